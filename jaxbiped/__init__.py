@@ -1,0 +1,64 @@
+"""jaxbiped: differentiable simulation of passive biped walkers in JAX.
+
+This page is the map: every public name is exported here and nowhere else. Pictures live in
+`jaxbiped.plot`, which needs matplotlib and is not imported with the rest.
+
+Importing jaxbiped switches JAX to 64-bit floats: contact this stiff cannot do with less.
+"""
+
+from jaxbiped import _clock as _clock
+
+import jax as _jax
+
+_jax.config.update("jax_enable_x64", True)
+
+from jaxbiped._checks import ArgumentError as ArgumentError
+from jaxbiped.dynamics._energy import Energies as Energies
+from jaxbiped.dynamics._energy import Powers as Powers
+from jaxbiped.dynamics._energy import energies as energies
+from jaxbiped.dynamics._energy import powers as powers
+from jaxbiped.dynamics._feet import Feet as Feet
+from jaxbiped.dynamics._feet import Foot as Foot
+from jaxbiped.dynamics._feet import feet as feet
+from jaxbiped.dynamics._feet import standing_height as standing_height
+from jaxbiped.dynamics._feet import touches as touches
+from jaxbiped.dynamics._forces import FootForce as FootForce
+from jaxbiped.dynamics._forces import FootForces as FootForces
+from jaxbiped.dynamics._forces import foot_forces as foot_forces
+from jaxbiped.dynamics._motion import Accelerations as Accelerations
+from jaxbiped.dynamics._motion import accelerations as accelerations
+from jaxbiped.dynamics._motion import vector_field as vector_field
+from jaxbiped.dynamics._state import State as State
+from jaxbiped.dynamics._state import exchange_legs as exchange_legs
+from jaxbiped.dynamics._state import seed_state as seed_state
+from jaxbiped.scene._bengisu_akay import BengisuAkay as BengisuAkay
+from jaxbiped.scene._clearance import AbstractClearance as AbstractClearance
+from jaxbiped.scene._clearance import AlwaysTouching as AlwaysTouching
+from jaxbiped.scene._clearance import StanceRotation as StanceRotation
+from jaxbiped.scene._coulomb import RegularisedCoulomb as RegularisedCoulomb
+from jaxbiped.scene._frictionless import Frictionless as Frictionless
+from jaxbiped.scene._ground import Ground as Ground
+from jaxbiped.scene._hertz import Hertz as Hertz
+from jaxbiped.scene._law import AbstractFrictionLaw as AbstractFrictionLaw
+from jaxbiped.scene._law import AbstractNormalLaw as AbstractNormalLaw
+from jaxbiped.scene._ristow_schafer import RistowSchafer as RistowSchafer
+from jaxbiped.scene._scene import Scene as Scene
+from jaxbiped.scene._seed import seed_scene as seed_scene
+from jaxbiped.scene._smooth_bengisu_akay import SmoothBengisuAkay as SmoothBengisuAkay
+from jaxbiped.scene._smooth_ristow_schafer import SmoothRistowSchafer as SmoothRistowSchafer
+from jaxbiped.scene._walker import Walker as Walker
+from jaxbiped.solve._accuracy import ACCURACIES as ACCURACIES
+from jaxbiped.solve._accuracy import rms_norm as rms_norm
+from jaxbiped.solve._ending import Ending as Ending
+from jaxbiped.solve._rodas3p import Rodas3P as Rodas3P
+from jaxbiped.solve._rodas4 import Rodas4 as Rodas4
+from jaxbiped.solve._rodas4p import Rodas4P as Rodas4P
+from jaxbiped.solve._rodas5p import Rodas5P as Rodas5P
+from jaxbiped.solve._rosenbrock import AbstractRosenbrock as AbstractRosenbrock
+from jaxbiped.solve._rosenbrock import RosenbrockInterpolation as RosenbrockInterpolation
+from jaxbiped.solve._rosenbrock import RosenbrockTableau as RosenbrockTableau
+from jaxbiped.solve._simulate import CompiledSimulation as CompiledSimulation
+from jaxbiped.solve._simulate import Simulation as Simulation
+from jaxbiped.solve._simulate import simulate as simulate
+from jaxbiped.solve._solvers import SOLVERS as SOLVERS
+from jaxbiped.solve._trajectory import Trajectory as Trajectory

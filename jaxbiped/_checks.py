@@ -1,0 +1,114 @@
+"""Checks of arguments: one clear sentence each, raised before anything is compiled.
+
+Values that are being traced (inside `jit`, `vmap`, `grad`) have no number to check and pass.
+"""
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+
+
+class ArgumentError(ValueError):
+    """An argument is not allowed. The message names it, its value and what is allowed."""
+
+
+def _is_traced(value: Any) -> bool:
+    return isinstance(value, jax.core.Tracer)
+
+
+def _numbers(name: str, value: Any) -> np.ndarray:
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{name} = {value!r} is not a number.") from None
+
+
+def _shown(array: np.ndarray, bad: np.ndarray) -> str:
+    """The first offending value; where there are many, how many offend."""
+    first = f"{array[bad].flat[0]:g}"
+    return first if array.size == 1 else f"{first} (one of {int(bad.sum())} such entries)"
+
+
+def _require(name: str, value: Any, allowed: str, test: Any) -> None:
+    if _is_traced(value):
+        return
+    array = _numbers(name, value)
+    bad = ~(np.isfinite(array) & test(array))
+    if bad.any():
+        raise ArgumentError(f"{name} = {_shown(array, bad)} is not allowed: it must be {allowed}.")
+
+
+def check_finite(name: str, value: Any) -> None:
+    """Raises `ArgumentError` unless every entry of `value` is a finite number."""
+    _require(name, value, "a finite number", lambda x: np.ones(x.shape, bool))
+
+
+def check_positive(name: str, value: Any, unit: str = "") -> None:
+    """Raises `ArgumentError` unless every entry of `value` is finite and above zero."""
+    _require(name, value, f"a finite number above 0{_in(unit)}", lambda x: x > 0)
+
+
+def check_not_negative(name: str, value: Any, unit: str = "") -> None:
+    """Raises `ArgumentError` unless every entry of `value` is finite and at least zero."""
+    _require(name, value, f"a finite number of at least 0{_in(unit)}", lambda x: x >= 0)
+
+
+def check_at_least(name: str, value: Any, bound_name: str, bound: Any) -> None:
+    """Raises `ArgumentError` unless `value >= bound` in every entry."""
+    if not _is_traced(bound):
+        floor = _numbers(bound_name, bound)
+        allowed = f"at least {bound_name}"
+        if floor.size == 1:
+            allowed += f" = {floor.item():g}"
+        _require(name, value, allowed, lambda x: x >= floor)
+
+
+def check_below(name: str, value: Any, bound: float, why: str) -> None:
+    """Raises `ArgumentError` unless |value| < bound in every entry."""
+    _require(name, value, f"between {-bound:g} and {bound:g} ({why})", lambda x: abs(x) < bound)
+
+
+def check_choice(name: str, value: Any, allowed: Iterable[str]) -> None:
+    """Raises `ArgumentError` unless `value` is one of the `allowed` names."""
+    names = list(allowed)
+    if value not in names:
+        raise ArgumentError(f"{name} = {value!r} is not known: choose one of {', '.join(names)}.")
+
+
+def check_type(name: str, value: Any, kind: type) -> None:
+    """Raises `ArgumentError` unless `value` is an instance of `kind`."""
+    if not isinstance(value, kind):
+        raise ArgumentError(f"{name} = {value!r} is not allowed: it must be a {kind.__name__}.")
+
+
+def check_writable_directory(name: str, path: Path) -> None:
+    """Creates the directory if need be; raises `ArgumentError` where files cannot be written."""
+    allowed = "it must be a directory in which files can be written"
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = (error.strerror or "cannot be made").lower()
+        raise ArgumentError(
+            f"{name} = {str(path)!r} is not allowed ({reason}): {allowed}."
+        ) from None
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise ArgumentError(f"{name} = {str(path)!r} is not allowed (not writable): {allowed}.")
+
+
+def check_writable_file(name: str, path: Path) -> None:
+    """Raises `ArgumentError` where a file of this name cannot be written."""
+    if path.is_dir():
+        raise ArgumentError(f"{name} = {str(path)!r} is a directory: it must be a file to write.")
+    parent = path.parent
+    if not parent.is_dir() or not os.access(path if path.exists() else parent, os.W_OK):
+        raise ArgumentError(
+            f"{name} = {str(path)!r} cannot be written: its folder must exist and be writable."
+        )
+
+
+def _in(unit: str) -> str:
+    return f" {unit}" if unit else ""

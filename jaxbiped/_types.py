@@ -1,0 +1,17 @@
+"""Names for the shapes that annotations use."""
+
+from typing import TypeAlias
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+Scalar: TypeAlias = Float[Array, "..."]
+"""A number: one scalar leaf, or one such leaf for each entry of a batch or a time series."""
+
+
+def as_float(value: object) -> Array:
+    """A floating-point array of JAX's default width (64 bits unless changed) or its own."""
+    if isinstance(value, jax.Array | jax.core.Tracer):
+        return value if jnp.issubdtype(value.dtype, jnp.floating) else value.astype(float)
+    return jnp.asarray(value, dtype=float)

@@ -1,0 +1,88 @@
+"""Energies of the walker and the powers that change them."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._forces import foot_force
+from jaxbiped.dynamics._state import State
+from jaxbiped.scene._scene import Scene
+
+
+class Energies(NamedTuple):
+    """Energies at a state [J].
+
+    Attributes:
+        kinetic: of both legs and the hip.
+        gravitational: zero with all mass at the origin of the slope's frame.
+        elastic: stored in the feet that touch.
+    """
+
+    kinetic: Scalar
+    gravitational: Scalar
+    elastic: Scalar
+
+    @property
+    def total(self) -> Scalar:
+        """Sum of the three [J]."""
+        return self.kinetic + self.gravitational + self.elastic
+
+
+class Powers(NamedTuple):
+    """Powers at a state [W].
+
+    Attributes:
+        gravity: of gravity on the walker.
+        indentation: of the walker on the ground's normal reaction, F_N δ̇, both feet together.
+        damper: what of it is lost while a foot touches, (F_N − elastic force) δ̇.
+        friction: lost to friction, never negative.
+    """
+
+    gravity: Scalar
+    indentation: Scalar
+    damper: Scalar
+    friction: Scalar
+
+
+def energies(scene: Scene, state: State) -> Energies:
+    """Kinetic, gravitational and elastic energy; leaves shaped as the state's."""
+    walker, ground = scene.walker, scene.ground
+    kinetic = 0.5 * walker.hip_mass * (state.hip_vx**2 + state.hip_vz**2)
+    moment_x = walker.hip_mass * state.hip_x
+    moment_z = walker.hip_mass * state.hip_z
+    for angle, rate in ((state.theta_1, state.omega_1), (state.theta_2, state.omega_2)):
+        sine, cosine = jnp.sin(angle), jnp.cos(angle)
+        vx = state.hip_vx + walker.d * cosine * rate
+        vz = state.hip_vz + walker.d * sine * rate
+        kinetic = kinetic + 0.5 * (walker.m * (vx**2 + vz**2) + walker.J * rate**2)
+        moment_x = moment_x + walker.m * (state.hip_x + walker.d * sine)
+        moment_z = moment_z + walker.m * (state.hip_z - walker.d * cosine)
+    height = moment_z * jnp.cos(ground.slope) - moment_x * jnp.sin(ground.slope)
+    elastic = sum(_elastic_energy(scene, foot) for foot in feet(scene, state))
+    return Energies(kinetic, ground.g * height, jnp.asarray(elastic))
+
+
+def powers(scene: Scene, state: State) -> Powers:
+    """Power of gravity and the contact's powers; leaves shaped as the state's."""
+    walker, ground = scene.walker, scene.ground
+    momentum_x = walker.total_mass * state.hip_vx
+    momentum_z = walker.total_mass * state.hip_vz
+    for angle, rate in ((state.theta_1, state.omega_1), (state.theta_2, state.omega_2)):
+        momentum_x = momentum_x + walker.m * walker.d * jnp.cos(angle) * rate
+        momentum_z = momentum_z + walker.m * walker.d * jnp.sin(angle) * rate
+    gravity = ground.g * (jnp.sin(ground.slope) * momentum_x - jnp.cos(ground.slope) * momentum_z)
+    indentation = damper = friction = jnp.zeros_like(state.hip_x)
+    for foot in feet(scene, state):
+        force = foot_force(scene, foot)
+        held = jnp.where(touches(foot), scene.normal.elastic_force(foot.penetration), 0.0)
+        indentation = indentation + force.normal * foot.penetration_rate
+        damper = damper + (force.normal - held) * foot.penetration_rate
+        if force.tangential is not None:
+            friction = friction - force.tangential * foot.slip_speed
+    return Powers(gravity, indentation, damper, friction)
+
+
+def _elastic_energy(scene: Scene, foot: Foot) -> Scalar:
+    return jnp.where(touches(foot), scene.normal.elastic_energy(foot.penetration), 0.0)

@@ -1,0 +1,46 @@
+"""Forces of the ground on the feet."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.dynamics._state import State
+from jaxbiped.scene._frictionless import Frictionless
+from jaxbiped.scene._scene import Scene
+
+
+class FootForce(NamedTuple):
+    """Force of the ground on one foot.
+
+    Attributes:
+        normal: F_N along the slope's outward normal [N], never negative.
+        tangential: along the slope, downhill positive [N]; None where the scene has no friction.
+    """
+
+    normal: Scalar
+    tangential: Scalar | None
+
+
+def foot_force(scene: Scene, foot: Foot) -> FootForce:
+    """Force on a foot whose kinematics are known."""
+    normal = scene.normal.force(foot.penetration, foot.penetration_rate)
+    if foot.admitted is not None:
+        normal = jnp.where(foot.admitted, normal, 0.0)
+    if isinstance(scene.friction, Frictionless):
+        return FootForce(normal, None)
+    return FootForce(normal, scene.friction.force(normal, foot.slip_speed))
+
+
+class FootForces(NamedTuple):
+    """One entry for each leg."""
+
+    foot_1: FootForce
+    foot_2: FootForce
+
+
+def foot_forces(scene: Scene, state: State) -> FootForces:
+    """Forces on both feet at a state; leaves shaped as the state's."""
+    both = feet(scene, state)
+    return FootForces(foot_force(scene, both.foot_1), foot_force(scene, both.foot_2))

@@ -1,0 +1,79 @@
+"""The state of the walker in minimal coordinates, and the seed's start."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+
+from jaxbiped._checks import ArgumentError, check_finite, check_type
+from jaxbiped._types import Scalar, as_float
+
+
+class State(NamedTuple):
+    """Hip position, leg angles and their rates: eight scalar leaves in the slope's frame.
+
+    The frame is fixed to the slope: x along it, downhill positive; z along its outward normal. A
+    leg's angle is measured from that normal, positive when its foot is ahead of (downhill from)
+    the hip. Leaves may carry any common batch shape.
+
+    Attributes:
+        hip_x, hip_z: hip position [m].
+        theta_1, theta_2: leg angles [rad].
+        hip_vx, hip_vz: hip velocity [m/s].
+        omega_1, omega_2: leg rates [rad/s].
+    """
+
+    hip_x: Scalar
+    hip_z: Scalar
+    theta_1: Scalar
+    theta_2: Scalar
+    hip_vx: Scalar
+    hip_vz: Scalar
+    omega_1: Scalar
+    omega_2: Scalar
+
+
+def seed_state() -> State:
+    """The seed paper's start (section 2.3) on a slope of 0.02 rad, its misprints mended.
+
+    Leg 2 stands, leg 1 swings and is momentarily all but at rest. The paper prints the legs'
+    velocities with the labels swapped and one sign flipped; undoing that gives one hip velocity
+    from both legs, to 1e-5 m/s.
+    """
+    return State(
+        hip_x=jnp.asarray(0.0, dtype=float),
+        hip_z=jnp.asarray(0.395, dtype=float),
+        theta_1=jnp.asarray(-0.2479, dtype=float),
+        theta_2=jnp.asarray(0.1655, dtype=float),
+        hip_vx=jnp.asarray(0.49797, dtype=float),
+        hip_vz=jnp.asarray(0.05853, dtype=float),
+        omega_1=jnp.asarray(-0.0052, dtype=float),
+        omega_2=jnp.asarray(-1.2565, dtype=float),
+    )
+
+
+def exchange_legs(state: State) -> State:
+    """The same motion with the names of the two legs exchanged."""
+    return state._replace(
+        theta_1=state.theta_2,
+        theta_2=state.theta_1,
+        omega_1=state.omega_2,
+        omega_2=state.omega_1,
+    )
+
+
+def checked_state(state: State) -> State:
+    """`state` with every leaf a floating-point array of one shape.
+
+    Raises:
+        ArgumentError: not a `State`, an entry that is not finite, or leaves of different shapes.
+    """
+    check_type("state", state, State)
+    for name, value in state._asdict().items():
+        check_finite(f"state.{name}", value)
+    leaves = [as_float(value) for value in state]
+    shapes = {leaf.shape for leaf in leaves}
+    if len(shapes) > 1:
+        raise ArgumentError(
+            f"state has leaves of shapes {sorted(shapes)}: all eight must have the same shape."
+        )
+    return State(*leaves)

@@ -1,0 +1,1 @@
+"""What is modelled and nothing else. Public names are exported by `jaxbiped` itself."""

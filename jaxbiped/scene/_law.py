@@ -1,0 +1,58 @@
+"""The two interfaces that every law of contact answers."""
+
+import abc
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._types import Scalar
+
+
+class AbstractNormalLaw(eqx.Module):
+    """Normal force of the ground on a foot as a function of penetration and its rate."""
+
+    @abc.abstractmethod
+    def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
+        """Normal force [N], never negative, zero where `penetration` [m] is not above zero.
+
+        `rate` [m/s] is the rate of penetration, positive while the foot goes in.
+        """
+
+    @abc.abstractmethod
+    def elastic_force(self, penetration: Scalar) -> Scalar:
+        """The part of the force that stores energy [N], as if the foot were held at rest."""
+
+    @abc.abstractmethod
+    def elastic_energy(self, penetration: Scalar) -> Scalar:
+        """Energy stored in the contact [J]: the integral of `elastic_force`."""
+
+
+class AbstractFrictionLaw(eqx.Module):
+    """Tangential force of the ground on a foot as a function of normal force and slip speed."""
+
+    @abc.abstractmethod
+    def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
+        """Tangential force [N] along the slope, opposing `slip_speed` [m/s]."""
+
+
+def power(base: Scalar, exponent: Scalar) -> Scalar:
+    """`base ** exponent` for a positive base, with one exponential shared by all derivatives."""
+    return jnp.exp(exponent * jnp.log(base))
+
+
+def hertz_force(stiffness: Scalar, exponent: Scalar, penetration: Scalar) -> Scalar:
+    """K δⁿ where δ > 0, else zero [N]; every derivative is finite at δ = 0."""
+    touching = penetration > 0.0
+    depth = jnp.where(touching, penetration, 1.0)
+    return jnp.where(touching, stiffness * power(depth, exponent), 0.0)
+
+
+def hertz_energy(stiffness: Scalar, exponent: Scalar, penetration: Scalar) -> Scalar:
+    """The integral of `hertz_force` over penetration [J]."""
+    return hertz_force(stiffness, exponent, penetration) * penetration / (exponent + 1.0)
+
+
+def smooth_ramp(x: Scalar, width: Scalar) -> Scalar:
+    """Zero up to 0, `x` from `width` on, twice continuously differentiable in between."""
+    t = jnp.clip(x / width, 0.0, 1.0)
+    return x * (t * t * t * (10.0 + t * (6.0 * t - 15.0)))

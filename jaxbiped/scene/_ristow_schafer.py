@@ -1,0 +1,46 @@
+"""The seed's normal law: Hertz stiffness with a damper that grows with penetration."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from jaxbiped._checks import check_at_least, check_not_negative, check_positive
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.scene._law import AbstractNormalLaw, hertz_energy, hertz_force, power
+
+
+class RistowSchafer(AbstractNormalLaw):
+    """F_N = K δⁿ + c δ δ̇ while δ > 0, never below zero (no adhesion).
+
+    Source: the seed paper, section 2.2, after Ristow and Schäfer et al. The reaction leaves zero
+    at δ̇ = −(K/c) δⁿ⁻¹, while the foot is still indented.
+
+    Attributes (leaves of any batch shape):
+        K: contact stiffness [N/mⁿ].
+        c: contact damping [N·s/m²].
+        n: exponent [–].
+
+    Raises:
+        ArgumentError: K not above 0, c below 0 or n below 1.
+    """
+
+    K: Array = eqx.field(converter=as_float)
+    c: Array = eqx.field(converter=as_float)
+    n: Array = eqx.field(converter=as_float, default=1.5)
+
+    def __check_init__(self) -> None:
+        check_positive("K", self.K, "N/m^n")
+        check_not_negative("c", self.c, "N s/m^2")
+        check_at_least("n", self.n, "1", 1.0)
+
+    def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
+        touching = penetration > 0.0
+        depth = jnp.where(touching, penetration, 1.0)
+        force = self.K * power(depth, self.n) + self.c * depth * rate
+        return jnp.where(touching & (force > 0.0), force, 0.0)
+
+    def elastic_force(self, penetration: Scalar) -> Scalar:
+        return hertz_force(self.K, self.n, penetration)
+
+    def elastic_energy(self, penetration: Scalar) -> Scalar:
+        return hertz_energy(self.K, self.n, penetration)

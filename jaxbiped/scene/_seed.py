@@ -1,0 +1,43 @@
+"""The seed paper's own scene."""
+
+from jaxbiped.scene._bengisu_akay import BengisuAkay
+from jaxbiped.scene._clearance import StanceRotation
+from jaxbiped.scene._ground import Ground
+from jaxbiped.scene._ristow_schafer import RistowSchafer
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._walker import Walker
+
+
+def seed_scene(
+    *,
+    slope: float = 0.02,
+    g: float = 9.8,
+    m: float = 1.0,
+    J: float = 0.0096,
+    l: float = 0.40,
+    d: float = 0.10,
+    r: float = 0.08,
+    hip_mass: float = 0.0,
+    n: float = 1.5,
+    K: float = 1e6,
+    c: float = 1e7,
+    mu_static: float = 0.50,
+    mu_kinetic: float = 0.40,
+    v0: float = 1e-4,
+    xi: float = 1000.0,
+) -> Scene:
+    """The paper's walker (section 2.3) on its slope, any parameter replaced by its paper name.
+
+    Units: `slope` rad, `g` m/s², `m` and `hip_mass` kg, `J` kg·m², `l`, `d`, `r` m, `K` N/mⁿ,
+    `c` N·s/m², `v0` m/s, `xi` s/m. The paper prints slopes as "0,20 rad"; 0.02 is meant.
+
+    Raises:
+        ArgumentError: a value that is not allowed; the message names it.
+    """
+    return Scene(
+        walker=Walker(m=m, J=J, l=l, d=d, r=r, hip_mass=hip_mass),
+        ground=Ground(slope=slope, g=g),
+        normal=RistowSchafer(K=K, c=c, n=n),
+        friction=BengisuAkay(mu_static=mu_static, mu_kinetic=mu_kinetic, v0=v0, xi=xi),
+        clearance=StanceRotation(),
+    )

@@ -1,0 +1,51 @@
+"""The walker: two equal rigid legs, joined at the hip, on round feet."""
+
+import equinox as eqx
+from jaxtyping import Array
+
+from jaxbiped._checks import check_at_least, check_not_negative, check_positive
+from jaxbiped._types import Scalar, as_float
+
+
+class Walker(eqx.Module):
+    """Two equal rigid legs joined by a frictionless hinge, each ending in a circular foot.
+
+    Source: the seed paper, section 2.1. The centre of the foot lies on the leg's axis.
+
+    Attributes (leaves of any batch shape):
+        m: mass of one leg [kg].
+        J: moment of inertia of one leg about its centre of mass [kg·m²].
+        l: hip to sole [m].
+        d: hip to the leg's centre of mass [m].
+        r: foot radius [m].
+        hip_mass: point mass at the hip [kg].
+
+    Raises:
+        ArgumentError: m, J or l not above 0; d, r or hip_mass below 0; l below r.
+    """
+
+    m: Array = eqx.field(converter=as_float)
+    J: Array = eqx.field(converter=as_float)
+    l: Array = eqx.field(converter=as_float)
+    d: Array = eqx.field(converter=as_float)
+    r: Array = eqx.field(converter=as_float)
+    hip_mass: Array = eqx.field(converter=as_float, default=0.0)
+
+    def __check_init__(self) -> None:
+        check_positive("m", self.m, "kg")
+        check_positive("J", self.J, "kg m^2")
+        check_positive("l", self.l, "m")
+        check_not_negative("d", self.d, "m")
+        check_not_negative("r", self.r, "m")
+        check_not_negative("hip_mass", self.hip_mass, "kg")
+        check_at_least("l", self.l, "r", self.r)
+
+    @property
+    def hip_to_foot(self) -> Scalar:
+        """Distance from the hip to the centre of the foot, l − r [m]."""
+        return self.l - self.r
+
+    @property
+    def total_mass(self) -> Scalar:
+        """Mass of both legs and the hip [kg]."""
+        return 2.0 * self.m + self.hip_mass

@@ -1,0 +1,74 @@
+"""Accuracy: named tolerances, the norm that errors are measured in, and what float32 can bear."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._checks import ArgumentError, check_choice, check_positive
+from jaxbiped._types import Scalar
+from jaxbiped.scene._scene import Scene
+
+
+class Tolerances(NamedTuple):
+    """Tolerances of the step-size control: relative, and absolute in SI units.
+
+    The absolute one must resolve the slip speed v0 at which friction peaks, or steps chatter
+    about it; by default it is a hundredth of the relative one.
+    """
+
+    rtol: float
+    atol: float
+
+
+ACCURACIES = {"fast": 1e-4, "balanced": 1e-6, "tight": 1e-8}
+"""Relative tolerance of each named accuracy."""
+
+
+def tolerances(accuracy: str, rtol: float | None, atol: float | None) -> Tolerances:
+    """The tolerances that a name stands for, either one replaced where it is given.
+
+    Raises:
+        ArgumentError: an unknown name, or a tolerance that is not above zero.
+    """
+    check_choice("accuracy", accuracy, ACCURACIES)
+    relative = ACCURACIES[accuracy] if rtol is None else rtol
+    check_positive("rtol", relative)
+    absolute = 1e-2 * relative if atol is None else atol
+    check_positive("atol", absolute)
+    return Tolerances(relative, absolute)
+
+
+def rms_norm(error: PyTree) -> Scalar:
+    """Root mean square over all leaves, without gluing them into one array first."""
+    leaves = jtu.tree_leaves(error)
+    size = sum(jnp.size(leaf) for leaf in leaves)
+    total = sum(jnp.sum(leaf * leaf) for leaf in leaves)
+    return jnp.sqrt(total / size)
+
+
+def check_precision(scene: Scene, dtype: np.dtype) -> None:
+    """Refuses a precision too coarse for the scene's contact.
+
+    Rounding a position of the order of l moves a foot by ε l. Where that alone changes the
+    reaction (its stiffness K at one metre's penetration, times ε l) by more than the walker's
+    weight, contact is noise.
+
+    Raises:
+        ArgumentError: for float32 (or less) where contact is too stiff.
+    """
+    leaves = jtu.tree_leaves(scene)
+    if dtype == np.float64 or any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+        return
+    walker = scene.walker
+    stiffness = scene.normal.elastic_force(jnp.ones_like(walker.l))
+    rounding = stiffness * float(jnp.finfo(dtype).eps) * walker.l
+    worst = float(jnp.max(rounding / (walker.total_mass * scene.ground.g)))
+    if worst > 1.0:
+        raise ArgumentError(
+            f"dtype = {np.dtype(dtype).name} is too coarse for this contact: rounding a position "
+            f"changes the reaction by {worst:.3g} times the walker's weight; use float64."
+        )

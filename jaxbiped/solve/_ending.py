@@ -1,0 +1,169 @@
+"""How a simulation can end, and the events that end it."""
+
+import enum
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._energy import energies
+from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._motion import accelerations
+from jaxbiped.dynamics._state import State
+from jaxbiped.scene._clearance import StanceRotation
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._fence import fenced
+
+_FALL_ANGLE = 1.0
+"""A hip lower than a leg at this angle [rad] could carry it has fallen."""
+_REST_RATE = 1e-4
+"""Rate of a leg at rest, in units of √(g/l)."""
+_LOST_RATE = 0.1
+"""Rate, in the same units, up to which a leg that turned back has just lost its ground."""
+_REST_ENERGY = 1e-10
+"""Kinetic energy of a walker at rest, in units of its weight times l."""
+_STUMBLE_SPEED = 1e-3
+"""Speed at which a rear foot comes down, in units of √(g l), from which it counts as a stumble."""
+
+
+class Ending(enum.IntEnum):
+    """How a simulation ended. `str(ending)` is its name in words.
+
+    - walking: the time or the footsteps asked for are done.
+    - fell forward: the hip came down moving downhill; or the swing leg turned back too late, its
+      foot ahead but so deep under the ground that the reaction bars its way.
+    - fell back: the hip came down moving uphill.
+    - stopped: the stance leg came to rest in single support (under the paper's clearance rule it
+      would then lose its ground and sink), or the whole walker stands still on the ground.
+    - stumbled: the foot behind came down, moving forward, while the one ahead carried; or the
+      swing leg was so barred before it had passed the other.
+    - out of steps: the solver's cap on steps was reached, or no footstep came in all the time
+      allowed for it.
+    - solver failed: the state is no longer a number.
+    """
+
+    WALKING = 0
+    FELL_FORWARD = 1
+    FELL_BACK = 2
+    STOPPED = 3
+    STUMBLED = 4
+    OUT_OF_STEPS = 5
+    SOLVER_FAILED = 6
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+
+def has_fallen(scene: Scene, state: State) -> Scalar:
+    """Whether the hip is lower than a leg at 1 rad could carry it (boolean)."""
+    walker = scene.walker
+    return state.hip_z < walker.r + walker.hip_to_foot * jnp.cos(_FALL_ANGLE)
+
+
+@eqx.filter_jit  # for its trace cache
+def is_barred(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
+    """Whether the motion has no continuation at the surface where a leg turns back (two booleans).
+
+    Under the paper's clearance rule contact comes on when a swing leg turns back (θ̇ falls to
+    zero). Where its foot is under the ground by then, the reaction is there at once, and may push
+    the leg forward again, into the side where there is none: neither side lets it go on. The
+    first boolean: the foot is ahead of the other; the second: behind.
+    """
+    never = jnp.zeros_like(state.hip_z, dtype=bool)
+    if not isinstance(scene.clearance, StanceRotation):
+        return never, never
+    foot_1, foot_2 = feet(scene, state)
+    unit = jnp.sqrt(scene.ground.g / scene.walker.l)
+
+    def turning(foot: Foot, rate: Scalar) -> Scalar:
+        return (foot.penetration > 0.0) & (rate >= 0.0) & (rate < _REST_RATE * unit)
+
+    turning_1 = turning(foot_1, state.omega_1)
+    turning_2 = turning(foot_2, state.omega_2)
+
+    def attracted() -> tuple[Scalar, Scalar]:
+        barely_back = jnp.full_like(state.hip_z, -jnp.finfo(state.hip_z.dtype).tiny)
+        off = accelerations(scene, state)
+        on_1 = accelerations(scene, state._replace(omega_1=barely_back))
+        on_2 = accelerations(scene, state._replace(omega_2=barely_back))
+        barred_1 = (off.alpha_1 < 0.0) & (on_1.alpha_1 > 0.0)
+        barred_2 = (off.alpha_2 < 0.0) & (on_2.alpha_2 > 0.0)
+        return barred_1, barred_2
+
+    attracted_1, attracted_2 = fenced(turning_1 | turning_2, attracted)
+    barred_1, barred_2 = turning_1 & attracted_1, turning_2 & attracted_2
+    first_ahead = foot_1.x > foot_2.x
+    ahead = (barred_1 & first_ahead) | (barred_2 & ~first_ahead)
+    return ahead, (barred_1 | barred_2) & ~ahead
+
+
+@eqx.filter_jit  # for its trace cache
+def has_stopped(scene: Scene, state: State) -> Scalar:
+    """Whether the stance leg is at rest in single support, or the walker on the ground (boolean)."""
+    foot_1, foot_2 = feet(scene, state)
+    touch_1, touch_2 = touches(foot_1), touches(foot_2)
+    if not isinstance(scene.clearance, StanceRotation):
+        unit = scene.walker.total_mass * scene.ground.g * scene.walker.l
+        at_rest = energies(scene, state).kinetic < _REST_ENERGY * unit
+        return (touch_1 | touch_2) & at_rest
+    unit = jnp.sqrt(scene.ground.g / scene.walker.l)
+
+    def at_rest_on(carries: Scalar, other: Scalar, rate: Scalar) -> Scalar:
+        return carries & ~other & (rate > -_REST_RATE * unit)
+
+    def lost(foot: Foot, rate: Scalar) -> Scalar:
+        return (foot.penetration > 0.0) & (rate >= 0.0) & (rate < _LOST_RATE * unit)
+
+    slow = at_rest_on(touch_1, touch_2, state.omega_1) | at_rest_on(touch_2, touch_1, state.omega_2)
+    sinking = lost(foot_1, state.omega_1) | lost(foot_2, state.omega_2)
+    return slow | (~touch_1 & ~touch_2 & sinking)
+
+
+@eqx.filter_jit  # for its trace cache
+def has_stumbled(scene: Scene, state: State) -> Scalar:
+    """Whether the rear foot comes down, moving forward, while the other carries (boolean)."""
+    foot_1, foot_2 = feet(scene, state)
+    unit = jnp.sqrt(scene.ground.g * scene.walker.l)
+
+    def trips(rear: Foot, front: Foot) -> Scalar:
+        entering = rear.penetration_rate > jnp.maximum(front.penetration_rate, 0.0)
+        fast = rear.penetration_rate > _STUMBLE_SPEED * unit
+        return (rear.x < front.x) & entering & fast & (rear.slip_speed > _STUMBLE_SPEED * unit)
+
+    both = touches(foot_1) & touches(foot_2)
+    return both & (trips(foot_1, foot_2) | trips(foot_2, foot_1))
+
+
+WATCHES = ("fall", "stop", "stumble")
+
+
+def ending_events(watch: tuple[str, ...]) -> dict[Ending, Callable[..., Any]]:
+    """The conditions, for `diffrax.Event`, that end a solve whose `args` is the scene."""
+
+    def fell_forward(t: Any, y: State, args: Scene, **kwargs: Any) -> Any:
+        too_late, _ = is_barred(args, y)
+        return too_late | (has_fallen(args, y) & (y.hip_vx >= 0.0))
+
+    def fell_back(t: Any, y: State, args: Scene, **kwargs: Any) -> Any:
+        return has_fallen(args, y) & (y.hip_vx < 0.0)
+
+    def stopped(t: Any, y: State, args: Scene, **kwargs: Any) -> Any:
+        return has_stopped(args, y)
+
+    def stumbled(t: Any, y: State, args: Scene, **kwargs: Any) -> Any:
+        _, too_short = is_barred(args, y)
+        return too_short | has_stumbled(args, y)
+
+    def failed(t: Any, y: State, args: Scene, **kwargs: Any) -> Any:
+        return ~jnp.isfinite(sum(y))
+
+    events: dict[Ending, Callable[..., Any]] = {Ending.SOLVER_FAILED: failed}
+    if "fall" in watch:
+        events |= {Ending.FELL_FORWARD: fell_forward, Ending.FELL_BACK: fell_back}
+    if "stop" in watch:
+        events[Ending.STOPPED] = stopped
+    if "stumble" in watch:
+        events[Ending.STUMBLED] = stumbled
+    return events

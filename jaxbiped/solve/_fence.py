@@ -1,0 +1,33 @@
+"""Keeps XLA's CPU backend from computing the same thing many times over."""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox.internal as eqxi
+import jax
+import jax.extend
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxbiped._types import Scalar
+
+
+def fenced(happens: Scalar, compute: Callable[[], Any]) -> Any:
+    """`compute()`, kept apart from what comes before and after it in the compiled program.
+
+    XLA's CPU backend fuses every scalar operation into each of its consumers, repeating it for
+    each: hundreds of sines a step where a dozen are needed. It removes optimisation barriers
+    first, but never fuses across a conditional. So the work is put into one whose condition the
+    compiler cannot know. `happens` (boolean) says where the result is wanted; where no lane wants
+    it, the result may be zeros. Elsewhere than on a CPU there is nothing to keep apart.
+    """
+    if jax.default_backend() != "cpu":
+        return compute()
+    program, shapes = jax.make_jaxpr(compute, return_shape=True)()
+    leaves, structure = jtu.tree_flatten(shapes)
+    results = jax.lax.cond(
+        eqxi.unvmap_any(happens),
+        jax.extend.core.jaxpr_as_fun(program),
+        lambda: [jnp.zeros(leaf.shape, leaf.dtype) for leaf in leaves],
+    )
+    return jtu.tree_unflatten(structure, results)

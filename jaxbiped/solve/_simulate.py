@@ -1,0 +1,251 @@
+"""Simulating a scene from a start."""
+
+from typing import Any, Literal
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import Array, Float
+
+from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._motion import vector_field
+from jaxbiped.dynamics._state import State, checked_state
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import check_precision, rms_norm, tolerances
+from jaxbiped.solve._ending import WATCHES, Ending, ending_events
+from jaxbiped.solve._footstep_limit import FootstepLimit
+from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve._trajectory import Trajectory
+
+_FIRST_STEP = 1e-5
+"""First step tried [s]; a start that is not a number must not choose it."""
+_SMALLEST_STEP = 1e-12
+"""Step size [s] that is taken whatever its error: how a jump of the force is crossed."""
+_PATIENCE = 100.0
+"""Time allowed for each footstep asked for [s]."""
+
+
+def simulate(
+    scene: Scene,
+    state: State,
+    *,
+    duration: float | None = None,
+    steps: int | None = None,
+    solver: str | diffrax.AbstractSolver = "rodas4",
+    accuracy: str = "balanced",
+    rtol: float | None = None,
+    atol: float | None = None,
+    save: Literal["steps", "end"] | Float[Array, " n"] = "steps",
+    watch: tuple[str, ...] = WATCHES,
+    max_solver_steps: int = 65536,
+    adjoint: diffrax.AbstractAdjoint | None = None,
+) -> Trajectory:
+    """Simulates a scene from a state, for a time, a number of footsteps, or whichever ends first.
+
+    Works under `jit`, `vmap` and differentiation; one lane that falls or fails neither changes nor
+    holds up the others. Under any of these a trajectory saved step by step keeps its full length
+    of `max_solver_steps + 1`, filled with infinities: save only the end of large batches.
+
+    Args:
+        scene: what to simulate.
+        state: start, eight scalar leaves. Their dtype is the precision of the solve: 64 bits
+            unless the user says otherwise.
+        duration: simulated time [s].
+        steps: footsteps (heel strikes) after which to end.
+        solver: a name (see `SOLVERS`) or any diffrax solver.
+        accuracy: "fast", "balanced" or "tight": relative tolerance 1e-4, 1e-6 or 1e-8.
+        rtol: relative tolerance, in place of the accuracy's.
+        atol: absolute tolerance (SI), in place of a hundredth of the relative one.
+        save: "steps" for every step and the continuous solution, "end" for the final state, or
+            increasing times [s] at which to save.
+        watch: which misfortunes end the solve: any of "fall", "stop", "stumble".
+        max_solver_steps: cap on the solver's attempted steps.
+        adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
+            needs `diffrax.ForwardMode()`.
+
+    Returns:
+        The motion, and how it ended.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled.
+    """
+    run = Simulation.prepare(
+        scene,
+        state,
+        duration=duration,
+        steps=steps,
+        solver=solver,
+        accuracy=accuracy,
+        rtol=rtol,
+        atol=atol,
+        save=save,
+        watch=watch,
+        max_solver_steps=max_solver_steps,
+        adjoint=adjoint,
+    )
+    return _trimmed(_solve(run))
+
+
+class Simulation(eqx.Module):
+    """A checked request to simulate. `prepare` it, then `compile` it to run it apart from that."""
+
+    scene: Scene
+    state: State
+    duration: Scalar
+    times: Array | None
+    rtol: Scalar
+    atol: Scalar
+    solver: diffrax.AbstractSolver
+    adjoint: diffrax.AbstractAdjoint
+    steps: int | None = eqx.field(static=True)
+    save_steps: bool = eqx.field(static=True)
+    watch: tuple[str, ...] = eqx.field(static=True)
+    max_solver_steps: int = eqx.field(static=True)
+
+    @staticmethod
+    def prepare(
+        scene: Scene,
+        state: State,
+        *,
+        duration: float | None = None,
+        steps: int | None = None,
+        solver: str | diffrax.AbstractSolver = "rodas4",
+        accuracy: str = "balanced",
+        rtol: float | None = None,
+        atol: float | None = None,
+        save: Any = "steps",
+        watch: tuple[str, ...] = WATCHES,
+        max_solver_steps: int = 65536,
+        adjoint: diffrax.AbstractAdjoint | None = None,
+    ) -> "Simulation":
+        """Checks the arguments, which are those of `simulate`."""
+        check_type("scene", scene, Scene)
+        state = checked_state(state)
+        if duration is None and steps is None:
+            raise ArgumentError("duration = None and steps = None: say how long to simulate.")
+        if steps is not None:
+            check_positive("steps", steps)
+        allowed_time = _PATIENCE * steps if steps is not None else 0.0
+        time = allowed_time if duration is None else duration
+        check_positive("duration", time, "s")
+        check_positive("max_solver_steps", max_solver_steps)
+        for name in watch:
+            check_choice("watch", name, WATCHES)
+        if isinstance(save, str):
+            check_choice("save", save, ("steps", "end"))
+        relative, absolute = tolerances(accuracy, rtol, atol)
+        dtype = jnp.result_type(state.hip_z)
+        check_precision(scene, dtype)
+
+        def cast(leaf: Any) -> Array:
+            return jnp.asarray(leaf, dtype=dtype)
+
+        return Simulation(
+            scene=jtu.tree_map(cast, scene),
+            state=state,
+            duration=cast(time),
+            times=None if isinstance(save, str) else cast(save),
+            rtol=cast(relative),
+            atol=cast(absolute),
+            solver=solver_named(solver),
+            adjoint=diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint,
+            steps=None if steps is None else int(steps),
+            save_steps=isinstance(save, str) and save == "steps",
+            watch=tuple(watch),
+            max_solver_steps=int(max_solver_steps),
+        )
+
+    def compile(self) -> "CompiledSimulation":
+        """Compiles the solve, so that its run can be timed by itself."""
+        return CompiledSimulation(_solve.lower(self).compile(), self)
+
+
+class CompiledSimulation:
+    """A compiled request; call it to run."""
+
+    def __init__(self, program: Any, request: Simulation) -> None:
+        self._program = program
+        self._request = request
+
+    def __call__(self) -> Trajectory:
+        """Runs the solve and waits for it."""
+        return _trimmed(jax.block_until_ready(self._program(self._request)))
+
+
+@eqx.filter_jit
+def _solve(run: Simulation) -> Trajectory:
+    controller: Any = diffrax.PIDController(
+        rtol=run.rtol,
+        atol=run.atol,
+        norm=rms_norm,
+        dtmin=_SMALLEST_STEP,
+        force_dtmin=True,  # a state that is no longer a number ends the solve by event
+    )
+    if run.steps is not None:
+        controller = FootstepLimit(controller, run.steps)
+    events = ending_events(run.watch)
+    zero = jnp.zeros_like(run.duration)
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(vector_field),
+        run.solver,
+        t0=zero,
+        t1=run.duration,
+        dt0=jnp.minimum(jnp.full_like(zero, _FIRST_STEP), run.duration),
+        y0=run.state,
+        args=run.scene,
+        saveat=_saveat(run),
+        stepsize_controller=controller,
+        event=diffrax.Event(list(events.values())) if events else None,
+        max_steps=run.max_solver_steps,
+        adjoint=run.adjoint,
+        throw=False,
+    )
+    return Trajectory(
+        t=solution.ts,
+        state=solution.ys,
+        ending=_ending(solution, list(events), run),
+        accepted=solution.stats["num_accepted_steps"],
+        rejected=solution.stats["num_rejected_steps"],
+        dense=solution.interpolation if run.save_steps else None,
+    )
+
+
+def _saveat(run: Simulation) -> diffrax.SaveAt:
+    counting = run.steps is not None
+    if run.save_steps:
+        return diffrax.SaveAt(t0=True, steps=True, dense=True, controller_state=counting)
+    if run.times is not None:
+        return diffrax.SaveAt(ts=run.times, controller_state=counting)
+    return diffrax.SaveAt(t1=True, controller_state=counting)
+
+
+def _ending(solution: diffrax.Solution, names: list[Ending], run: Simulation) -> Array:
+    results = diffrax.RESULTS
+    code = jnp.asarray(int(Ending.SOLVER_FAILED))
+    code = jnp.where(solution.result == results.max_steps_reached, int(Ending.OUT_OF_STEPS), code)
+    done = solution.result == results.successful
+    if run.steps is not None:
+        _, _, count = solution.controller_state
+        # Time ran out before the footsteps came, where only footsteps were asked for.
+        patience_ended = done & (count < run.steps) & (run.duration >= _PATIENCE * run.steps)
+        code = jnp.where(patience_ended, int(Ending.OUT_OF_STEPS), code)
+        done = (done & ~patience_ended) | (solution.result == results.event_occurred)
+    code = jnp.where(done, int(Ending.WALKING), code)
+    for name, happened in zip(names, solution.event_mask or [], strict=False):
+        code = jnp.where(happened, int(name), code)
+    return code
+
+
+def _trimmed(trajectory: Trajectory) -> Trajectory:
+    """Cuts unused room off a single trajectory; one that is being traced keeps it."""
+    if trajectory.dense is None or isinstance(trajectory.t, jax.core.Tracer):
+        return trajectory
+    length = int(trajectory.accepted) + 1
+    return eqx.tree_at(
+        lambda each: (each.t, each.state),
+        trajectory,
+        (trajectory.t[:length], jtu.tree_map(lambda leaf: leaf[:length], trajectory.state)),
+    )

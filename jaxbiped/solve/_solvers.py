@@ -1,0 +1,42 @@
+"""Solvers by name: our Rosenbrock family and diffrax's own."""
+
+import diffrax
+import optimistix
+
+from jaxbiped._checks import check_choice
+from jaxbiped.solve._rodas3p import Rodas3P
+from jaxbiped.solve._rodas4 import Rodas4
+from jaxbiped.solve._rodas4p import Rodas4P
+from jaxbiped.solve._rodas5p import Rodas5P
+
+
+def _chord() -> optimistix.AbstractRootFinder:
+    # diffrax's default, VeryChord, rejects steps that converge (diffrax 0.7.2).
+    return diffrax.with_stepsize_controller_tols(optimistix.Chord)()
+
+
+SOLVERS = {
+    "rodas3p": Rodas3P,
+    "rodas4": Rodas4,
+    "rodas4p": Rodas4P,
+    "rodas5p": Rodas5P,
+    "kvaerno3": lambda: diffrax.Kvaerno3(root_finder=_chord()),
+    "kvaerno4": lambda: diffrax.Kvaerno4(root_finder=_chord()),
+    "kvaerno5": lambda: diffrax.Kvaerno5(root_finder=_chord()),
+    "bosh3": diffrax.Bosh3,
+    "tsit5": diffrax.Tsit5,
+    "dopri5": diffrax.Dopri5,
+    "dopri8": diffrax.Dopri8,
+}
+
+
+def solver_named(solver: str | diffrax.AbstractSolver) -> diffrax.AbstractSolver:
+    """The solver of that name, or the solver itself where one is given.
+
+    Raises:
+        ArgumentError: an unknown name.
+    """
+    if isinstance(solver, diffrax.AbstractSolver):
+        return solver
+    check_choice("solver", solver, SOLVERS)
+    return SOLVERS[solver]()

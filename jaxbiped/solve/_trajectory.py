@@ -1,0 +1,62 @@
+"""What a simulation returns."""
+
+from typing import Any
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import Array, Float, Int
+
+from jaxbiped.dynamics._state import State
+from jaxbiped.solve._ending import Ending
+
+
+class Trajectory(eqx.Module):
+    """A simulated motion and how it ended. Under `vmap` every leaf gains the batch's axes.
+
+    Attributes:
+        t: times that were saved [s], shape (n,).
+        state: states at those times, leaves of shape (n,).
+        ending: code of an `Ending`; `Ending(int(code))` names it.
+        accepted, rejected: numbers of the solver's steps.
+        dense: the continuous solution, where all steps were saved.
+    """
+
+    t: Float[Array, "..."]
+    state: State
+    ending: Int[Array, "..."]
+    accepted: Int[Array, "..."]
+    rejected: Int[Array, "..."]
+    dense: diffrax.DenseInterpolation | None
+
+    @property
+    def final(self) -> State:
+        """The last state saved."""
+        return jtu.tree_map(lambda leaf: leaf[..., -1], self.state)
+
+    @property
+    def outcome(self) -> Ending:
+        """How it ended, by name; for one simulation, not a batch."""
+        return Ending(int(self.ending))
+
+    def at(self, t: Any) -> State:
+        """States at times `t` [s] of any shape, to the order of the solver's dense output.
+
+        Raises:
+            ValueError: only the final state or given times were saved.
+        """
+        if self.dense is None:
+            raise ValueError(
+                'Nothing is known between the saved times: simulate with save="steps".'
+            )
+        dense = self.dense
+        flat = jnp.ravel(jnp.asarray(t, dtype=self.t.dtype))
+        states = _evaluate(dense, flat)
+        return jtu.tree_map(lambda leaf: leaf.reshape(jnp.shape(t)), states)
+
+
+@eqx.filter_jit
+def _evaluate(dense: diffrax.DenseInterpolation, t: Array) -> State:
+    return jax.vmap(dense.evaluate)(t)
