@@ -31,6 +31,13 @@ from jaxbiped.dynamics._motion import vector_field as vector_field
 from jaxbiped.dynamics._state import State as State
 from jaxbiped.dynamics._state import exchange_legs as exchange_legs
 from jaxbiped.dynamics._state import seed_state as seed_state
+from jaxbiped.gait._dataset import trajectory_dataset as trajectory_dataset
+from jaxbiped.gait._footsteps import Footsteps as Footsteps
+from jaxbiped.gait._footsteps import HeelStrikes as HeelStrikes
+from jaxbiped.gait._footsteps import footsteps as footsteps
+from jaxbiped.gait._footsteps import heel_strikes as heel_strikes
+from jaxbiped.gait._ledger import EnergyLedger as EnergyLedger
+from jaxbiped.gait._ledger import energy_ledger as energy_ledger
 from jaxbiped.scene._bengisu_akay import BengisuAkay as BengisuAkay
 from jaxbiped.scene._clearance import AbstractClearance as AbstractClearance
 from jaxbiped.scene._clearance import AlwaysTouching as AlwaysTouching

@@ -1,6 +1,6 @@
 """Names for the shapes that annotations use."""
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -8,6 +8,9 @@ from jaxtyping import Array, Float
 
 Scalar: TypeAlias = Float[Array, "..."]
 """A number: one scalar leaf, or one such leaf for each entry of a batch or a time series."""
+
+Parameter: TypeAlias = Any
+"""A number that a constructor turns into a floating-point array: a float, an array, a tracer."""
 
 
 def as_float(value: object) -> Array:

@@ -1,1 +1,1 @@
-"""Equations of motion of a scene, and what can be read off a state. Public names are exported by `jaxbiped` itself."""
+"""Equations of motion and what a state tells. Public names are exported by `jaxbiped`."""

@@ -72,7 +72,27 @@ def touches(foot: Foot) -> Scalar:
     return below if foot.admitted is None else below & foot.admitted
 
 
-def standing_height(scene: Scene, stance_angle: Scalar, penetration: Scalar = 0.0) -> Scalar:
-    """Hip height [m] at which a leg at `stance_angle` [rad] indents the ground by `penetration` [m]."""
+def landings(before: Feet, after: Feet) -> tuple[Scalar, Scalar]:
+    """Whether each foot comes to touch between two moments and is the one ahead (booleans).
+
+    Such a landing is a heel strike where the other foot made the one before.
+    """
+
+    def lands(i: int) -> Scalar:
+        return ~touches(before[i]) & touches(after[i]) & (after[i].x > after[1 - i].x)
+
+    return lands(0), lands(1)
+
+
+def standing_foot(both: Feet) -> Scalar:
+    """The foot that alone touches: 1 or 2, or 0 where none or both do."""
+    touch_1, touch_2 = touches(both.foot_1), touches(both.foot_2)
+    return jnp.where(touch_1 & ~touch_2, 1, jnp.where(touch_2 & ~touch_1, 2, 0))
+
+
+def standing_height(
+    scene: Scene, stance_angle: Scalar, penetration: Scalar | float = 0.0
+) -> Scalar:
+    """Hip height [m] over a leg at `stance_angle` [rad] that indents the ground [m]."""
     walker = scene.walker
     return walker.r - penetration + walker.hip_to_foot * jnp.cos(stance_angle)

@@ -1,6 +1,6 @@
 """Equations of motion in minimal coordinates: hip x, hip z and two leg angles."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
@@ -75,7 +75,7 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
         leg_load(scene, state.theta_2, state.omega_2, both.foot_2),
     )
     mass, ground = scene.walker.total_mass, scene.ground
-    m_xx, m_xz, m_zz = mass, 0.0, mass
+    m_xx, m_xz, m_zz = mass, jnp.zeros_like(mass), mass
     f_x = mass * ground.g * jnp.sin(ground.slope)
     f_z = -mass * ground.g * jnp.cos(ground.slope)
     for leg in legs:
@@ -95,7 +95,7 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
     )
 
 
-def vector_field(t: Scalar, state: State, scene: Scene) -> State:
+def vector_field(t: Any, state: State, scene: Scene) -> State:
     """Time derivative of the state, in the form that `diffrax.ODETerm` takes."""
     second = accelerations(scene, state)
     return State(

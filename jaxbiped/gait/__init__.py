@@ -1,1 +1,1 @@
-"""What a walk consists of: footsteps, their measures and their energy. Public names are exported by `jaxbiped` itself."""
+"""What a walk consists of: footsteps and energy. Public names are exported by `jaxbiped`."""

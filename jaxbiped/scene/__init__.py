@@ -1,1 +1,1 @@
-"""What is modelled and nothing else. Public names are exported by `jaxbiped` itself."""
+"""What is modelled and nothing else. Public names are exported by `jaxbiped`."""

@@ -2,10 +2,9 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array
 
 from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene._law import AbstractFrictionLaw
 
 
@@ -30,10 +29,10 @@ class BengisuAkay(AbstractFrictionLaw):
         ArgumentError: a coefficient or xi below 0, or v0 not above 0.
     """
 
-    mu_static: Array = eqx.field(converter=as_float)
-    mu_kinetic: Array = eqx.field(converter=as_float)
-    v0: Array = eqx.field(converter=as_float)
-    xi: Array = eqx.field(converter=as_float)
+    mu_static: Parameter = eqx.field(converter=as_float)
+    mu_kinetic: Parameter = eqx.field(converter=as_float)
+    v0: Parameter = eqx.field(converter=as_float)
+    xi: Parameter = eqx.field(converter=as_float)
 
     def __check_init__(self) -> None:
         check_not_negative("mu_static", self.mu_static)

@@ -2,10 +2,9 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array
 
 from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene._law import AbstractFrictionLaw
 
 
@@ -20,8 +19,8 @@ class RegularisedCoulomb(AbstractFrictionLaw):
         ArgumentError: mu below 0 or v_d not above 0.
     """
 
-    mu: Array = eqx.field(converter=as_float)
-    v_d: Array = eqx.field(converter=as_float)
+    mu: Parameter = eqx.field(converter=as_float)
+    v_d: Parameter = eqx.field(converter=as_float)
 
     def __check_init__(self) -> None:
         check_not_negative("mu", self.mu)

@@ -3,10 +3,9 @@
 import math
 
 import equinox as eqx
-from jaxtyping import Array
 
 from jaxbiped._checks import check_below, check_not_negative
-from jaxbiped._types import as_float
+from jaxbiped._types import Parameter, as_float
 
 
 class Ground(eqx.Module):
@@ -20,8 +19,8 @@ class Ground(eqx.Module):
         ArgumentError: a slope of a right angle or more, or g below 0.
     """
 
-    slope: Array = eqx.field(converter=as_float)
-    g: Array = eqx.field(converter=as_float, default=9.8)
+    slope: Parameter = eqx.field(converter=as_float)
+    g: Parameter = eqx.field(converter=as_float, default=9.8)
 
     def __check_init__(self) -> None:
         check_below("slope", self.slope, math.pi / 2, "radians")

@@ -1,10 +1,9 @@
 """Hertz's law of elastic contact."""
 
 import equinox as eqx
-from jaxtyping import Array
 
 from jaxbiped._checks import check_at_least, check_positive
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene._law import AbstractNormalLaw, hertz_energy, hertz_force
 
 
@@ -19,8 +18,8 @@ class Hertz(AbstractNormalLaw):
         ArgumentError: K not above 0 or n below 1.
     """
 
-    K: Array = eqx.field(converter=as_float)
-    n: Array = eqx.field(converter=as_float, default=1.5)
+    K: Parameter = eqx.field(converter=as_float)
+    n: Parameter = eqx.field(converter=as_float, default=1.5)
 
     def __check_init__(self) -> None:
         check_positive("K", self.K, "N/m^n")

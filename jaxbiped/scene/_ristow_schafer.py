@@ -2,10 +2,9 @@
 
 import equinox as eqx
 import jax.numpy as jnp
-from jaxtyping import Array
 
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene._law import AbstractNormalLaw, hertz_energy, hertz_force, power
 
 
@@ -24,9 +23,9 @@ class RistowSchafer(AbstractNormalLaw):
         ArgumentError: K not above 0, c below 0 or n below 1.
     """
 
-    K: Array = eqx.field(converter=as_float)
-    c: Array = eqx.field(converter=as_float)
-    n: Array = eqx.field(converter=as_float, default=1.5)
+    K: Parameter = eqx.field(converter=as_float)
+    c: Parameter = eqx.field(converter=as_float)
+    n: Parameter = eqx.field(converter=as_float, default=1.5)
 
     def __check_init__(self) -> None:
         check_positive("K", self.K, "N/m^n")

@@ -3,10 +3,9 @@
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
 
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene._law import AbstractNormalLaw, hertz_energy, hertz_force, smooth_ramp
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
@@ -31,11 +30,11 @@ class SmoothRistowSchafer(AbstractNormalLaw):
         ArgumentError: K or a width not above 0, c below 0 or n below 1.
     """
 
-    K: Array = eqx.field(converter=as_float)
-    c: Array = eqx.field(converter=as_float)
-    n: Array = eqx.field(converter=as_float, default=1.5)
-    depth_width: Array = eqx.field(converter=as_float, default=1e-5)
-    force_width: Array = eqx.field(converter=as_float, default=1.0)
+    K: Parameter = eqx.field(converter=as_float)
+    c: Parameter = eqx.field(converter=as_float)
+    n: Parameter = eqx.field(converter=as_float, default=1.5)
+    depth_width: Parameter = eqx.field(converter=as_float, default=1e-5)
+    force_width: Parameter = eqx.field(converter=as_float, default=1.0)
 
     def __check_init__(self) -> None:
         check_positive("K", self.K, "N/m^n")

@@ -1,10 +1,9 @@
 """The walker: two equal rigid legs, joined at the hip, on round feet."""
 
 import equinox as eqx
-from jaxtyping import Array
 
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Parameter, Scalar, as_float
 
 
 class Walker(eqx.Module):
@@ -24,12 +23,12 @@ class Walker(eqx.Module):
         ArgumentError: m, J or l not above 0; d, r or hip_mass below 0; l below r.
     """
 
-    m: Array = eqx.field(converter=as_float)
-    J: Array = eqx.field(converter=as_float)
-    l: Array = eqx.field(converter=as_float)
-    d: Array = eqx.field(converter=as_float)
-    r: Array = eqx.field(converter=as_float)
-    hip_mass: Array = eqx.field(converter=as_float, default=0.0)
+    m: Parameter = eqx.field(converter=as_float)
+    J: Parameter = eqx.field(converter=as_float)
+    l: Parameter = eqx.field(converter=as_float)
+    d: Parameter = eqx.field(converter=as_float)
+    r: Parameter = eqx.field(converter=as_float)
+    hip_mass: Parameter = eqx.field(converter=as_float, default=0.0)
 
     def __check_init__(self) -> None:
         check_positive("m", self.m, "kg")

@@ -1,1 +1,1 @@
-"""Stiff stepping through diffrax: solvers, endings, accuracy and `simulate`. Public names are exported by `jaxbiped` itself."""
+"""Stiff stepping through diffrax. Public names are exported by `jaxbiped`."""

@@ -111,8 +111,12 @@ def _swapped_entries(happens: Scalar | None, a: Entry, b: Entry) -> tuple[Entry,
     return _swapped(happens, _or_zero(a, b), _or_zero(b, a))
 
 
-def _or_zero(entry: Entry, like: Entry) -> Scalar:
-    return jnp.zeros_like(like) if entry is None else entry
+def _or_zero(entry: Entry, other: Entry) -> Scalar:
+    """The entry; where it is a structural zero, a zero shaped as the other one, which is none."""
+    if entry is not None:
+        return entry
+    assert other is not None
+    return jnp.zeros_like(other)
 
 
 def _minus(entry: Entry, factor: Scalar, subtrahend: Entry) -> Entry:

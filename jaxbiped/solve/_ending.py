@@ -101,7 +101,7 @@ def is_barred(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
 
 @eqx.filter_jit  # for its trace cache
 def has_stopped(scene: Scene, state: State) -> Scalar:
-    """Whether the stance leg is at rest in single support, or the walker on the ground (boolean)."""
+    """Whether the stance leg is at rest in single support, or all the walker is (boolean)."""
     foot_1, foot_2 = feet(scene, state)
     touch_1, touch_2 = touches(foot_1), touches(foot_2)
     if not isinstance(scene.clearance, StanceRotation):

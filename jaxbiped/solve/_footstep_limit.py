@@ -8,23 +8,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
-from jaxbiped.dynamics._feet import Feet, feet, touches
+from jaxbiped.dynamics._feet import feet, landings, standing_foot
 from jaxbiped.dynamics._state import State
-
-
-def strikes(before: Feet, after: Feet, last: Scalar) -> tuple[Scalar, Scalar]:
-    """Whether each foot makes a heel strike between two moments (booleans).
-
-    A heel strike is the foot ahead coming to touch, when the other one struck last. `last` is the
-    foot that did (1 or 2; 0 where none has).
-    """
-
-    def lands(i: int) -> Scalar:
-        ahead = after[i].x > after[1 - i].x
-        return ~touches(before[i]) & touches(after[i]) & ahead & (last != i + 1)
-
-    return lands(0), lands(1)
 
 
 class FootstepLimit(diffrax.AbstractAdaptiveStepSizeController):
@@ -34,27 +19,31 @@ class FootstepLimit(diffrax.AbstractAdaptiveStepSizeController):
     how many strikes there were. The solve's `args` must be the scene.
 
     Attributes:
+        rtol, atol, norm: the controller's own, where diffrax looks for them.
         controller: decides every step's size.
         limit: number of heel strikes after which the solve ends.
     """
 
+    rtol: Any
+    atol: Any
+    norm: Callable[[PyTree], Any]
     controller: diffrax.PIDController
     limit: int = eqx.field(static=True)
 
-    @property
-    def rtol(self) -> Any:
-        return self.controller.rtol
-
-    @property
-    def atol(self) -> Any:
-        return self.controller.atol
-
-    @property
-    def norm(self) -> Callable[[PyTree], Any]:
-        return self.controller.norm
+    @staticmethod
+    def around(controller: diffrax.PIDController, limit: int) -> "FootstepLimit":
+        """Wraps a controller."""
+        return FootstepLimit(
+            rtol=controller.rtol,
+            atol=controller.atol,
+            norm=controller.norm,
+            controller=controller,
+            limit=limit,
+        )
 
     def wrap(self, direction: Any) -> "FootstepLimit":
-        return FootstepLimit(self.controller.wrap(direction), self.limit)
+        """As diffrax asks; direction makes no difference here."""
+        return FootstepLimit.around(self.controller.wrap(direction), self.limit)
 
     def init(
         self,
@@ -67,11 +56,9 @@ class FootstepLimit(diffrax.AbstractAdaptiveStepSizeController):
         func: Any,
         error_order: Any,
     ) -> tuple[Any, Any]:
+        """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(terms, t0, t1, y0, dt0, args, func, error_order)
-        foot_1, foot_2 = feet(args, y0)
-        alone_1 = touches(foot_1) & ~touches(foot_2)
-        alone_2 = touches(foot_2) & ~touches(foot_1)
-        last = jnp.where(alone_1, 1, jnp.where(alone_2, 2, 0))
+        last = standing_foot(feet(args, y0))
         return first, (inner, last, jnp.zeros_like(last))
 
     def adapt_step_size(
@@ -84,13 +71,14 @@ class FootstepLimit(diffrax.AbstractAdaptiveStepSizeController):
         y_error: Any,
         error_order: Any,
         controller_state: Any,
-    ) -> tuple[Any, Any, Any, Any, Any, diffrax.RESULTS]:
+    ) -> tuple[Any, Any, Any, Any, Any, Any]:
+        """Accepts or rejects a step as the wrapped controller does, and counts."""
         inner, last, count = controller_state
         keep, next_t0, next_t1, made_jump, inner, result = self.controller.adapt_step_size(
             t0, t1, y0, y1_candidate, args, y_error, error_order, inner
         )
-        strike_1, strike_2 = strikes(feet(args, y0), feet(args, y1_candidate), last)
-        strike_1, strike_2 = keep & strike_1, keep & strike_2
+        lands_1, lands_2 = landings(feet(args, y0), feet(args, y1_candidate))
+        strike_1, strike_2 = keep & lands_1 & (last != 1), keep & lands_2 & (last != 2)
         last = jnp.where(strike_1, 1, jnp.where(strike_2, 2, last))
         count = count + jnp.where(strike_1 | strike_2, 1, 0)
         done = diffrax.RESULTS.where(

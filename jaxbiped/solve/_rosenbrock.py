@@ -55,8 +55,8 @@ class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
     With θ = (t − t0)/(t1 − t0): y = (1 − θ) y0 + θ (y1 + (1 − θ)(k_1 + θ (k_2 + θ k_3 …))).
     """
 
-    t0: Any
-    t1: Any
+    t0: Any  # type: ignore[misc]
+    t1: Any  # type: ignore[misc]
     y0: PyTree
     y1: PyTree
     coefficients: tuple[PyTree, ...]
@@ -107,7 +107,7 @@ class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):
         args: PyTree,
         solver_state: None,
         made_jump: Any,
-    ) -> tuple[PyTree, PyTree, dict[str, Any], None, diffrax.RESULTS]:
+    ) -> tuple[PyTree, PyTree, dict[str, Any], None, Any]:
         """One step, as `diffrax.AbstractSolver.step` describes it."""
         del solver_state, made_jump
         y1, error, coefficients = _step(self.tableau, terms, t0, t1, y0, args)

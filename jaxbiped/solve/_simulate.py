@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-from jaxtyping import Array, Float
+from jaxtyping import Array
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._types import Scalar
@@ -38,7 +38,7 @@ def simulate(
     accuracy: str = "balanced",
     rtol: float | None = None,
     atol: float | None = None,
-    save: Literal["steps", "end"] | Float[Array, " n"] = "steps",
+    save: Literal["steps", "end"] | Array = "steps",
     watch: tuple[str, ...] = WATCHES,
     max_solver_steps: int = 65536,
     adjoint: diffrax.AbstractAdjoint | None = None,
@@ -60,7 +60,7 @@ def simulate(
         rtol: relative tolerance, in place of the accuracy's.
         atol: absolute tolerance (SI), in place of a hundredth of the relative one.
         save: "steps" for every step and the continuous solution, "end" for the final state, or
-            increasing times [s] at which to save.
+            an array of increasing times [s], shape (n,), at which to save.
         watch: which misfortunes end the solve: any of "fall", "stop", "stumble".
         max_solver_steps: cap on the solver's attempted steps.
         adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
@@ -160,7 +160,8 @@ class Simulation(eqx.Module):
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
-        return CompiledSimulation(_solve.lower(self).compile(), self)
+        program = _solve.lower(self).compile()  # type: ignore[attr-defined]
+        return CompiledSimulation(program, self)
 
 
 class CompiledSimulation:
@@ -185,7 +186,7 @@ def _solve(run: Simulation) -> Trajectory:
         force_dtmin=True,  # a state that is no longer a number ends the solve by event
     )
     if run.steps is not None:
-        controller = FootstepLimit(controller, run.steps)
+        controller = FootstepLimit.around(controller, run.steps)
     events = ending_events(run.watch)
     zero = jnp.zeros_like(run.duration)
     solution = diffrax.diffeqsolve(
@@ -234,7 +235,8 @@ def _ending(solution: diffrax.Solution, names: list[Ending], run: Simulation) ->
         code = jnp.where(patience_ended, int(Ending.OUT_OF_STEPS), code)
         done = (done & ~patience_ended) | (solution.result == results.event_occurred)
     code = jnp.where(done, int(Ending.WALKING), code)
-    for name, happened in zip(names, solution.event_mask or [], strict=False):
+    masks: Any = solution.event_mask
+    for name, happened in zip(names, masks or [], strict=True):
         code = jnp.where(happened, int(name), code)
     return code
 

@@ -1,5 +1,7 @@
 """Solvers by name: our Rosenbrock family and diffrax's own."""
 
+from collections.abc import Callable
+
 import diffrax
 import optimistix
 
@@ -15,7 +17,7 @@ def _chord() -> optimistix.AbstractRootFinder:
     return diffrax.with_stepsize_controller_tols(optimistix.Chord)()
 
 
-SOLVERS = {
+SOLVERS: dict[str, Callable[[], diffrax.AbstractSolver]] = {
     "rodas3p": Rodas3P,
     "rodas4": Rodas4,
     "rodas4p": Rodas4P,

@@ -56,6 +56,20 @@ class Trajectory(eqx.Module):
         states = _evaluate(dense, flat)
         return jtu.tree_map(lambda leaf: leaf.reshape(jnp.shape(t)), states)
 
+    def require_dense(self) -> diffrax.DenseInterpolation:
+        """The continuous solution of a single trajectory.
+
+        Raises:
+            ValueError: it was not saved, or this is a batch.
+        """
+        if self.dense is None:
+            raise ValueError(
+                'Nothing is known between the saved times: simulate with save="steps".'
+            )
+        if jnp.ndim(self.t) != 1:
+            raise ValueError("This is a batch of trajectories: look at one of them at a time.")
+        return self.dense
+
 
 @eqx.filter_jit
 def _evaluate(dense: diffrax.DenseInterpolation, t: Array) -> State:

@@ -1,0 +1,39 @@
+# Two commands: `make walk` runs the main job, `make test` all checks. Each sets up what it needs
+# in .venv inside this checkout; repeated runs do not set up again.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+OUT := out/walk
+
+.PHONY: walk test lint types clean
+
+walk: $(VENV)/.installed
+	$(BIN)/jaxbiped walk --out $(OUT)
+	@echo "Pictures, animation and trajectory: $(OUT)"
+
+test: lint types
+	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+lint: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.installed-dev
+	$(BIN)/mypy
+
+$(VENV)/.made:
+	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "jaxbiped needs Python 3.11 or newer"'
+	$(PYTHON) -m venv $(VENV)
+	touch $@
+
+$(VENV)/.installed: $(VENV)/.made pyproject.toml
+	$(PIP) --editable .
+	touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.made pyproject.toml
+	$(PIP) --editable '.[dev]'
+	touch $@ $(VENV)/.installed
+
+clean:
+	rm -rf $(VENV) out

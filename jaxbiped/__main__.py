@@ -1,0 +1,5 @@
+"""`python -m jaxbiped` is `jaxbiped`."""
+
+from jaxbiped.cli import main
+
+main()

@@ -1,0 +1,116 @@
+"""Options of `jaxbiped walk`: every parameter of the seed's scene by its paper name."""
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import arg
+
+from jaxbiped._checks import check_positive, check_writable_directory, check_writable_file
+from jaxbiped.dynamics._state import State, checked_state, seed_state
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._seed import seed_scene
+
+
+@dataclasses.dataclass(frozen=True)
+class SceneOptions:
+    """Parameters of the seed's scene (SI units)."""
+
+    slope: float = 0.02
+    """Angle of the slope, downhill positive [rad]."""
+    m: float = 1.0
+    """Mass of one leg [kg]."""
+    J: float = 0.0096
+    """Moment of inertia of one leg about its centre of mass [kg m^2]."""
+    l: float = 0.40
+    """Hip to sole [m]."""
+    d: float = 0.10
+    """Hip to the leg's centre of mass [m]."""
+    r: float = 0.08
+    """Foot radius [m]."""
+    hip_mass: float = 0.0
+    """Point mass at the hip [kg]."""
+    g: float = 9.8
+    """Gravitational acceleration [m/s^2]."""
+    n: float = 1.5
+    """Exponent of the contact law."""
+    K: float = 1e6
+    """Contact stiffness [N/m^n]."""
+    c: float = 1e7
+    """Contact damping [N s/m^2]."""
+    mu_static: float = 0.50
+    """Static friction coefficient."""
+    mu_kinetic: float = 0.40
+    """Kinetic friction coefficient."""
+    v0: float = 1e-4
+    """Slip speed of the friction's peak [m/s]."""
+    xi: float = 1000.0
+    """Stribeck rate [s/m]."""
+
+    def scene(self) -> Scene:
+        """The scene that these parameters describe; raises `ArgumentError`."""
+        return seed_scene(**dataclasses.asdict(self))
+
+
+_START = {name: float(value) for name, value in seed_state()._asdict().items()}
+
+
+@dataclasses.dataclass(frozen=True)
+class StartOptions:
+    """Start in the slope's frame; the seed's own unless said otherwise."""
+
+    hip_x: float = _START["hip_x"]
+    """Hip, along the slope [m]."""
+    hip_z: float = _START["hip_z"]
+    """Hip, above the slope [m]."""
+    theta_1: float = _START["theta_1"]
+    """Angle of leg 1 from the slope's normal, foot ahead positive [rad]."""
+    theta_2: float = _START["theta_2"]
+    """Angle of leg 2 [rad]."""
+    hip_vx: float = _START["hip_vx"]
+    """Hip velocity along the slope [m/s]."""
+    hip_vz: float = _START["hip_vz"]
+    """Hip velocity away from the slope [m/s]."""
+    omega_1: float = _START["omega_1"]
+    """Rate of leg 1 [rad/s]."""
+    omega_2: float = _START["omega_2"]
+    """Rate of leg 2 [rad/s]."""
+
+    def state(self) -> State:
+        """The start; raises `ArgumentError`."""
+        return checked_state(State(**dataclasses.asdict(self)))
+
+
+@dataclasses.dataclass(frozen=True)
+class OutputOptions:
+    """Where results go."""
+
+    out: Path | None = None
+    """Folder for pictures, an animation and the trajectory."""
+    json: Annotated[Path | None, arg(name="json")] = None
+    """File for the numbers in SI units; - prints only them."""
+
+    def check(self) -> None:
+        """Raises `ArgumentError` where something cannot be written."""
+        if self.out is not None:
+            check_writable_directory("--out", self.out)
+        if self.json is not None and str(self.json) != "-":
+            check_writable_file("--json", self.json)
+
+
+@dataclasses.dataclass(frozen=True)
+class SolveOptions:
+    """How long and how to solve."""
+
+    duration: float = 10.0
+    """Simulated time [s]."""
+    solver: str = "rodas4"
+    """Name of a solver: ours (rodas3p, rodas4, rodas4p, rodas5p) or one of diffrax's."""
+    rtol: float = 1e-6
+    """Relative tolerance."""
+    atol: float | None = None
+    """Absolute tolerance (SI units); a hundredth of the relative one unless given."""
+
+    def check(self) -> None:
+        """Raises `ArgumentError` for a duration that is not positive."""
+        check_positive("--duration", self.duration, "s")

@@ -1,0 +1,175 @@
+"""Footsteps: what a walk is counted and measured in."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped.dynamics._feet import feet, landings, standing_foot, touches
+from jaxbiped.dynamics._forces import foot_forces
+from jaxbiped.dynamics._state import State
+from jaxbiped.gait._ledger import energy_ledger
+from jaxbiped.gait._samples import moments_of_change, observed, sampled
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._trajectory import Trajectory
+
+
+class HeelStrikes(NamedTuple):
+    """Heel strikes of a walk; leaves of shape (n,).
+
+    Attributes:
+        time_s: when the foot comes to touch [s].
+        foot: which one does, 1 or 2.
+    """
+
+    time_s: np.ndarray
+    foot: np.ndarray
+
+
+class Footsteps(NamedTuple):
+    """Footsteps of a walk, each from one heel strike to the next; leaves of shape (n,).
+
+    Attributes:
+        time_s: time of the heel strike that completes the step [s].
+        period_s: time since the heel strike before [s].
+        length_m: distance between the places where the two feet struck, along the slope [m].
+        speed_m_s: length over period [m/s].
+        peak_normal_N: largest normal force on a foot [N].
+        max_penetration_m: largest penetration of a foot that touches [m].
+        double_support_s: time from the first strike until a foot carries nothing again [s].
+        cost_of_transport: energy lost over weight times length [–].
+        energy_residual_J: what the step's energy ledger leaves open [J].
+    """
+
+    time_s: np.ndarray
+    period_s: np.ndarray
+    length_m: np.ndarray
+    speed_m_s: np.ndarray
+    peak_normal_N: np.ndarray  # noqa: N815 (newton)
+    max_penetration_m: np.ndarray
+    double_support_s: np.ndarray
+    cost_of_transport: np.ndarray
+    energy_residual_J: np.ndarray  # noqa: N815 (joule)
+
+
+class _Load(NamedTuple):
+    normal: Any
+    penetration: Any
+    both: Any
+
+
+def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
+    """Heel strikes: the foot ahead comes to touch, the other one having struck before.
+
+    Raises:
+        ValueError: a trajectory without its continuous solution, or a batch of them.
+    """
+    trajectory.require_dense()
+    states = trajectory.state
+    both = feet(scene, states)
+    before, after = (
+        type(both)(*[_part(foot, part) for foot in both]) for part in (slice(-1), slice(1, None))
+    )
+    lands = np.stack([np.asarray(landing) for landing in landings(before, after)])
+    last = int(standing_foot(both)[0])
+    found: list[tuple[int, int]] = []
+    for k in np.flatnonzero(lands.any(axis=0)):
+        for leg in (1, 2):
+            if lands[leg - 1, k] and leg != last:
+                found.append((int(k), leg))
+                last = leg
+    steps = np.array([k for k, _ in found], dtype=int)
+    foot = np.array([leg for _, leg in found], dtype=int)
+    t = np.asarray(trajectory.t)
+    time = np.zeros(len(found))
+    for leg, condition in ((1, _first_touches), (2, _second_touches)):
+        mine = foot == leg
+        time[mine] = moments_of_change(
+            scene, trajectory, condition, t[steps[mine]], t[steps[mine] + 1]
+        )
+    return HeelStrikes(time, foot)
+
+
+def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
+    """Every footstep that a trajectory completes; none gives leaves of shape (0,).
+
+    Raises:
+        ValueError: a trajectory without its continuous solution, or a batch of them.
+    """
+    strikes = heel_strikes(scene, trajectory)
+    count = max(len(strikes.time_s) - 1, 0)
+    if count == 0:
+        return Footsteps(*[np.zeros(0)] * len(Footsteps._fields))
+    time, foot = strikes
+    both = observed(scene, trajectory, feet, time)
+    place = np.where(foot == 1, both.foot_1.x, both.foot_2.x)
+    period, length = np.diff(time), np.diff(place)
+    loads = sampled(scene, trajectory, _loads, time)
+    step = np.searchsorted(time, 0.5 * (loads.edges[1:] + loads.edges[:-1])) - 1
+    ledger = energy_ledger(scene, trajectory, time)
+    weight = float(scene.walker.total_mass * scene.ground.g)
+    return Footsteps(
+        time_s=time[1:],
+        period_s=period,
+        length_m=length,
+        speed_m_s=length / period,
+        peak_normal_N=_largest(loads.values.normal, step, count),
+        max_penetration_m=_largest(loads.values.penetration, step, count),
+        double_support_s=_double_support(scene, trajectory, time, loads.edges, loads.values.both),
+        cost_of_transport=(ledger.damper_loss + ledger.friction_loss) / (weight * length),
+        energy_residual_J=ledger.residual,
+    )
+
+
+def _part(foot: Any, part: slice) -> Any:
+    return type(foot)(*[None if leaf is None else leaf[part] for leaf in foot])
+
+
+def _first_touches(scene: Scene, state: State) -> Any:
+    return touches(feet(scene, state).foot_1)
+
+
+def _second_touches(scene: Scene, state: State) -> Any:
+    return touches(feet(scene, state).foot_2)
+
+
+def _both_carry(scene: Scene, state: State) -> Any:
+    forces = foot_forces(scene, state)
+    return (forces.foot_1.normal > 0.0) & (forces.foot_2.normal > 0.0)
+
+
+def _loads(scene: Scene, state: State) -> _Load:
+    forces = foot_forces(scene, state)
+    depths = [jnp.where(touches(foot), foot.penetration, 0.0) for foot in feet(scene, state)]
+    return _Load(
+        normal=jnp.maximum(forces.foot_1.normal, forces.foot_2.normal),
+        penetration=jnp.maximum(*depths),
+        both=(forces.foot_1.normal > 0.0) & (forces.foot_2.normal > 0.0),
+    )
+
+
+def _largest(values: np.ndarray, step: np.ndarray, count: int) -> np.ndarray:
+    """The largest value in each footstep."""
+    largest = np.zeros(count)
+    inside = (step >= 0) & (step < count)
+    np.maximum.at(largest, step[inside], values[inside].max(axis=1))
+    return largest
+
+
+def _double_support(
+    scene: Scene, trajectory: Trajectory, time: np.ndarray, edges: np.ndarray, both: np.ndarray
+) -> np.ndarray:
+    """Time from each heel strike but the last until a foot carries nothing again [s]."""
+    durations = np.zeros(len(time) - 1)
+    carried = np.asarray(both.all(axis=1))
+    spans = []
+    for k, start in enumerate(time[:-1]):
+        first = int(np.searchsorted(edges, start))
+        ends = np.flatnonzero(~carried[first:])
+        if ends.size and ends[0] > 0:
+            spans.append((k, edges[first + ends[0] - 1], edges[first + ends[0] + 1]))
+    if spans:
+        which, left, right = (np.array(column) for column in zip(*spans, strict=True))
+        released = moments_of_change(scene, trajectory, _both_carry, left, right)
+        durations[which] = released - time[which]
+    return durations

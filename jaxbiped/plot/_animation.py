@@ -1,0 +1,129 @@
+"""The walk as a moving picture."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle
+
+from jaxbiped._checks import check_positive
+from jaxbiped.plot._samples import end_time, state_at
+from jaxbiped.plot._style import GROUND_COLOUR, LEG_COLOURS, new_figure
+from jaxbiped.plot._upright import Pose, poses, upright
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._trajectory import Trajectory
+
+_TICK = 0.1
+"""Distance between the marks on the slope [m], by which one sees the camera move."""
+
+
+def animate(
+    scene: Scene,
+    trajectory: Trajectory,
+    *,
+    frames_per_second: float = 25.0,
+    slow_down: float = 1.0,
+) -> FuncAnimation:
+    """An animation of the walk, gravity down the page, the camera moving along with the hip.
+
+    The slope carries a mark every 0.1 m. A motion of T seconds has
+    floor(T × slow_down × frames_per_second) + 1 frames. Keep the result until it is saved.
+
+    Args:
+        scene: what was simulated.
+        trajectory: the motion, saved step by step.
+        frames_per_second: of the picture [1/s]; a GIF rounds the time of a frame to 10 ms.
+        slow_down: seconds of the picture for a second of the motion.
+
+    Raises:
+        ValueError: the trajectory was not saved step by step, or a number not above 0.
+    """
+    check_positive("frames_per_second", frames_per_second)
+    check_positive("slow_down", slow_down)
+    interval = 1.0 / (frames_per_second * slow_down)
+    times = np.arange(int(end_time(trajectory) / interval + 1e-9) + 1) * interval
+    shown = poses(scene, state_at(trajectory, times))
+    figure = new_figure(4.8, 3.0)
+    figure.set_dpi(100)
+    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    picture = _Picture(ax, scene, shown, times)
+    return FuncAnimation(
+        figure, picture.draw, frames=len(times), interval=1e3 / frames_per_second, blit=False
+    )
+
+
+def save_animation(
+    scene: Scene,
+    trajectory: Trajectory,
+    path: str | Path,
+    *,
+    frames_per_second: float = 25.0,
+    slow_down: float = 1.0,
+) -> Path:
+    """Writes the animation (see `animate`) as a GIF that repeats, and returns its path."""
+    moving = animate(scene, trajectory, frames_per_second=frames_per_second, slow_down=slow_down)
+    moving.save(str(path), writer=PillowWriter(fps=round(frames_per_second)))
+    return Path(path)
+
+
+def animation_html(
+    scene: Scene,
+    trajectory: Trajectory,
+    *,
+    frames_per_second: float = 25.0,
+    slow_down: float = 1.0,
+) -> str:
+    """The animation (see `animate`) as HTML with controls, for `IPython.display.HTML`."""
+    moving = animate(scene, trajectory, frames_per_second=frames_per_second, slow_down=slow_down)
+    return moving.to_jshtml(fps=round(frames_per_second))
+
+
+class _Picture:
+    """The artists of one frame and how they move."""
+
+    def __init__(self, ax: Axes, scene: Scene, shown: Pose, times: np.ndarray) -> None:
+        self._ax, self._shown, self._times = ax, shown, times
+        length = float(scene.walker.l)
+        radius = float(scene.walker.r)
+        self._half_width = 1.2 * length
+        self._draw_ground(scene, length)
+        self._legs: list[Any] = []
+        self._feet: list[Circle] = []
+        for colour in LEG_COLOURS:
+            (line,) = ax.plot([], [], color=colour, linewidth=4.0, solid_capstyle="round")
+            circle = Circle((0.0, 0.0), radius, facecolor="none", edgecolor=colour, linewidth=2.0)
+            ax.add_patch(circle)
+            self._legs.append(line)
+            self._feet.append(circle)
+        (self._hip,) = ax.plot([], [], "o", color="black", markersize=7)
+        self._clock = ax.text(0.02, 0.95, "", transform=ax.transAxes, va="top")
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.set_axis_off()
+        self.draw(0)
+
+    def _draw_ground(self, scene: Scene, length: float) -> None:
+        hips = self._shown.hip[:, 0]
+        first = np.floor((hips.min() - 3.0 * length) / _TICK)
+        last = np.ceil((hips.max() + 3.0 * length) / _TICK)
+        along = np.arange(first, last + 1.0) * _TICK
+        surface = upright(scene, along, np.zeros_like(along))
+        below = upright(scene, along - 0.02, np.full_like(along, -0.02))
+        self._ax.plot(*surface.T, color=GROUND_COLOUR, linewidth=1.5)
+        gap = np.full_like(surface, np.nan)
+        marks = np.stack([surface, below, gap], axis=1).reshape(-1, 2)
+        self._ax.plot(*marks.T, color=GROUND_COLOUR, linewidth=1.0)
+
+    def draw(self, frame: int) -> list[Any]:
+        """Moves everything to a frame, and the camera with it."""
+        hip_x, hip_z = self._shown.hip[frame]
+        for line, circle, centres in zip(self._legs, self._feet, self._shown.feet, strict=True):
+            x, z = centres[frame]
+            line.set_data([hip_x, x], [hip_z, z])
+            circle.set_center((x, z))
+        self._hip.set_data([hip_x], [hip_z])
+        self._clock.set_text(f"$t$ = {self._times[frame]:.2f} s")
+        self._ax.set_xlim(hip_x - self._half_width, hip_x + self._half_width)
+        self._ax.set_ylim(hip_z - self._half_width, hip_z + 0.25 * self._half_width)
+        return [*self._legs, *self._feet, self._hip, self._clock]

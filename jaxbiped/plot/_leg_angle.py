@@ -1,0 +1,45 @@
+"""Leg angles over time (paper, figure 6)."""
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from jaxbiped.plot._samples import sampled
+from jaxbiped.plot._style import (
+    LEG_COLOURS,
+    LEG_NAMES,
+    LEG_STYLES,
+    axes_or_new,
+    dress,
+    figure_of,
+    legend_above,
+)
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._trajectory import Trajectory
+
+
+def leg_angles(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None) -> Figure:
+    """Draws both legs' angles from the slope's normal [rad] over time [s].
+
+    Args:
+        scene: what was simulated.
+        trajectory: the motion, saved step by step.
+        ax: axes to draw into; a new figure unless given.
+
+    Raises:
+        ValueError: the trajectory was not saved step by step.
+    """
+    t, state = sampled(trajectory)
+    ax = axes_or_new(ax, 7.2, 3.4)
+    for k, angle in enumerate((state.theta_1, state.theta_2)):
+        ax.plot(
+            t,
+            angle,
+            color=LEG_COLOURS[k],
+            linestyle=LEG_STYLES[k],
+            linewidth=1.3,
+            label=LEG_NAMES[k],
+        )
+    ax.margins(x=0.01)
+    dress(ax, "Leg angles", "time, $t$ (s)", r"leg angle, $\theta$ (rad)")
+    legend_above(ax)
+    return figure_of(ax)

@@ -1,0 +1,44 @@
+"""Penetration of the feet over time (paper, figure 7)."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from jaxbiped.plot._samples import contacts, sampled
+from jaxbiped.plot._style import (
+    LEG_COLOURS,
+    LEG_NAMES,
+    axes_or_new,
+    dress,
+    figure_of,
+    legend_above,
+)
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._trajectory import Trajectory
+
+
+def penetrations(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None) -> Figure:
+    """Draws how deep each foot that touches is in the ground [mm] over time [s].
+
+    A swing foot that the clearance rule lets pass under the surface does not touch: its line is
+    interrupted.
+
+    Args:
+        scene: what was simulated.
+        trajectory: the motion, saved step by step.
+        ax: axes to draw into; a new figure unless given.
+
+    Raises:
+        ValueError: the trajectory was not saved step by step.
+    """
+    samples = sampled(trajectory)
+    found = contacts(scene, samples.state)
+    ax = axes_or_new(ax, 7.2, 3.4)
+    for k, (foot, touching) in enumerate(zip(found.feet, found.touching, strict=True)):
+        depth = np.where(touching, foot.penetration * 1e3, np.nan)
+        ax.plot(samples.t, depth, color=LEG_COLOURS[k], linewidth=1.3, label=LEG_NAMES[k])
+    ax.margins(x=0.01)
+    ax.set_ylim(bottom=0.0)
+    dress(ax, "Penetration of the feet", "time, $t$ (s)", r"penetration, $\delta$ (mm)")
+    legend_above(ax)
+    return figure_of(ax)

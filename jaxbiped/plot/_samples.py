@@ -1,0 +1,110 @@
+"""A trajectory on times fit for drawing: the solver's own steps and evenly spaced times."""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped.dynamics._feet import Feet, feet, touches
+from jaxbiped.dynamics._forces import FootForces, foot_forces
+from jaxbiped.dynamics._state import State
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._trajectory import Trajectory
+
+_EVEN = 2048
+"""Evenly spaced times; a fixed number, so that evaluating them compiles once."""
+_BLOCK = 4096
+"""Lengths are padded to multiples of this before feet and forces are computed, likewise."""
+
+
+class Samples(NamedTuple):
+    """A motion at increasing times: `t` [s] of shape (n,), NumPy leaves of shape (n,)."""
+
+    t: np.ndarray
+    state: State
+
+
+class Contacts(NamedTuple):
+    """Feet, whether each touches, and the forces on them, at the times of some samples."""
+
+    feet: Feet
+    touching: tuple[np.ndarray, np.ndarray]
+    forces: FootForces
+
+
+def end_time(trajectory: Trajectory) -> float:
+    """Time of the last saved state [s]."""
+    if np.ndim(trajectory.t) != 1:
+        raise ArgumentError("trajectory is a batch: draw one of its trajectories at a time.")
+    return float(trajectory.t[-1])
+
+
+def state_at(trajectory: Trajectory, t: Any) -> State:
+    """States at times [s], as NumPy arrays.
+
+    Raises:
+        ValueError: the trajectory was not saved step by step.
+    """
+    return _as_numpy(trajectory.at(t))
+
+
+def sampled(
+    trajectory: Trajectory, *, start: float | None = None, stop: float | None = None
+) -> Samples:
+    """Every step of the solver between two times [s], and 2048 evenly spaced times.
+
+    The steps crowd where the motion is fast (a heel strike lasts a millisecond), the even times
+    fill in where they are far apart.
+
+    Raises:
+        ValueError: the trajectory was not saved step by step.
+    """
+    last = end_time(trajectory)
+    start = 0.0 if start is None else max(start, 0.0)
+    stop = last if stop is None else min(stop, last)
+    even = np.linspace(start, stop, _EVEN)
+    filled = state_at(trajectory, even)
+    steps = np.asarray(trajectory.t)
+    inside = (steps > start) & (steps < stop)
+    t, order = np.unique(np.concatenate([even, steps[inside]]), return_index=True)
+    state = jtu.tree_map(
+        lambda a, b: np.concatenate([a, np.asarray(b)[inside]])[order], filled, trajectory.state
+    )
+    return Samples(t, state)
+
+
+def contacts(scene: Scene, state: State) -> Contacts:
+    """Feet and forces at states with leaves of shape (n,), as NumPy arrays."""
+    length = len(state.hip_x)
+    room = -length % _BLOCK
+    padded = jtu.tree_map(lambda leaf: np.pad(leaf, (0, room), mode="edge"), state)
+    found = _contacts(scene, padded)
+    return jtu.tree_map(lambda leaf: np.asarray(leaf)[:length], found)
+
+
+@eqx.filter_jit
+def _contacts(scene: Scene, state: State) -> Contacts:
+    both = feet(scene, state)
+    touching = tuple(jnp.broadcast_to(touches(foot), state.hip_x.shape) for foot in both)
+    return Contacts(both, (touching[0], touching[1]), foot_forces(scene, state))
+
+
+def heel_strikes(samples: Samples, found: Contacts) -> list[tuple[float, int]]:
+    """Heel strikes in order: time at which a foot comes down while the other carries [s], and leg.
+
+    Legs are numbered 0 and 1. The time is that of the last sample before the foot touches.
+    """
+    strikes = []
+    for leg in (0, 1):
+        on, other = found.touching[leg], found.touching[1 - leg]
+        for k in np.flatnonzero(on[1:] & ~on[:-1] & other[:-1]):
+            strikes.append((float(samples.t[k]), leg))
+    return sorted(strikes)
+
+
+def _as_numpy(state: State) -> State:
+    return jtu.tree_map(np.asarray, jax.device_get(state))

@@ -1,0 +1,60 @@
+"""What all figures share: colours, sizes, new figures, and where legends go."""
+
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+LEG_COLOURS = ("#0072B2", "#D55E00")
+"""Leg 1 blue, leg 2 vermilion: two of Okabe and Ito's colours, distinct to colour-blind readers."""
+LEG_STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)))
+"""Leg 1 solid, leg 2 dashed, for print without colour."""
+LEG_NAMES = ("leg 1", "leg 2")
+GROUND_COLOUR = "#595959"
+SHADE_COLOUR = "#DDDDDD"
+
+
+def new_figure(width: float = 6.4, height: float = 4.0) -> Figure:
+    """A figure [inches] that knows how to draw itself, apart from pyplot's list of figures."""
+    figure = Figure(figsize=(width, height), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def axes_or_new(ax: Axes | None, width: float = 6.4, height: float = 4.0) -> Axes:
+    """The axes given, or those of a new figure."""
+    return new_figure(width, height).add_subplot() if ax is None else ax
+
+
+def figure_of(ax: Axes) -> Figure:
+    """The figure that axes belong to, also where they lie in a subfigure."""
+    figure = ax.figure.figure
+    assert isinstance(figure, Figure)
+    return figure
+
+
+def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
+    """Title, labels and a faint grid."""
+    ax.set_title(title, loc="left", fontsize="medium")
+    ax.set_xlabel(x_label)
+    ax.set_ylabel(y_label)
+    ax.grid(color="#E6E6E6", linewidth=0.6)
+    ax.set_axisbelow(True)
+    ax.spines[["top", "right"]].set_visible(False)
+
+
+def legend_above(ax: Axes, **options: Any) -> None:
+    """A legend in one row above the axes, right of the title, where it covers no data."""
+    handles, _ = ax.get_legend_handles_labels()
+    ax.legend(
+        **{
+            "loc": "lower right",
+            "bbox_to_anchor": (1.0, 1.0),
+            "ncols": max(len(options.get("handles", handles)), 1),
+            "frameon": False,
+            "fontsize": "small",
+            "borderaxespad": 0.2,
+        }
+        | options
+    )
