@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.animation import FuncAnimation
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
@@ -47,6 +47,7 @@ def animate(
     shown = poses(scene, state_at(trajectory, times))
     figure = new_figure(4.8, 3.0)
     figure.set_dpi(100)
+    figure.set_layout_engine("none")
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     picture = _Picture(ax, scene, shown, times)
     return FuncAnimation(
@@ -54,30 +55,15 @@ def animate(
     )
 
 
-def save_animation(
-    scene: Scene,
-    trajectory: Trajectory,
-    path: str | Path,
-    *,
-    frames_per_second: float = 25.0,
-    slow_down: float = 1.0,
-) -> Path:
-    """Writes the animation (see `animate`) as a GIF that repeats, and returns its path."""
-    moving = animate(scene, trajectory, frames_per_second=frames_per_second, slow_down=slow_down)
-    moving.save(str(path), writer=PillowWriter(fps=round(frames_per_second)))
+def save_animation(animation: FuncAnimation, path: str | Path) -> Path:
+    """Writes what `animate` returned as a GIF that repeats, and returns its path."""
+    animation.save(str(path), writer="pillow")
     return Path(path)
 
 
-def animation_html(
-    scene: Scene,
-    trajectory: Trajectory,
-    *,
-    frames_per_second: float = 25.0,
-    slow_down: float = 1.0,
-) -> str:
-    """The animation (see `animate`) as HTML with controls, for `IPython.display.HTML`."""
-    moving = animate(scene, trajectory, frames_per_second=frames_per_second, slow_down=slow_down)
-    return moving.to_jshtml(fps=round(frames_per_second))
+def animation_html(animation: FuncAnimation) -> str:
+    """What `animate` returned as HTML with controls, for `IPython.display.HTML`."""
+    return animation.to_jshtml()
 
 
 class _Picture:

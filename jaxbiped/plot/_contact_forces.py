@@ -7,11 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.plot._samples import Contacts, Samples, contacts, heel_strikes, sampled
+from jaxbiped.gait._footsteps import heel_strikes
+from jaxbiped.plot._samples import Contacts, contacts, sampled
 from jaxbiped.plot._style import (
     LEG_COLOURS,
     LEG_NAMES,
-    LEG_STYLES,
     SHADE_COLOUR,
     dress,
     legend_above,
@@ -51,76 +51,70 @@ def contact_forces(
     """
     samples = sampled(trajectory)
     found = contacts(scene, samples.state)
-    strikes = heel_strikes(samples, found)
-    if strikes and not -len(strikes) <= strike < len(strikes):
+    times, feet = heel_strikes(scene, trajectory)
+    if times.size and not -times.size <= strike < times.size:
         raise ArgumentError(
-            f"strike = {strike} is not allowed: this motion has {len(strikes)} heel strikes."
+            f"strike = {strike} is not allowed: this motion has {times.size} heel strikes."
         )
     rows = 1 if found.forces.foot_1.tangential is None else 2
-    columns = 2 if strikes else 1
+    columns = 2 if times.size else 1
     if figure is None:
         figure = new_figure(4.6 * columns, 1.0 + 2.2 * rows)
     axes = figure.subplots(
         rows, columns, sharex="col", squeeze=False, width_ratios=[1.35, 1.0][:columns]
     )
-    _draw_column(axes[:, 0], samples.t, found, LEG_STYLES[:1] * 2)
+    _draw_column(axes[:, 0], samples.t, found)
     axes[0, 0].margins(x=0.01)
     dress(axes[0, 0], "Contact forces", "", _NORMAL)
     legend_above(axes[0, 0])
     if rows == 2:
         dress(axes[1, 0], "", "", _TANGENTIAL)
     axes[-1, 0].set_xlabel("time, $t$ (s)")
-    if strikes:
-        _draw_strike(axes[:, 1], scene, trajectory, *strikes[strike])
+    if times.size:
+        _draw_strike(axes[:, 1], scene, trajectory, times[strike], feet[strike] - 1)
     whole = figure.figure
     assert isinstance(whole, Figure)
     return whole
 
 
-def _draw_column(axes: Any, t: np.ndarray, found: Contacts, styles: tuple[Any, ...]) -> None:
+def _draw_column(axes: Any, t: np.ndarray, found: Contacts) -> None:
     for k, force in enumerate(found.forces):
-        look: dict[str, Any] = {
-            "color": LEG_COLOURS[k],
-            "linestyle": styles[k],
-            "linewidth": 1.1,
-            "label": LEG_NAMES[k],
-        }
+        look: dict[str, Any] = {"color": LEG_COLOURS[k], "linewidth": 1.1, "label": LEG_NAMES[k]}
         axes[0].plot(t, force.normal, **look)
         if force.tangential is not None:
             axes[1].plot(t, force.tangential, **look)
 
 
 def _draw_strike(axes: Any, scene: Scene, trajectory: Trajectory, time: float, leg: int) -> None:
-    near: Samples = sampled(trajectory, start=time - _BEFORE, stop=time + _AFTER)
+    near = sampled(trajectory, start=time - _BEFORE, stop=time + _AFTER)
     found = contacts(scene, near.state)
     milliseconds = (near.t - time) * 1e3
-    _draw_column(axes, milliseconds, found, LEG_STYLES)
-    both = milliseconds[
-        found.touching[0]
-        & found.touching[1]
-        & (found.forces.foot_1.normal > 0)
-        & (found.forces.foot_2.normal > 0)
-    ]
-    for row, ax in enumerate(axes):
+    _draw_column(axes, milliseconds, found)
+    normal = [np.asarray(force.normal) for force in found.forces]
+    both = milliseconds[(normal[0] > 0.0) & (normal[1] > 0.0)]
+    for ax in axes:
         if both.size:
-            ax.axvspan(both[0], both[-1], color=SHADE_COLOUR, linewidth=0, zorder=0)
-        ax.margins(x=0.0)
+            ax.axvspan(both[0], both[-1], color=SHADE_COLOUR, linewidth=0, label="double support")
+        ax.margins(x=0.0, y=0.12)
         dress(ax, "", "", "")
-        if row == 0:
-            _title_strike(ax, milliseconds, found, time, leg)
+    axes[0].set_title(
+        f"Heel strike of {LEG_NAMES[leg]} at {time:.3f} s", loc="left", fontsize="medium"
+    )
     axes[-1].set_xlabel("time after the foot touches (ms)")
+    _mark_peak(axes[0], milliseconds, normal[leg])
+    if len(axes) == 2:
+        _mark_peak(axes[1], milliseconds, np.asarray(found.forces[leg].tangential))
+    if both.size:
+        axes[0].legend(handles=[axes[0].patches[-1]], loc="best", fontsize="small")
 
 
-def _title_strike(ax: Axes, t: np.ndarray, found: Contacts, time: float, leg: int) -> None:
-    normal = found.forces[leg].normal
-    peak = int(np.argmax(normal))
-    ax.set_title(f"Heel strike of {LEG_NAMES[leg]} at {time:.3f} s", loc="left", fontsize="medium")
+def _mark_peak(ax: Axes, t: np.ndarray, force: np.ndarray) -> None:
+    peak = int(np.argmax(np.abs(force)))
     ax.annotate(
-        f"peak {normal[peak]:.4g} N",
-        (t[peak], normal[peak]),
-        xytext=(8, 2),
+        f"{force[peak]:.4g} N".replace("-", "−"),
+        (float(t[peak]), float(force[peak])),
+        xytext=(7, 3 if force[peak] > 0.0 else -3),
         textcoords="offset points",
         fontsize="small",
-        va="bottom",
+        va="bottom" if force[peak] > 0.0 else "top",
     )
-    ax.set_ylim(top=1.12 * normal[peak])

@@ -34,11 +34,13 @@ def penetrations(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None
     samples = sampled(trajectory)
     found = contacts(scene, samples.state)
     ax = axes_or_new(ax, 7.2, 3.4)
+    deepest = 0.0
     for k, (foot, touching) in enumerate(zip(found.feet, found.touching, strict=True)):
         depth = np.where(touching, foot.penetration * 1e3, np.nan)
         ax.plot(samples.t, depth, color=LEG_COLOURS[k], linewidth=1.3, label=LEG_NAMES[k])
+        deepest = max(deepest, float(depth[touching].max(initial=0.0)))
     ax.margins(x=0.01)
-    ax.set_ylim(bottom=0.0)
+    ax.set_ylim(0.0, 1.1 * max(deepest, 1e-3))
     dress(ax, "Penetration of the feet", "time, $t$ (s)", r"penetration, $\delta$ (mm)")
     legend_above(ax)
     return figure_of(ax)

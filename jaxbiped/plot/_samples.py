@@ -8,7 +8,6 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._feet import Feet, feet, touches
 from jaxbiped.dynamics._forces import FootForces, foot_forces
 from jaxbiped.dynamics._state import State
@@ -32,14 +31,17 @@ class Contacts(NamedTuple):
     """Feet, whether each touches, and the forces on them, at the times of some samples."""
 
     feet: Feet
-    touching: tuple[np.ndarray, np.ndarray]
+    touching: tuple[Any, Any]
     forces: FootForces
 
 
 def end_time(trajectory: Trajectory) -> float:
-    """Time of the last saved state [s]."""
-    if np.ndim(trajectory.t) != 1:
-        raise ArgumentError("trajectory is a batch: draw one of its trajectories at a time.")
+    """Time of the last state [s].
+
+    Raises:
+        ValueError: the trajectory was not saved step by step, or this is a batch.
+    """
+    trajectory.require_dense()
     return float(trajectory.t[-1])
 
 
@@ -91,19 +93,6 @@ def _contacts(scene: Scene, state: State) -> Contacts:
     both = feet(scene, state)
     touching = tuple(jnp.broadcast_to(touches(foot), state.hip_x.shape) for foot in both)
     return Contacts(both, (touching[0], touching[1]), foot_forces(scene, state))
-
-
-def heel_strikes(samples: Samples, found: Contacts) -> list[tuple[float, int]]:
-    """Heel strikes in order: time at which a foot comes down while the other carries [s], and leg.
-
-    Legs are numbered 0 and 1. The time is that of the last sample before the foot touches.
-    """
-    strikes = []
-    for leg in (0, 1):
-        on, other = found.touching[leg], found.touching[1 - leg]
-        for k in np.flatnonzero(on[1:] & ~on[:-1] & other[:-1]):
-            strikes.append((float(samples.t[k]), leg))
-    return sorted(strikes)
 
 
 def _as_numpy(state: State) -> State:

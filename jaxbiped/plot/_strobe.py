@@ -1,5 +1,7 @@
 """The walk as a stroboscope shows it (paper, figure 4)."""
 
+import math
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection, LineCollection
@@ -17,7 +19,7 @@ from jaxbiped.plot._style import (
     figure_of,
     legend_above,
 )
-from jaxbiped.plot._upright import Pose, poses, upright
+from jaxbiped.plot._upright import Pose, poses
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -33,7 +35,7 @@ def gait_strobe(
     ax: Axes | None = None,
     start: float = 0.0,
     stop: float | None = None,
-    count: int = 13,
+    count: int = 10,
 ) -> Figure:
     """Draws the walker at equal times, older poses fainter, over the slope as it is inclined.
 
@@ -62,9 +64,9 @@ def gait_strobe(
         [np.linspace(start, stop, count), np.linspace(start, stop, _PATH_POINTS)]
     )
     everything = poses(scene, state_at(trajectory, times))
-    shown = Pose(everything.hip[:count], tuple(each[:count] for each in everything.feet))  # type: ignore[arg-type]
+    shown = Pose(everything.hip[:count], (everything.feet[0][:count], everything.feet[1][:count]))
 
-    ax = axes_or_new(ax, 7.2, 4.2)
+    ax = axes_or_new(ax, 7.2, 3.9)
     _draw_slope(ax, scene, shown)
     ax.plot(*everything.hip[count:].T, color="#8C8C8C", linewidth=0.8, zorder=1)
     _draw_legs(ax, scene, shown)
@@ -107,7 +109,7 @@ def _draw_legs(ax: Axes, scene: Scene, shown: Pose) -> None:
             transOffset=ax.transData,
             facecolors="none",
             edgecolors=colour,
-            linewidths=0.9,
+            linewidths=0.8,
             alpha=opacity,
             zorder=2,
         )
@@ -120,6 +122,6 @@ def _draw_legs(ax: Axes, scene: Scene, shown: Pose) -> None:
 
 def _draw_slope(ax: Axes, scene: Scene, shown: Pose) -> None:
     """A straight line that runs on past both edges, whatever the limits become."""
-    origin = upright(scene, np.asarray(0.0), np.asarray(0.0))
-    ahead = upright(scene, np.asarray(1.0), np.asarray(0.0))
-    ax.axline(tuple(origin), tuple(ahead), color=GROUND_COLOUR, linewidth=1.4, zorder=1)
+    steepness = -math.tan(float(scene.ground.slope))
+    x = float(shown.hip[0, 0])
+    ax.axline((x, steepness * x), slope=steepness, color=GROUND_COLOUR, linewidth=1.4, zorder=1)
