@@ -1,6 +1,7 @@
 """A vector field at a point: its value, its exact Jacobian, and (I − g J)⁻¹ applied to vectors."""
 
 import abc
+import math
 from collections.abc import Callable
 from typing import Any, TypeAlias
 
@@ -67,8 +68,8 @@ def split(
             if shape == ():
                 joined.append(next(rest))
             else:
-                size = int(jnp.prod(jnp.asarray(shape)))
-                joined.append(jnp.stack([next(rest) for _ in range(size)]).reshape(shape))
+                parts = [next(rest) for _ in range(math.prod(shape))]
+                joined.append(jnp.stack(parts).reshape(shape))
         return jtu.tree_unflatten(structure, joined)
 
     return scalars, join

@@ -7,7 +7,8 @@ from jaxbiped.solve._rosenbrock import AbstractRosenbrock, RosenbrockTableau
 
 class Rodas3P(AbstractRosenbrock):
     """Third order, five stages, L-stable, stiffly accurate, without order reduction on
-    Prothero-Robinson problems; dense output of third order.
+    Prothero-Robinson problems; dense output of third order. The last two stages share one
+    evaluation of the vector field, and their difference is the error estimate.
 
     Source: Steinebach, Numerical Algorithms 96 (2024).
     """
@@ -18,7 +19,7 @@ class Rodas3P(AbstractRosenbrock):
             (4.0 / 3.0,),
             (0.0, 0.0),
             (2.90625, 3.375, 0.40625),
-            (2.90625, 3.375, 0.40625, 1.0),
+            (2.90625, 3.375, 0.40625, 0.0),
         ),
         c=(
             (-4.0,),
@@ -32,6 +33,7 @@ class Rodas3P(AbstractRosenbrock):
             (1.78125, 6.75, 0.15625, -6.0, -1.0),
             (4.21875, -15.1875, -3.09375, 9.0, 0.0),
         ),
+        error=(0.0, 0.0, 0.0, -1.0, 1.0),
     )
 
     def order(self, terms: Any) -> int:

@@ -1,4 +1,4 @@
-"""Rodas4: fourth order, the default."""
+"""Rodas4: fourth order."""
 
 from typing import Any, ClassVar
 
@@ -7,6 +7,7 @@ from jaxbiped.solve._rosenbrock import AbstractRosenbrock, RosenbrockTableau
 
 class Rodas4(AbstractRosenbrock):
     """Fourth order, six stages, L-stable, stiffly accurate; dense output of third order.
+    On stiff Prothero-Robinson problems of second order only.
 
     Source: Hairer and Wanner, Solving Ordinary Differential Equations II, section VI.4 (RODAS).
     """

@@ -14,8 +14,8 @@ _LAST_ROW = (
 
 
 class Rodas5P(AbstractRosenbrock):
-    """Fifth order, eight stages, L-stable, stiffly accurate, without order reduction on
-    Prothero-Robinson problems; dense output of fourth order.
+    """Fifth order, eight stages, L-stable, stiffly accurate, of fourth order on Prothero-Robinson
+    problems however stiff; dense output of fourth order.
 
     Source: Steinebach, BIT Numerical Mathematics 63:27 (2023).
     """

@@ -28,7 +28,7 @@ class RosenbrockTableau(NamedTuple):
 
     With W = I − h γ J and f_t = ∂f/∂t, the stages are
     W u_i = γ (h f(t + α_i h, y + Σ_j a_ij u_j) + Σ_j c_ij u_j + γ_i h² f_t).
-    The last stage's argument plus u_s is the new value; u_s is its error estimate.
+    The last stage's argument plus u_s is the new value.
 
     Source of the form: Hairer and Wanner, Solving Ordinary Differential Equations II, eq. IV.7.25.
 
@@ -39,6 +39,7 @@ class RosenbrockTableau(NamedTuple):
         alpha: times α_i of the stages.
         gammas: coefficients γ_i of the time derivative.
         dense: rows that make the coefficients of the dense output from the stages.
+        error: weights that make the error estimate from the stages; u_s where left empty.
     """
 
     gamma: float
@@ -47,6 +48,7 @@ class RosenbrockTableau(NamedTuple):
     alpha: Row
     gammas: Row
     dense: tuple[Row, ...]
+    error: Row = ()
 
 
 class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
@@ -134,7 +136,8 @@ def _step(
     control = jnp.asarray(terms.contr(t0, t1), dtype=dtype)
     stages, end = _stages(tableau, field, jnp.asarray(t0), start, span, control)
     dense = tuple(join(_weighted(row, stages)) for row in tableau.dense)
-    return join(end), join(stages[-1]), dense
+    error = _weighted(tableau.error, stages) if tableau.error else stages[-1]
+    return join(end), join(error), dense
 
 
 def _stages(
@@ -158,12 +161,14 @@ def _stages(
     )
     factors = fenced(moves, lambda: lin.factorise(jacobian, step))
     stages: list[Components] = []
-    value = start
+    value, last_rate = start, slope
 
-    def stage(i: int) -> tuple[Components, Components]:
+    def stage(i: int) -> tuple[Components, Components, Components | None]:
         row_a, row_c = (tableau.a[i - 1], tableau.c[i - 1]) if i else ((), ())
         argument, rate = start, slope
-        if any(row_a):
+        if _repeats(tableau, i):
+            argument, rate = value, last_rate
+        elif any(row_a):
             argument = _plus(start, _weighted(row_a, stages))
             time = t + jnp.asarray(tableau.alpha[i] * span, dtype=t.dtype)
             rate = lin.evaluate(time, argument)
@@ -173,12 +178,20 @@ def _stages(
         weight = step * (tableau.gammas[i] * span)
         if tableau.gammas[i]:
             right = [r if d is None else r + weight * d for r, d in zip(right, drift, strict=True)]
-        return lin.solve(factors, jacobian, step, right), argument
+        kept_rate = rate if _repeats(tableau, i + 1) else None
+        return lin.solve(factors, jacobian, step, right), argument, kept_rate
 
     for i in range(len(tableau.alpha)):
-        increment, value = fenced(moves, functools.partial(stage, i))
+        increment, value, last_rate = fenced(moves, functools.partial(stage, i))
         stages.append(increment)
     return stages, _plus(value, stages[-1])
+
+
+def _repeats(tableau: RosenbrockTableau, i: int) -> bool:
+    """Whether stage i evaluates the vector field where the stage before it did."""
+    if not 2 <= i < len(tableau.alpha) or tableau.alpha[i] != tableau.alpha[i - 1]:
+        return False
+    return tableau.a[i - 1] == (*tableau.a[i - 2], 0.0)
 
 
 def _weighted(weights: Sequence[float], stages: list[Components]) -> Components:
