@@ -64,4 +64,4 @@ def _inner_program(equation: Any) -> Jaxpr | None:
     return None
 
 
-_CALLS = {"jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "remat", "checkpoint"}
+_CALLS = {"jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "remat2", "checkpoint"}

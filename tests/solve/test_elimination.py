@@ -1,0 +1,101 @@
+"""The unrolled elimination: equal to a dense solve, whatever entries are left out."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxbiped.solve._elimination import factorise, solve
+
+BATCH = 50
+
+
+def _scalars(values, present):
+    """Rows of batched scalars, None where an entry is absent."""
+    size = present.shape[0]
+    return [
+        [jnp.asarray(values[:, i, j]) if present[i, j] else None for j in range(size)]
+        for i in range(size)
+    ]
+
+
+@jax.jit
+def _solution(matrix, right):
+    return jnp.stack(solve(factorise(matrix), right), axis=-1)
+
+
+def _check(values, present, seed=1):
+    values = np.where(present, values, 0.0)
+    right = np.random.default_rng(seed).normal(size=values.shape[:2])
+    mine = _solution(_scalars(values, present), list(jnp.asarray(right.T)))
+    truth = np.linalg.solve(values, right[..., None])[..., 0]
+    condition = np.linalg.cond(values)[:, None]
+    assert (np.abs(mine - truth) < 1e-14 * condition * np.abs(truth).max(-1, keepdims=True)).all()
+    well = condition[:, 0] < 50.0
+    assert np.abs(mine - truth)[well].max() < 1e-12
+    assert well.any()
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 5])
+def test_random_matrices(size):
+    values = np.random.default_rng(size).normal(size=(BATCH, size, size))
+    _check(values, np.ones((size, size), dtype=bool))
+
+
+def test_pivots_are_searched_in_every_lane():
+    """Tiny leading entries ruin an elimination that does not exchange rows."""
+    values = np.random.default_rng(7).normal(size=(BATCH, 4, 4))
+    values[::2, 0, 0] *= 1e-17
+    values[1::3, 1, 1] = 0.0
+    values[::5, 0, 0] = 0.0
+    _check(values, np.ones((4, 4), dtype=bool))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_entries_left_out(seed):
+    rng = np.random.default_rng(seed)
+    present = rng.random((5, 5)) < 0.35
+    present[np.arange(5), rng.permutation(5)] = True
+    values = rng.normal(size=(BATCH, 5, 5)) + 0.2
+    _check(values, present)
+
+
+def test_a_permutation_costs_no_comparison():
+    """Where only one entry can be the pivot, the exchange is settled at compile time."""
+    order = np.array([2, 0, 3, 1])
+    present = np.eye(4, dtype=bool)[order]
+    values = np.random.default_rng(3).normal(size=(BATCH, 4, 4))
+    _check(values, present)
+    matrix = _scalars(values, present)
+    assert not any(entry is not None for row in factorise(matrix).upper[:1] for entry in row[1:])
+    program = str(jax.make_jaxpr(lambda m: solve(factorise(m), [m[0][2]] * 4))(matrix))
+    assert "select" not in program
+    assert "sub" not in program
+
+
+@pytest.mark.parametrize(
+    "present",
+    [np.array([[1, 0], [1, 0]]), np.array([[1, 1, 0], [1, 1, 0], [1, 0, 0]]), np.zeros((1, 1))],
+)
+def test_singular_by_structure(present):
+    values = np.random.default_rng(0).normal(size=(1, *present.shape))
+    with pytest.raises(ValueError, match="singular whatever its entries"):
+        factorise(_scalars(values, present.astype(bool)))
+
+
+def test_singular_by_value_is_not_finite():
+    ones = [[jnp.asarray(1.0)] * 2] * 2
+    assert not np.isfinite(solve(factorise(ones), [jnp.asarray(1.0), jnp.asarray(2.0)])).any()
+
+
+def test_derivative_of_a_solution():
+    """d(A⁻¹ b) = −A⁻¹ dA A⁻¹ b."""
+    rng = np.random.default_rng(5)
+    A, dA, b = rng.normal(size=(3, 3)), rng.normal(size=(3, 3)), rng.normal(size=3)
+
+    def mine(a):
+        return jnp.stack(solve(factorise([list(row) for row in a]), list(jnp.asarray(b))))
+
+    _, tangent = jax.jvp(mine, (jnp.asarray(A),), (jnp.asarray(dA),))
+    truth = -np.linalg.solve(A, dA @ np.linalg.solve(A, b))
+    np.testing.assert_allclose(tangent, truth, rtol=1e-11)
