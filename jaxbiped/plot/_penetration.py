@@ -36,11 +36,20 @@ def penetrations(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None
     ax = axes_or_new(ax, 7.2, 3.4)
     deepest = 0.0
     for k, (foot, touching) in enumerate(zip(found.feet, found.touching, strict=True)):
-        depth = np.where(touching, foot.penetration * 1e3, np.nan)
+        depth = _depth_mm(np.asarray(foot.penetration), touching)
         ax.plot(samples.t, depth, color=LEG_COLOURS[k], linewidth=1.3, label=LEG_NAMES[k])
-        deepest = max(deepest, float(depth[touching].max(initial=0.0)))
+        deepest = max(deepest, float(np.nanmax(depth, initial=0.0)))
     ax.margins(x=0.01)
     ax.set_ylim(0.0, 1.1 * max(deepest, 1e-3))
     dress(ax, "Penetration of the feet", "time, $t$ (s)", r"penetration, $\delta$ (mm)")
     legend_above(ax)
     return figure_of(ax)
+
+
+def _depth_mm(penetration: np.ndarray, touching: np.ndarray) -> np.ndarray:
+    """Penetration where the foot touches, zero at the samples just outside, nothing elsewhere."""
+    beside = np.zeros_like(touching)
+    beside[1:] |= touching[:-1]
+    beside[:-1] |= touching[1:]
+    at_surface = beside & ~touching & (penetration <= 0.0)
+    return np.where(touching | at_surface, np.maximum(penetration, 0.0) * 1e3, np.nan)

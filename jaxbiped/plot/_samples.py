@@ -84,7 +84,8 @@ def contacts(scene: Scene, state: State) -> Contacts:
     length = len(state.hip_x)
     room = -length % _BLOCK
     padded = jtu.tree_map(lambda leaf: np.pad(leaf, (0, room), mode="edge"), state)
-    found = _contacts(scene, padded)
+    # A parameter that is a plain number would be a constant of the program, and compiled anew.
+    found = _contacts(jtu.tree_map(jnp.asarray, scene), padded)
     return jtu.tree_map(lambda leaf: np.asarray(leaf)[:length], found)
 
 

@@ -1,0 +1,63 @@
+"""What holds for every figure."""
+
+import subprocess
+import sys
+
+import jax
+import jax.numpy as jnp
+import pytest
+from matplotlib.figure import Figure
+
+import jaxbiped as jb
+from jaxbiped import plot
+
+FIGURES = [
+    plot.gait_strobe,
+    plot.phase_portrait,
+    plot.leg_angles,
+    plot.penetrations,
+    plot.contact_forces,
+]
+
+
+@pytest.fixture(scope="module")
+def endings():
+    """A fall and a stop."""
+    found = []
+    for slope in (0.04, 0.005):
+        scene = jb.seed_scene(slope=slope)
+        found.append((scene, jb.simulate(scene, jb.seed_state(), duration=10.0)))
+    assert [str(walk.outcome) for _, walk in found] == ["fell forward", "stopped"]
+    return found
+
+
+@pytest.mark.parametrize("draw", FIGURES)
+def test_motions_that_end_early_are_drawn(draw, endings, tmp_path):
+    for k, (scene, walk) in enumerate(endings):
+        figure = draw(scene, walk)
+        assert isinstance(figure, Figure)
+        figure.savefig(tmp_path / f"{k}.png")
+        assert (tmp_path / f"{k}.png").stat().st_size > 5000
+
+
+@pytest.mark.parametrize("draw", [*FIGURES, plot.animate])
+def test_the_continuous_solution_is_needed(draw):
+    scene = jb.seed_scene()
+    end = jb.simulate(scene, jb.seed_state(), duration=0.1, save="end")
+    with pytest.raises(ValueError, match='save="steps"'):
+        draw(scene, end)
+
+
+@pytest.mark.parametrize("draw", [*FIGURES, plot.animate])
+def test_a_batch_is_refused(draw, seed_walk):
+    scene, walk = seed_walk
+    batch = jax.tree_util.tree_map(lambda leaf: jnp.asarray(leaf)[None], walk)
+    with pytest.raises(ValueError, match="batch"):
+        draw(scene, batch)
+
+
+def test_pyplot_is_left_alone():
+    code = "import sys, jaxbiped.plot; sys.exit('matplotlib.pyplot' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    code = "import sys, jaxbiped; sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

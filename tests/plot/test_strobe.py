@@ -1,0 +1,74 @@
+import math
+
+import numpy as np
+import pytest
+from matplotlib.collections import EllipseCollection, LineCollection
+from matplotlib.figure import Figure
+
+import jaxbiped as jb
+from jaxbiped.plot import gait_strobe
+
+
+def _drawn(figure):
+    (ax,) = figure.axes
+    legs = [each for each in ax.collections if isinstance(each, LineCollection)]
+    feet = [each for each in ax.collections if isinstance(each, EllipseCollection)]
+    segments = np.array([leg.get_segments() for leg in legs])
+    return ax, segments, np.array([foot.get_offsets() for foot in feet])
+
+
+@pytest.fixture(scope="module")
+def strobe(seed_walk):
+    return gait_strobe(*seed_walk, start=0.5, stop=1.4, count=7)
+
+
+def test_legs_have_their_length_and_end_at_the_feet(strobe):
+    ax, segments, feet = _drawn(strobe)
+    assert isinstance(strobe, Figure)
+    assert segments.shape == (2, 7, 2, 2)
+    lengths = np.linalg.norm(segments[:, :, 1] - segments[:, :, 0], axis=-1)
+    np.testing.assert_allclose(lengths, 0.40 - 0.08, rtol=1e-12)
+    np.testing.assert_array_equal(segments[:, :, 1], feet)
+    assert "(m)" in ax.get_xlabel()
+    assert "(m)" in ax.get_ylabel()
+    assert ax.get_aspect() == 1.0
+
+
+def test_poses_are_the_trajectorys_seen_upright(seed_walk, strobe):
+    _, walk = seed_walk
+    _, segments, _ = _drawn(strobe)
+    state = walk.at(np.linspace(0.5, 1.4, 7))
+    x, z = np.asarray(state.hip_x), np.asarray(state.hip_z)
+    for leg, angle in enumerate((np.asarray(state.theta_1), np.asarray(state.theta_2))):
+        along = segments[leg, :, 1] - segments[leg, :, 0]
+        # The leg's angle from the true vertical is its angle from the normal less the slope.
+        tilt = np.arctan2(along[:, 0], -along[:, 1])
+        np.testing.assert_allclose(tilt, angle - 0.02, atol=1e-12)
+        hip = x * np.cos(0.02) + z * np.sin(0.02), z * np.cos(0.02) - x * np.sin(0.02)
+        np.testing.assert_allclose(segments[leg, :, 0], np.stack(hip, axis=-1), atol=1e-12)
+
+
+def test_the_slope_falls_and_carries_a_foot(strobe):
+    ax, _, feet = _drawn(strobe)
+    (slope,) = [line for line in ax.lines if hasattr(line, "get_slope")]
+    assert slope.get_slope() == pytest.approx(-math.tan(0.02))
+    x, z = slope.get_xy1()
+    heights = (feet[..., 1] - z - slope.get_slope() * (feet[..., 0] - x)) * math.cos(0.02)
+    np.testing.assert_allclose(heights.min(axis=0), 0.08, atol=1e-3)
+
+
+def test_all_that_is_drawn_is_seen(strobe):
+    ax, segments, feet = _drawn(strobe)
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    points = np.concatenate([segments.reshape(-1, 2), (feet - 0.08).reshape(-1, 2)])
+    points = np.concatenate([points, (feet + 0.08).reshape(-1, 2)])
+    assert (points > [left, bottom]).all()
+    assert (points < [right, top]).all()
+
+
+def test_axes_and_spans_given(seed_walk):
+    ax = Figure().add_subplot()
+    assert gait_strobe(*seed_walk, ax=ax, count=1) is ax.figure
+    for options in ({"start": 2.0}, {"start": -0.1}, {"start": 1.0, "stop": 0.5}, {"count": 0}):
+        with pytest.raises(jb.ArgumentError):
+            gait_strobe(*seed_walk, **options)
