@@ -13,8 +13,14 @@ Parameter: TypeAlias = Any
 """A number that a constructor turns into a floating-point array: a float, an array, a tracer."""
 
 
-def as_float(value: object) -> Array:
-    """A floating-point array of JAX's default width (64 bits unless changed) or its own."""
+def as_float(value: Any) -> Any:
+    """A floating-point array of JAX's default width (64 bits unless changed) or its own.
+
+    What is no number is returned as it is, for the check that follows to refuse by name.
+    """
     if isinstance(value, jax.Array | jax.core.Tracer):
         return value if jnp.issubdtype(value.dtype, jnp.floating) else value.astype(float)
-    return jnp.asarray(value, dtype=float)
+    try:
+        return jnp.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        return value

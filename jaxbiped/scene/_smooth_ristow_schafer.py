@@ -54,9 +54,10 @@ class SmoothRistowSchafer(AbstractNormalLaw):
     def elastic_energy(self, penetration: Scalar) -> Scalar:
         # On the ramp by quadrature (the integrand is smooth there), above it in closed form.
         width = jnp.asarray(self.depth_width)
-        upper = jnp.clip(penetration / width, 0.0, 1.0)
+        inside = penetration < width
+        upper = jnp.where(inside, jnp.maximum(penetration / width, 0.0), 1.0)
         on_ramp = sum(
             weight * upper * self.elastic_force(node * upper * width) for node, weight in _GAUSS
         )
-        above = hertz_energy(self.K, self.n, jnp.maximum(penetration, width))
+        above = hertz_energy(self.K, self.n, jnp.where(inside, width, penetration))
         return width * on_ramp + above - hertz_energy(self.K, self.n, width)

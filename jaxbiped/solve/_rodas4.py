@@ -1,4 +1,4 @@
-"""Rodas4: fourth order."""
+"""Rodas4: fourth order, the default."""
 
 from typing import Any, ClassVar
 

@@ -56,7 +56,7 @@ def simulate(
         duration: simulated time [s].
         steps: footsteps (heel strikes) after which to end.
         solver: a name (see `SOLVERS`) or any diffrax solver.
-        accuracy: "fast", "balanced" or "tight": relative tolerance 1e-4, 1e-6 or 1e-8.
+        accuracy: "fast", "balanced" or "tight" (see `ACCURACIES`).
         rtol: relative tolerance, in place of the accuracy's.
         atol: absolute tolerance (SI), in place of a hundredth of the relative one.
         save: "steps" for every step and the continuous solution, "end" for the final state, or

@@ -223,5 +223,7 @@ def test_orders_on_prothero_robinson_problems(solver):
 
 @each_solver
 def test_fast_decay_is_gone_in_one_step(solver):
-    decay = _solve(lambda t, y, rate: -rate * y, solver(), jnp.asarray(1.0), jnp.asarray(1e12), 1.0)
-    assert abs(decay[-1]) < 1e-8
+    """The distance to the slow solution after one step of h λ = 1e12, from a distance of 1."""
+    start, stiffness = 1.0 + jnp.sin(jnp.asarray(0.3)), jnp.asarray(1e12)
+    values = _solve(_prothero_robinson, solver(), start, stiffness, jnp.asarray(1.0))
+    assert abs(values[-1] - np.sin(1.3)) < 1e-8

@@ -1,0 +1,90 @@
+"""`jaxbiped walk` as a user meets it."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from PIL import Image
+
+from jaxbiped.cli import main
+
+
+def _run(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "jaxbiped", "walk", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory):
+    """The command run once, with every output."""
+    out = tmp_path_factory.mktemp("walk")
+    result = _run("--duration", "3", "--out", str(out / "out"), "--json", str(out / "walk.json"))
+    return out, result
+
+
+def test_prints_a_table_and_the_ending(walk):
+    _, result = walk
+    assert result.returncode == 0, result.stderr
+    assert "period s" in result.stdout
+    assert "0.4415" in result.stdout
+    assert "walking after 3 s" in result.stdout
+
+
+def test_json_keys_and_numbers(walk):
+    out, _ = walk
+    numbers = json.loads((out / "walk.json").read_text())
+    assert {"ending", "slope_rad", "steps", "energy_residual_J", "solver", "wall_s"} <= set(numbers)
+    assert numbers["ending"] == "walking"
+    assert numbers["slope_rad"] == 0.02
+    keys = {"time_s", "period_s", "length_m", "speed_m_s", "peak_normal_N", "max_penetration_m"}
+    assert keys <= set(numbers["steps"][0])
+    assert numbers["steps"][0]["period_s"] == pytest.approx(0.4415, abs=1e-4)
+    assert numbers["steps"][0]["peak_normal_N"] == pytest.approx(312, rel=0.01)
+    assert {"name", "accepted", "rejected"} <= set(numbers["solver"])
+    assert {"import", "compile", "run"} == set(numbers["wall_s"])
+    assert abs(numbers["energy_residual_J"]) < 1e-5
+
+
+def test_writes_pictures_an_animation_and_the_trajectory(walk):
+    out, _ = walk
+    names = {path.name for path in (out / "out").iterdir()}
+    assert {"strobe.png", "contact_forces.png", "walk.gif", "trajectory.nc"} <= names
+    for name in names:
+        if name.endswith((".png", ".gif")):
+            with Image.open(out / "out" / name) as picture:
+                assert min(picture.size) > 100
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--K", "-1"], ("K", "-1", "above 0")),
+        (["--theta-1", "nan"], ("theta_1", "nan", "finite")),
+        (["--solver", "euler9"], ("solver", "euler9", "rodas4")),
+        (["--l", "0.05"], ("l", "0.05", "r = 0.08")),
+        (["--out", "/dev/null/pictures"], ("--out", "/dev/null/pictures", "directory")),
+        (["--json", "/no/such/folder/x.json"], ("--json", "/no/such/folder/x.json", "folder")),
+        (["--duration", "0"], ("duration", "0", "above 0")),
+        (["--rtol", "-1"], ("rtol", "-1", "above 0")),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_code_2(arguments, words, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(["walk", *arguments])
+    assert stopped.value.code == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert len(printed.err.strip().splitlines()) == 1
+    assert all(word in printed.err for word in words)
+
+
+def test_json_to_standard_output_prints_only_that(capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(["walk", "--slope", "0.04", "--duration", "5", "--json", "-"])
+    assert stopped.value.code == 0
+    assert json.loads(capsys.readouterr().out)["ending"] == "fell forward"

@@ -1,0 +1,79 @@
+"""Scenes as pytrees: parameters are leaves, and what is not modelled is not there."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+
+PARAMETERS = "m J l d r hip slope g K c n mu_s mu_k v0 xi".split()  # noqa: SIM905
+
+
+def test_seed_scene_holds_the_papers_parameters():
+    scene = jb.seed_scene()
+    values = [float(leaf) for leaf in jax.tree_util.tree_leaves(scene)]
+    expected = [1.0, 0.0096, 0.4, 0.1, 0.08, 0.0, 0.02, 9.8, 1e6, 1e7, 1.5, 0.5, 0.4, 1e-4, 1000.0]
+    np.testing.assert_allclose(values, expected)
+
+
+def test_every_leaf_is_differentiable_and_vmappable():
+    """Acceleration of a foot in contact and slipping depends on all that is modelled."""
+    state = jb.seed_state()._replace(hip_x=jnp.asarray(0.3), omega_2=jnp.asarray(-1.2565))
+    scene = jb.seed_scene(hip_mass=0.5)
+
+    def hip_acceleration(scene):
+        return jb.accelerations(scene, state).hip_ax
+
+    gradient = jax.grad(hip_acceleration)(scene)
+    leaves = dict(zip(PARAMETERS, _leaves(gradient), strict=True))
+    assert all(np.isfinite(value) for value in leaves.values())
+    idle = {name for name, value in leaves.items() if value == 0.0}
+    assert idle <= {"mu_k", "xi"} or idle <= {"mu_s"}
+    many = jax.vmap(lambda K: eqx.tree_at(lambda s: s.normal.K, scene, K))(jnp.array([1e5, 1e6]))
+    both = jax.vmap(hip_acceleration)(_broadcast(many, 2))
+    np.testing.assert_allclose(both[1], hip_acceleration(scene), rtol=1e-12)
+
+
+def _leaves(tree):
+    return [float(leaf) for leaf in jax.tree_util.tree_leaves(tree)]
+
+
+def _broadcast(tree, n):
+    return jax.tree_util.tree_map(lambda leaf: jnp.broadcast_to(leaf, (n,)), tree)
+
+
+def _primitives(scene):
+    program = jax.make_jaxpr(lambda state: jb.accelerations(scene, state))(jb.seed_state())
+    return str(program)
+
+
+def test_what_a_scene_leaves_out_is_not_in_the_program():
+    seed = jb.seed_scene()
+    without = jb.Scene(seed.walker, seed.ground, seed.normal, jb.Frictionless())
+    coulomb = jb.Scene(
+        seed.walker, seed.ground, seed.normal, jb.RegularisedCoulomb(mu=0.4, v_d=1e-4)
+    )
+    assert _primitives(seed).count(" exp ") == 4
+    assert _primitives(without).count(" exp ") == 2
+    assert _primitives(coulomb).count(" tanh ") == 2
+    assert " tanh " not in _primitives(without)
+    assert " sign " in _primitives(seed)
+    assert " sign " not in _primitives(without)
+
+
+def test_frictionless_forces_have_no_tangential_part():
+    seed = jb.seed_scene()
+    scene = jb.Scene(seed.walker, seed.ground, seed.normal, jb.Frictionless())
+    assert jb.foot_forces(scene, jb.seed_state()).foot_1.tangential is None
+
+
+@pytest.mark.parametrize("rule", [jb.StanceRotation(), jb.AlwaysTouching()])
+def test_clearance_rules(rule):
+    forward, backward = rule.admits(jnp.asarray(1.0)), rule.admits(jnp.asarray(-1.0))
+    if isinstance(rule, jb.AlwaysTouching):
+        assert forward is None
+    else:
+        assert not bool(forward)
+        assert bool(backward)

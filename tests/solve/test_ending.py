@@ -1,0 +1,96 @@
+"""Every ending by its name, on walks that end so."""
+
+import jax.numpy as jnp
+import pytest
+
+import jaxbiped as jb
+
+Ending = jb.Ending
+
+
+def _walk(slope, **options):
+    options = {"duration": 20.0, "save": "end"} | options
+    return jb.simulate(jb.seed_scene(slope=slope), jb.seed_state(), **options)
+
+
+@pytest.mark.parametrize(
+    ("slope", "ending"),
+    [
+        (0.005, Ending.STOPPED),
+        (0.010, Ending.WALKING),
+        (0.030, Ending.WALKING),
+        (0.035, Ending.FELL_FORWARD),
+        (0.040, Ending.FELL_FORWARD),
+        (0.060, Ending.FELL_FORWARD),
+    ],
+)
+def test_the_seed_start_on_other_slopes(slope, ending):
+    walk = _walk(slope)
+    assert walk.outcome == ending
+    if ending == Ending.STOPPED:
+        assert float(walk.final.hip_z) > 0.39  # recognised before it sinks
+
+
+def test_it_still_walks_after_a_hundred_footsteps():
+    walk = _walk(0.02, duration=None, steps=100)
+    assert walk.outcome == Ending.WALKING
+    assert float(walk.t[-1]) == pytest.approx(0.3932 + 99 * 0.44083, abs=0.05)
+
+
+def test_out_of_steps():
+    assert _walk(0.02, max_solver_steps=50).outcome == Ending.OUT_OF_STEPS
+    assert _walk(0.02, duration=None, steps=100, max_solver_steps=50).outcome == Ending.OUT_OF_STEPS
+
+
+def _state(**values):
+    return jb.seed_state()._replace(**{name: jnp.asarray(v) for name, v in values.items()})
+
+
+def test_fell_back():
+    """Both feet far ahead of a hip that moves uphill, on ground that always holds."""
+    seed = jb.seed_scene()
+    scene = jb.Scene(seed.walker, seed.ground, seed.normal, seed.friction, jb.AlwaysTouching())
+    start = _state(
+        theta_1=0.6, theta_2=0.65, omega_1=1.5, omega_2=1.5, hip_vx=-0.5, hip_vz=-0.3,
+        hip_z=0.08 + 0.32 * 0.8253,
+    )  # fmt: skip
+    fall = jb.simulate(scene, start, duration=2.0, save="end", watch=("fall",))
+    assert fall.outcome == Ending.FELL_BACK
+    assert float(fall.final.hip_vx) < 0.0
+
+
+def test_stopped_on_ground_that_always_holds():
+    """Let down on both feet, legs astride, it comes to rest and is told so."""
+    seed = jb.seed_scene(slope=0.0)
+    coulomb = jb.RegularisedCoulomb(mu=0.8, v_d=1e-3)
+    scene = jb.Scene(seed.walker, seed.ground, seed.normal, coulomb, jb.AlwaysTouching())
+    start = _state(
+        theta_1=0.3, theta_2=-0.3, omega_1=0.0, omega_2=0.0, hip_vx=0.0, hip_vz=0.0,
+        hip_z=float(jb.standing_height(scene, jnp.asarray(0.3), 4e-4)),
+    )  # fmt: skip
+    rest = jb.simulate(scene, start, duration=50.0, save="end")
+    assert rest.outcome == Ending.STOPPED
+    assert float(rest.t[-1]) < 50.0
+
+
+def test_a_scuffing_foot_is_a_stumble():
+    """Without the clearance rule the swinging foot catches the ground at mid-stance."""
+    seed = jb.seed_scene()
+    scene = jb.Scene(seed.walker, seed.ground, seed.normal, seed.friction, jb.AlwaysTouching())
+    walk = jb.simulate(scene, jb.seed_state(), duration=2.0, save="end")
+    assert walk.outcome == Ending.STUMBLED
+    unwatched = jb.simulate(scene, jb.seed_state(), duration=0.3, save="end", watch=("fall",))
+    assert unwatched.outcome == Ending.WALKING
+
+
+def test_names_in_words():
+    names = [str(ending) for ending in Ending]
+    assert names == [
+        "walking",
+        "fell forward",
+        "fell back",
+        "stopped",
+        "stumbled",
+        "out of steps",
+        "solver failed",
+    ]

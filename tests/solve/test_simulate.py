@@ -1,0 +1,218 @@
+"""Simulations against an independent integrator, closed forms, and each other."""
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+
+
+def _error(trajectory, state):
+    return np.abs(np.array(trajectory.final) - state).max()
+
+
+def test_tight_state_error_is_below_1e_6(seed_walk, reference):
+    times, states = reference
+    _, walk = seed_walk
+    assert walk.outcome == jb.Ending.WALKING
+    assert _error(walk, states[-1]) < 1e-6
+    between = np.array(walk.at(times)).T
+    assert np.abs(between - states).max() < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("solver", "bound"), [("rodas4", 2e-4), ("rodas4p", 2e-4), ("rodas5p", 2e-4)]
+)
+def test_balanced_state_errors(solver, bound, reference):
+    walk = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=2.0, solver=solver, save="end")
+    assert _error(walk, reference[1][-1]) < bound
+
+
+def test_the_reference_itself(reference):
+    """Two programs, two integrators, one answer: at their tightest they agree to 1e-8."""
+    walk = jb.simulate(
+        jb.seed_scene(),
+        jb.seed_state(),
+        duration=2.0,
+        solver="rodas5p",
+        rtol=1e-11,
+        atol=1e-13,
+        save="end",
+    )
+    assert _error(walk, reference[1][-1]) < 1e-8
+
+
+def test_error_falls_with_the_tolerance_where_the_field_is_smooth(reference):
+    """In single support, t ≤ 0.35 s: a hundredth of the tolerance, a hundredth of the error."""
+    times, states = reference
+    at = int(np.searchsorted(times, 0.35))
+    errors = []
+    for rtol in (1e-4, 1e-6, 1e-8):
+        walk = jb.simulate(
+            jb.seed_scene(), jb.seed_state(), duration=times[at], rtol=rtol, save="end"
+        )
+        errors.append(_error(walk, states[at]))
+    slope = np.polyfit([-4, -6, -8], np.log10(errors), 1)[0]
+    assert slope > 0.7
+    assert errors[-1] < 1e-7
+
+
+def test_other_solvers_stay_available(reference):
+    """diffrax's implicit ones solve the walk; its explicit ones are there for soft scenes."""
+    walk = jb.simulate(
+        jb.seed_scene(), jb.seed_state(), duration=0.35, solver="kvaerno5", save="end"
+    )
+    at = int(np.searchsorted(reference[0], 0.35))
+    assert _error(walk, reference[1][at]) < 1e-4
+    high = jb.seed_state()._replace(hip_z=jnp.asarray(5.0))
+    flights = [
+        jb.simulate(jb.seed_scene(), high, duration=0.3, solver=name, accuracy="tight", save="end")
+        for name in ("tsit5", "rodas4")
+    ]
+    np.testing.assert_allclose(np.array(flights[0].final), np.array(flights[1].final), atol=1e-6)
+
+
+def test_energy_is_kept_without_damper_and_friction():
+    """The seed's walker bouncing on Hertz feet, frictionless."""
+    seed = jb.seed_scene()
+    scene = jb.Scene(
+        seed.walker, seed.ground, jb.Hertz(K=1e5), jb.Frictionless(), jb.AlwaysTouching()
+    )
+    start = jb.seed_state()._replace(hip_z=jnp.asarray(0.45))
+    motion = jb.simulate(scene, start, duration=0.6, accuracy="tight", watch=())
+    assert float(jnp.max(jb.foot_forces(scene, motion.state).foot_2.normal)) > 50.0
+    total = jb.energies(scene, motion.state).total
+    np.testing.assert_allclose(total, total[0], atol=2e-6)
+
+
+def _upright(speed_x=0.0, speed_z=0.0, height=0.0):
+    """Both legs straight down, soles `height` above the ground."""
+    return jb.State(*map(jnp.asarray, (0.0, 0.4 + height, 0.0, 0.0, speed_x, speed_z, 0.0, 0.0)))
+
+
+def test_a_drop_on_the_hertz_law():
+    """Largest penetration and rebound speed from the balance of energy, both feet at once."""
+    seed = jb.seed_scene(slope=0.0)
+    scene = jb.Scene(
+        seed.walker, seed.ground, jb.Hertz(K=1e6), jb.Frictionless(), jb.AlwaysTouching()
+    )
+    drop = jb.simulate(scene, _upright(speed_z=-0.5), duration=0.05, accuracy="tight", watch=())
+    times = np.linspace(0.0, 0.05, 20001)
+    states = drop.at(times)
+    depth = float(jnp.max(jb.feet(scene, states).foot_1.penetration))
+    # ½·2·v² + 2 g δ = 2·K δ^2.5/2.5
+    assert depth**2.5 * 1e6 / 2.5 - 9.8 * depth == pytest.approx(0.5 * 0.5**2, rel=1e-6)
+    leaving = int(np.flatnonzero(np.asarray(states.hip_z) > 0.4)[0])
+    assert float(states.hip_vz[leaving]) == pytest.approx(0.5, abs=1e-4)
+
+
+def _block(friction, slope):
+    """Legs too heavy to turn slide like one block on two feet."""
+    walker = jb.Walker(m=1.0, J=1e9, l=0.4, d=0.0, r=0.08)
+    normal = jb.RistowSchafer(K=1e6, c=1e6)
+    return jb.Scene(walker, jb.Ground(slope=slope), normal, friction, jb.AlwaysTouching())
+
+
+def _settled(scene, speed):
+    depth = float((9.8 * jnp.cos(scene.ground.slope) / 1e6) ** (2 / 3))
+    return _upright(speed_x=speed, height=-depth)
+
+
+def test_a_block_without_friction_slides_down_freely():
+    scene = _block(jb.Frictionless(), 0.1)
+    end = jb.simulate(scene, _settled(scene, 0.2), duration=0.5, accuracy="tight", watch=()).final
+    assert float(end.hip_vx) == pytest.approx(0.2 + 9.8 * np.sin(0.1) * 0.5, rel=1e-8)
+
+
+def test_a_block_on_regularised_coulomb_friction():
+    """v' = −μ g tanh(v/v_d) on the level: sinh(v/v_d) decays exponentially."""
+    v_d, mu, t = 0.05, 0.4, 0.06
+    scene = _block(jb.RegularisedCoulomb(mu=mu, v_d=v_d), 0.0)
+    end = jb.simulate(scene, _settled(scene, 0.3), duration=t, accuracy="tight", watch=()).final
+    expected = v_d * np.arcsinh(np.sinh(0.3 / v_d) * np.exp(-mu * 9.8 * t / v_d))
+    assert float(end.hip_vx) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", [jb.BengisuAkay, jb.SmoothBengisuAkay])
+def test_a_block_on_bengisu_akay_friction(law):
+    """Fast: the kinetic coefficient brakes it. On a slope: it creeps where F = m g sin α."""
+    friction = law(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
+    flat = _block(friction, 0.0)
+    end = jb.simulate(flat, _settled(flat, 0.5), duration=0.1, accuracy="tight", watch=()).final
+    assert float(end.hip_vx) == pytest.approx(0.5 - 0.4 * 9.8 * 0.1, rel=1e-6)
+    tilted = _block(friction, 0.1)
+    end = jb.simulate(tilted, _settled(tilted, 0.0), duration=0.1, accuracy="tight", watch=()).final
+    if law is jb.BengisuAkay:
+        creep = 1e-4 * (1 - np.sqrt(1 - np.tan(0.1) / 0.5))
+        assert float(end.hip_vx) == pytest.approx(creep, rel=1e-4)
+    force = friction.force(jnp.asarray(9.8 * np.cos(0.1)), end.hip_vx)
+    assert float(force) == pytest.approx(-9.8 * np.sin(0.1), rel=1e-4)
+
+
+def test_saving_only_the_end_or_given_times_changes_nothing(seed_walk):
+    scene, walk = seed_walk
+    options = dict(duration=2.0, accuracy="tight")
+    end = jb.simulate(scene, jb.seed_state(), save="end", **options)
+    times = jnp.array([0.5, 1.0, 2.0])
+    some = jb.simulate(scene, jb.seed_state(), save=times, **options)
+    np.testing.assert_allclose(np.array(end.final), np.array(walk.final), atol=1e-9)
+    np.testing.assert_allclose(np.array(some.state), np.array(walk.at(times)), atol=1e-9)
+    assert end.dense is None
+    with pytest.raises(ValueError, match="steps"):
+        end.at(0.1)
+
+
+def test_a_bad_lane_ends_alone():
+    """One lane that is no number and one that falls leave the others as they were."""
+    good = [-0.2479, -0.2489, -0.2469]
+    bad = [float("nan"), 0.9]
+
+    @jax.jit
+    @jax.vmap
+    def run(angle):
+        start = jb.seed_state()._replace(theta_1=angle)
+        return jb.simulate(jb.seed_scene(), start, duration=0.5, accuracy="fast", save="end")
+
+    alone, mixed = run(jnp.array(good)), run(jnp.array(good + bad))
+    np.testing.assert_allclose(np.array(alone.final), np.array(mixed.final)[:, :3], atol=1e-9)
+    assert [jb.Ending(int(e)) for e in mixed.ending[:3]] == [jb.Ending.WALKING] * 3
+    assert jb.Ending(int(mixed.ending[3])) == jb.Ending.SOLVER_FAILED
+    attempts = mixed.accepted + mixed.rejected
+    assert int(attempts[3]) < 30
+
+
+def test_forward_and_reverse_derivatives_of_a_swing_equal_differences():
+    """Single support, away from every switch, where plain stepping may be differentiated."""
+
+    def angle(K, adjoint):
+        scene = jb.seed_scene(K=K, d=0.1)
+        start = jb.seed_state()
+        run = jb.simulate(scene, start, duration=0.1, accuracy="tight", save="end", adjoint=adjoint)
+        return run.final.theta_1
+
+    K = jnp.asarray(1e6)
+    forward = jax.jit(jax.jacfwd(lambda K: angle(K, diffrax.ForwardMode())))(K)
+    backward = jax.jit(jax.grad(lambda K: angle(K, None)))(K)
+    high, low = (float(angle(K * (1 + s), None)) for s in (1e-3, -1e-3))
+    difference = (high - low) / 2e3
+    assert float(forward) == pytest.approx(float(backward), rel=1e-8)
+    assert float(forward) == pytest.approx(difference, rel=1e-2)
+
+
+def test_single_precision_is_the_users_choice_and_refused_where_too_coarse():
+    start = jax.tree_util.tree_map(lambda leaf: leaf.astype(jnp.float32), jb.seed_state())
+    walk = jb.simulate(jb.seed_scene(), start, duration=0.3, accuracy="fast", save="end")
+    assert walk.final.theta_1.dtype == jnp.float32
+    full = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=0.3, save="end")
+    np.testing.assert_allclose(np.array(walk.final), np.array(full.final), atol=2e-2)
+    with pytest.raises(jb.ArgumentError, match=r"float32.*float64"):
+        jb.simulate(jb.seed_scene(K=1e10), start, duration=0.3)
+
+
+def test_compiling_apart_from_running():
+    request = jb.Simulation.prepare(jb.seed_scene(), jb.seed_state(), duration=0.1, save="end")
+    run = request.compile()
+    same = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=0.1, save="end")
+    np.testing.assert_array_equal(np.array(run().final), np.array(same.final))
