@@ -227,3 +227,17 @@ def test_fast_decay_is_gone_in_one_step(solver):
     start, stiffness = 1.0 + jnp.sin(jnp.asarray(0.3)), jnp.asarray(1e12)
     values = _solve(_prothero_robinson, solver(), start, stiffness, jnp.asarray(1.0))
     assert abs(values[-1] - np.sin(1.3)) < 1e-8
+
+
+@each_solver
+def test_one_step_of_linear_decay(solver):
+    """The new value and its error estimate are those of the stability functions."""
+    method, z = Classic(solver.tableau), -0.8
+    term = diffrax.ODETerm(lambda t, y, args: z * y)
+    start = jnp.asarray(1.0)
+    end, error, dense, _, _ = solver().step(term, 0.0, 1.0, start, None, None, False)
+    values = [method.stability(weights, z) for weights in (method.b, method.embedded())]
+    np.testing.assert_allclose(end, values[0], rtol=1e-13)
+    np.testing.assert_allclose(error, values[0] - values[1], rtol=1e-9)
+    middle = solver().interpolation_cls(t0=0.0, t1=1.0, **dense).evaluate(0.3)
+    np.testing.assert_allclose(middle, method.stability(method.dense(0.3), z), rtol=1e-12)
