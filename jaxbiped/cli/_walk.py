@@ -2,6 +2,7 @@
 
 import dataclasses
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -98,7 +99,7 @@ def write_outputs(scene: Scene, trajectory: Trajectory, out: Path) -> list[Path]
     from jaxbiped import plot
     from jaxbiped.gait._dataset import trajectory_dataset
 
-    figures = {
+    figures: dict[str, Callable[..., Any]] = {
         "strobe.png": plot.gait_strobe,
         "phase_portrait.png": plot.phase_portrait,
         "leg_angles.png": plot.leg_angles,

@@ -79,7 +79,8 @@ def landings(before: Feet, after: Feet) -> tuple[Scalar, Scalar]:
     """
 
     def lands(i: int) -> Scalar:
-        return ~touches(before[i]) & touches(after[i]) & (after[i].x > after[1 - i].x)
+        newly = ~touches(before[i]) & touches(after[i])
+        return newly & (after[i].x > after[1 - i].x)
 
     return lands(0), lands(1)
 

@@ -2,14 +2,15 @@
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped.dynamics._feet import feet, landings, standing_foot, touches
+from jaxbiped.dynamics._feet import Feet, feet, landings, standing_foot, touches
 from jaxbiped.dynamics._forces import foot_forces
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._ledger import energy_ledger
-from jaxbiped.gait._samples import moments_of_change, observed, sampled
+from jaxbiped.gait._samples import at_steps, moments_of_change, observed, sampled
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -65,13 +66,10 @@ def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
         ValueError: a trajectory without its continuous solution, or a batch of them.
     """
     trajectory.require_dense()
-    states = trajectory.state
-    both = feet(scene, states)
-    before, after = (
-        type(both)(*[_part(foot, part) for foot in both]) for part in (slice(-1), slice(1, None))
-    )
+    both, standing = at_steps(scene, trajectory, _feet_and_stance)
+    before, after = (_part(both, part) for part in (slice(-1), slice(1, None)))
     lands = np.stack([np.asarray(landing) for landing in landings(before, after)])
-    last = int(standing_foot(both)[0])
+    last = int(standing[0])
     found: list[tuple[int, int]] = []
     for k in np.flatnonzero(lands.any(axis=0)):
         for leg in (1, 2):
@@ -121,8 +119,13 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     )
 
 
-def _part(foot: Any, part: slice) -> Any:
-    return type(foot)(*[None if leaf is None else leaf[part] for leaf in foot])
+def _feet_and_stance(scene: Scene, state: State) -> tuple[Feet, Any]:
+    both = feet(scene, state)
+    return both, standing_foot(both)
+
+
+def _part(both: Feet, part: slice) -> Feet:
+    return jax.tree_util.tree_map(lambda leaf: leaf[part], both)
 
 
 def _first_touches(scene: Scene, state: State) -> Any:

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._types import as_float
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
@@ -54,10 +55,20 @@ def observed(
 ) -> PyTree:
     """`function(scene, state)` at times of any shape, as NumPy arrays of that shape."""
     padded = _padded(np.ravel(times))
-    values = _observe(function, scene, trajectory.dense, jnp.asarray(padded))
+    values = _observe(function, _as_arrays(scene), trajectory.dense, jnp.asarray(padded))
     return jax.tree_util.tree_map(
         lambda leaf: np.asarray(leaf)[: times.size].reshape(times.shape), values
     )
+
+
+def at_steps(
+    scene: Scene, trajectory: Trajectory, function: Callable[[Scene, State], PyTree]
+) -> PyTree:
+    """`function(scene, state)` at the ends of the solver's steps, as NumPy arrays."""
+    size = len(trajectory.t)
+    states = State(*[jnp.asarray(_padded(np.asarray(leaf))) for leaf in trajectory.state])
+    values = _apply(function, _as_arrays(scene), states)
+    return jax.tree_util.tree_map(lambda leaf: np.asarray(leaf)[:size], values)
 
 
 def moments_of_change(
@@ -74,7 +85,7 @@ def moments_of_change(
     if before.size == 0:
         return before
     left, right = jnp.asarray(_padded(before)), jnp.asarray(_padded(after))
-    found = _bisect(condition, scene, trajectory.dense, left, right)
+    found = _bisect(condition, _as_arrays(scene), trajectory.dense, left, right)
     return np.asarray(found)[: before.size]
 
 
@@ -82,6 +93,16 @@ def _padded(times: np.ndarray) -> np.ndarray:
     """Times filled up to a power of two, so that few lengths are compiled."""
     size = max(8, 1 << (len(times) - 1).bit_length())
     return np.pad(times, (0, size - len(times)), mode="edge")
+
+
+def _as_arrays(scene: Scene) -> Scene:
+    """The scene with every leaf an array: a plain number would be compiled in."""
+    return jax.tree_util.tree_map(as_float, scene)
+
+
+@eqx.filter_jit
+def _apply(function: Any, scene: Scene, states: State) -> PyTree:
+    return function(scene, states)
 
 
 @eqx.filter_jit

@@ -14,7 +14,7 @@ class Scene(eqx.Module):
 
     A frozen pytree whose numeric leaves are the parameters: differentiate or `vmap` with respect
     to any of them by replacing it, for example
-    `equinox.tree_at(lambda s: s.normal.K, scene, 2e6)`.
+    `equinox.tree_at(lambda s: s.normal.K, scene, jnp.asarray(2e6))`.
 
     Attributes:
         walker: masses and lengths.

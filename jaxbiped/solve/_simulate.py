@@ -229,7 +229,8 @@ def _ending(solution: diffrax.Solution, names: list[Ending], run: Simulation) ->
     code = jnp.where(solution.result == results.max_steps_reached, int(Ending.OUT_OF_STEPS), code)
     done = solution.result == results.successful
     if run.steps is not None:
-        _, _, count = solution.controller_state
+        counting: Any = solution.controller_state
+        _, _, count = counting
         # Time ran out before the footsteps came, where only footsteps were asked for.
         patience_ended = done & (count < run.steps) & (run.duration >= _PATIENCE * run.steps)
         code = jnp.where(patience_ended, int(Ending.OUT_OF_STEPS), code)
