@@ -10,7 +10,7 @@ class Rodas3P(AbstractRosenbrock):
     Prothero-Robinson problems; dense output of third order. The last two stages share one
     evaluation of the vector field, and their difference is the error estimate.
 
-    Source: Steinebach, Numerical Algorithms 96 (2024).
+    Source: Steinebach, Rosenbrock methods within OrdinaryDiffEq.jl, JuliaCon Proceedings (2024).
     """
 
     tableau: ClassVar[RosenbrockTableau] = RosenbrockTableau(
