@@ -44,8 +44,26 @@ class AbstractLinearisation(eqx.Module):
         """Factors of I − step J."""
 
     @abc.abstractmethod
-    def solve(self, factors: Any, jacobian: Any, step: Scalar, right: Components) -> Components:
-        """(I − step J)⁻¹ applied to `right`."""
+    def solve_kept(
+        self,
+        factors: Any,
+        jacobian: Any,
+        step: Scalar,
+        right: Components,
+        direct_right: dict[int, Scalar],
+    ) -> Components:
+        """The kept components of (I − step J)⁻¹ r.
+
+        `right` holds r of the kept components, `direct_right` of the direct ones.
+        """
+
+    @abc.abstractmethod
+    def direct(self) -> dict[int, int]:
+        """Components whose rate *is* another, kept component, each with that one."""
+
+    @abc.abstractmethod
+    def kept(self) -> list[int]:
+        """The other components, which remain when the direct ones are eliminated."""
 
 
 def split(
@@ -107,8 +125,21 @@ class _DenseLinearisation(AbstractLinearisation):
         identity = jnp.eye(self.y.size, dtype=self.y.dtype)
         return jax.scipy.linalg.lu_factor(identity - step * jacobian)
 
-    def solve(self, factors: Any, jacobian: Any, step: Scalar, right: Components) -> Components:
+    def solve_kept(
+        self,
+        factors: Any,
+        jacobian: Any,
+        step: Scalar,
+        right: Components,
+        direct_right: dict[int, Scalar],
+    ) -> Components:
         return [jax.scipy.linalg.lu_solve(factors, right[0])]
+
+    def direct(self) -> dict[int, int]:
+        return {}
+
+    def kept(self) -> list[int]:
+        return [0]
 
 
 class _ScalarLinearisation(AbstractLinearisation):
@@ -135,31 +166,24 @@ class _ScalarLinearisation(AbstractLinearisation):
         return [list(row) for row in zip(*columns, strict=True)]
 
     def factorise(self, jacobian: Matrix, step: Scalar) -> Factors:
-        direct = self._direct()
-        return factorise(_reduced(jacobian, direct, self._kept(direct), step))
+        return factorise(_reduced(jacobian, self.direct(), self.kept(), step))
 
-    def solve(
-        self, factors: Factors, jacobian: Matrix, step: Scalar, right: Components
+    def solve_kept(
+        self,
+        factors: Factors,
+        jacobian: Matrix,
+        step: Scalar,
+        right: Components,
+        direct_right: dict[int, Scalar],
     ) -> Components:
-        direct = self._direct()
-        kept = self._kept(direct)
-        reduced_right = []
-        for i in kept:
-            entries = [(jacobian[i][position], right[position]) for position in direct]
+        reduced = []
+        for i, own in zip(self.kept(), right, strict=True):
+            entries = [(jacobian[i][p], value) for p, value in direct_right.items()]
             terms = [entry * value for entry, value in entries if entry is not None]
-            reduced_right.append(right[i] + step * sum(terms[1:], terms[0]) if terms else right[i])
-        solution = list(right)
-        for i, value in zip(kept, solve(factors, reduced_right), strict=True):
-            solution[i] = value
-        for position, source in direct.items():
-            solution[position] = right[position] + step * solution[source]
-        return solution
+            reduced.append(own + step * sum(terms[1:], terms[0]) if terms else own)
+        return solve(factors, reduced)
 
-    def _kept(self, direct: dict[int, int]) -> list[int]:
-        return [i for i in range(len(self.y)) if i not in direct]
-
-    def _direct(self) -> dict[int, int]:
-        """Components to eliminate by hand, each with the component that is its rate."""
+    def direct(self) -> dict[int, int]:
         direct: dict[int, int] = {}
         for i, copied in enumerate(self.structure.copies):
             source = None if copied is None else copied - 1
@@ -168,6 +192,10 @@ class _ScalarLinearisation(AbstractLinearisation):
             if source not in direct and i not in direct.values():
                 direct[i] = source
         return direct
+
+    def kept(self) -> list[int]:
+        direct = self.direct()
+        return [i for i in range(len(self.y)) if i not in direct]
 
     def _column(self, position: int) -> list[Entry]:
         """Derivatives of all rates with respect to one input (0: time, 1 on: components)."""

@@ -1,6 +1,7 @@
 """Rosenbrock methods as diffrax solvers: implicit steps without iterations."""
 
 import functools
+import operator
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
 
@@ -8,6 +9,7 @@ import diffrax
 import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 from equinox.internal import ω
 from jaxtyping import PyTree
 
@@ -134,10 +136,63 @@ def _step(
 
     span = jnp.asarray(t1 - t0, dtype=dtype)
     control = jnp.asarray(terms.contr(t0, t1), dtype=dtype)
-    stages, end = _stages(tableau, field, jnp.asarray(t0), start, span, control)
-    dense = tuple(join(_weighted(row, stages)) for row in tableau.dense)
-    error = _weighted(tableau.error, stages) if tableau.error else stages[-1]
+    stages = _stages(tableau, field, jnp.asarray(t0), start, span, control)
+    last = len(tableau.alpha) - 1
+    end = _plus(start, stages.weighted((*tableau.a[-1], 1.0)))
+    error = stages.weighted(tableau.error or (*[0.0] * last, 1.0))
+    dense = tuple(join(stages.weighted(row)) for row in tableau.dense)
     return join(end), join(error), dense
+
+
+class _Stages(NamedTuple):
+    """The stages of a step, of which only the kept components are computed one by one.
+
+    A direct component p, whose rate is the kept component s, obeys a linear recurrence: stage by
+    stage (I − γ c) u_p = g (1 s_0 + (a + I) u_s), with g = γ h. So its stages are
+    u_p = g (b s_0 + B u_s), with B and b known from the tableau alone.
+    """
+
+    start: Components
+    step: Scalar
+    direct: dict[int, int]
+    kept: list[int]
+    matrix: np.ndarray
+    vector: np.ndarray
+    increments: list[Components]
+
+    def weighted(self, weights: Sequence[float]) -> Components:
+        """Σ_j weights_j u_j for every component."""
+        row = np.asarray(weights)
+        count = len(row)
+        totals: Components = [None] * len(self.start)
+        for place, i in enumerate(self.kept):
+            totals[i] = _sum(row, [stage[place] for stage in self.increments])
+        through = row @ self.matrix[:count]
+        at_start = float(row @ self.vector[:count])
+        for p, s in self.direct.items():
+            totals[p] = self.step * self._chain(at_start, through, s)
+        return totals
+
+    def direct_right(self, i: int) -> dict[int, Scalar]:
+        """Right-hand sides of the direct components in stage i."""
+        known, at_start = self.matrix[i, :i], float(self.vector[i])
+        return {p: self.step * self._chain(at_start, known, s) for p, s in self.direct.items()}
+
+    def _chain(self, at_start: float, weights: np.ndarray, s: int) -> Scalar:
+        place = self.kept.index(s)
+        stages = [stage[place] for stage in self.increments[: len(weights)]]
+        terms = [at_start * self.start[s]] if at_start != 0.0 else []
+        return _sum([1.0] * len(terms) + list(weights), terms + stages)
+
+
+def _recurrence(tableau: RosenbrockTableau) -> tuple[np.ndarray, np.ndarray]:
+    """B and b of `_Stages`."""
+    size = len(tableau.alpha)
+    a, c = np.zeros((size, size)), np.zeros((size, size))
+    for i in range(1, size):
+        a[i, :i], c[i, :i] = tableau.a[i - 1], tableau.c[i - 1]
+    inverse = np.linalg.inv(np.eye(size) - tableau.gamma * c)
+    return inverse @ (a + np.eye(size)), inverse @ np.ones(size)
 
 
 def _stages(
@@ -147,44 +202,52 @@ def _stages(
     start: Components,
     span: Scalar,
     control: Scalar,
-) -> tuple[list[Components], Components]:
-    """All stages of a step and its new value.
+) -> _Stages:
+    """All stages of a step.
 
     `span` is the step in the time that `field` sees and `control` the same step as the state sees
     it: opposite in sign where diffrax integrates backwards.
     """
     lin = linearise(field, t, start)
+    kept = lin.kept()
     step = tableau.gamma * control
     moves = control != 0.0
+
+    def picked(components: Components) -> Components:
+        return [components[i] for i in kept]
+
     slope, drift, jacobian = fenced(
-        moves, lambda: (lin.evaluate(t, start), lin.time_derivative(), lin.jacobian())
+        moves,
+        lambda: (picked(lin.evaluate(t, start)), picked(lin.time_derivative()), lin.jacobian()),
     )
     factors = fenced(moves, lambda: lin.factorise(jacobian, step))
-    stages: list[Components] = []
-    value, last_rate = start, slope
+    stages = _Stages(start, step, lin.direct(), kept, *_recurrence(tableau), increments=[])
+    last_rate = slope
 
-    def stage(i: int) -> tuple[Components, Components, Components | None]:
+    def stage(i: int) -> tuple[Components, Components | None]:
         row_a, row_c = (tableau.a[i - 1], tableau.c[i - 1]) if i else ((), ())
-        argument, rate = start, slope
+        rate = slope
         if _repeats(tableau, i):
-            argument, rate = value, last_rate
+            rate = last_rate
         elif any(row_a):
-            argument = _plus(start, _weighted(row_a, stages))
+            argument = _plus(start, stages.weighted(row_a))
             time = t + jnp.asarray(tableau.alpha[i] * span, dtype=t.dtype)
-            rate = lin.evaluate(time, argument)
+            rate = picked(lin.evaluate(time, argument))
         right = [step * component for component in rate]
         if any(row_c):
-            right = _plus(right, _weighted([tableau.gamma * c for c in row_c], stages))
+            weights = [tableau.gamma * c for c in row_c]
+            extra = [_sum(weights, list(column)) for column in zip(*stages.increments, strict=True)]
+            right = _plus(right, extra)
         weight = step * (tableau.gammas[i] * span)
         if tableau.gammas[i]:
             right = [r if d is None else r + weight * d for r, d in zip(right, drift, strict=True)]
         kept_rate = rate if _repeats(tableau, i + 1) else None
-        return lin.solve(factors, jacobian, step, right), argument, kept_rate
+        return lin.solve_kept(factors, jacobian, step, right, stages.direct_right(i)), kept_rate
 
     for i in range(len(tableau.alpha)):
-        increment, value, last_rate = fenced(moves, functools.partial(stage, i))
-        stages.append(increment)
-    return stages, _plus(value, stages[-1])
+        increment, last_rate = fenced(moves, functools.partial(stage, i))
+        stages.increments.append(increment)
+    return stages
 
 
 def _repeats(tableau: RosenbrockTableau, i: int) -> bool:
@@ -194,17 +257,10 @@ def _repeats(tableau: RosenbrockTableau, i: int) -> bool:
     return tableau.a[i - 1] == (*tableau.a[i - 2], 0.0)
 
 
-def _weighted(weights: Sequence[float], stages: list[Components]) -> Components:
-    """Σ_j weights_j stages_j, component by component, zero weights left out."""
-    used = [(w, stage) for w, stage in zip(weights, stages, strict=False) if w != 0.0]
-    totals = []
-    for k in range(len(stages[0])):
-        terms = [stage[k] if w == 1.0 else w * stage[k] for w, stage in used]
-        total = terms[0]
-        for term in terms[1:]:
-            total = total + term
-        totals.append(total)
-    return totals
+def _sum(weights: Sequence[float] | np.ndarray, values: list[Any]) -> Any:
+    """Σ weights_j values_j, zero weights left out and units not multiplied by."""
+    terms = [v if w == 1.0 else float(w) * v for w, v in zip(weights, values, strict=False) if w]
+    return functools.reduce(operator.add, terms)
 
 
 def _plus(a: Components, b: Components) -> Components:
