@@ -127,7 +127,10 @@ def lsoda(duration: float, rtol: float, atol: float, start: np.ndarray = START) 
 
 @functools.cache
 def lsoda_batch() -> Callable[[np.ndarray, np.ndarray, float, float], np.ndarray]:
-    """numbalsoda over many starts (n, 8) on all of numba's threads; gives final states (n, 8)."""
+    """numbalsoda over many starts (n, 8) on all of numba's threads; gives final states (n, 8).
+
+    A lane that fails is not a number.
+    """
     from numbalsoda import lsoda as compiled_lsoda
 
     address = lsoda_address()
@@ -136,10 +139,10 @@ def lsoda_batch() -> Callable[[np.ndarray, np.ndarray, float, float], np.ndarray
     def batch(starts, times, rtol, atol):
         finals = np.empty_like(starts)
         for i in numba.prange(starts.shape[0]):
-            states, _ = compiled_lsoda(
+            states, done = compiled_lsoda(
                 address, starts[i], times, np.array([0.0]), rtol, atol, 100000
             )
-            finals[i] = states[-1]
+            finals[i] = states[-1] if done else np.full(8, np.nan)
         return finals
 
     return batch

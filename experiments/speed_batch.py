@@ -45,6 +45,8 @@ class Row(NamedTuple):
     padded_steps_per_second: float | None
     """The same if every lane took as many as the longest: what was computed."""
     simulations_per_second: float
+    failed: int
+    """Lanes that did not reach the end."""
 
 
 class Runner(NamedTuple):
@@ -137,7 +139,9 @@ def measured(found: list[Runner], rounds: int) -> tuple[list[Row], list[np.ndarr
             runner.run()
             times[turn, i] = time.perf_counter() - began
     rows = []
-    for runner, (_, steps), seconds in zip(found, results, np.median(times, axis=0), strict=True):
+    for runner, (states, steps), seconds in zip(
+        found, results, np.median(times, axis=0), strict=True
+    ):
         rows.append(
             Row(
                 runner.way,
@@ -147,14 +151,15 @@ def measured(found: list[Runner], rounds: int) -> tuple[list[Row], list[np.ndarr
                 None if steps is None else float(steps.sum() / seconds),
                 None if steps is None else float(runner.lanes * steps.max() / seconds),
                 float(runner.lanes / seconds),
+                int(np.sum(~np.isfinite(states).all(axis=1))),
             )
         )
     return rows, [states for states, _ in results]
 
 
 def errors(found: list[Runner], finals: list[np.ndarray]) -> list[dict[str, Any]]:
-    """Largest and median error over a few lanes of the smallest batches."""
-    lanes = min(runner.lanes for runner in found)
+    """Largest and median error over a few lanes of the largest batches."""
+    lanes = max(runner.lanes for runner in found)
     exact = np.stack([_independent.reference(DURATION, start) for start in perturbed(CHECKED)])
     rows = []
     for runner, states in zip(found, finals, strict=True):
@@ -186,13 +191,15 @@ def picture(options: Options, rows: list[Row]) -> None:
 
 
 def report(options: Options, rows: list[Row], off: list[dict[str, Any]]) -> None:
-    columns = f"{'lanes':>7}{'rtol':>9}{'s':>9}{'Msteps/s':>10}{'padded':>9}{'sims/s':>9}"
+    columns = (
+        f"{'lanes':>7}{'rtol':>9}{'s':>9}{'Msteps/s':>10}{'padded':>9}{'sims/s':>9}{'failed':>8}"
+    )
     options.say(f"{'':14}{columns}")
     for row in rows:
         rates = (row.steps_per_second, row.padded_steps_per_second)
         texts = ["–" if rate is None else f"{rate / 1e6:.3f}" for rate in rates]
         line = f"{row.way:14}{row.lanes:>7}{row.rtol:9.0e}{row.seconds:9.3f}{texts[0]:>10}"
-        options.say(line + f"{texts[1]:>9}{row.simulations_per_second:9.0f}")
+        options.say(line + f"{texts[1]:>9}{row.simulations_per_second:9.0f}{row.failed:8}")
     if _independent.lsoda_address() is None:
         options.say("numbalsoda: not installed")
     options.say(f"\nError of {CHECKED} lanes against Radau at 1e-11")

@@ -28,6 +28,14 @@ EXPERIMENTS = {
             "walk.gif",
         },
     },
+    "speed_single": {
+        "numbers": {"first_compile_s", "at_equal_error", "points", "reference_difference"},
+        "pictures": {"speed_single.png"},
+    },
+    "speed_batch": {
+        "numbers": {"compile_s", "rows", "errors"},
+        "pictures": {"speed_batch.png"},
+    },
 }
 """For each script: keys its numbers must have, and pictures it must write."""
 
@@ -66,5 +74,20 @@ def _walks_as_the_paper_says(numbers):
     )
 
 
-CHECKS = {"paper_figures_4_8": _walks_as_the_paper_says}
+def _agrees_with_an_independent_solve(numbers):
+    assert numbers["reference_difference"] < 1e-8
+    assert min(point["error"] for point in numbers["points"]["rodas4"]) < 1e-7
+
+
+def _every_lane_arrives(numbers):
+    ours = [row for row in numbers["rows"] if row["way"] == "vmap"]
+    assert ours
+    assert all(row["failed"] == 0 and row["steps_per_second"] > 0 for row in ours)
+
+
+CHECKS = {
+    "paper_figures_4_8": _walks_as_the_paper_says,
+    "speed_single": _agrees_with_an_independent_solve,
+    "speed_batch": _every_lane_arrives,
+}
 """For some scripts: what their numbers must say."""
