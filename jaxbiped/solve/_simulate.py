@@ -24,6 +24,9 @@ _FIRST_STEP = 1e-5
 """First step tried [s]; a start that is not a number must not choose it."""
 _SMALLEST_STEP = 1e-12
 """Step size [s] that is taken whatever its error: how a jump of the force is crossed."""
+_SAFETY = 0.8
+"""Of the step size that the error estimate allows. At diffrax's 0.9 the contact's switches reject
+so many steps that the same error takes more of them."""
 _PATIENCE = 100.0
 """Time allowed for each footstep asked for [s]."""
 
@@ -183,6 +186,7 @@ def _solve(run: Simulation) -> Trajectory:
         atol=run.atol,
         norm=rms_norm,
         dtmin=_SMALLEST_STEP,
+        safety=_SAFETY,
         force_dtmin=True,  # a state that is no longer a number ends the solve by event
     )
     if run.steps is not None:
