@@ -216,3 +216,30 @@ def test_compiling_apart_from_running():
     run = request.compile()
     same = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=0.1, save="end")
     np.testing.assert_array_equal(np.array(run().final), np.array(same.final))
+
+
+def test_extremes_of_the_contact_parameters():
+    """Decades above and below the seed's: every lane is solved, and none slows the others."""
+    cases = {
+        "seed": (1e6, 1e7, 1e-4, 1e3),
+        "soft": (1e4, 1e7, 1e-4, 1e3),
+        "rigid": (1e12, 1e12, 1e-4, 1e3),
+        "overdamped": (1e6, 1e10, 1e-4, 1e3),
+        "sharp friction": (1e6, 1e7, 1e-6, 1e3),
+        "blunt friction": (1e6, 1e7, 1e-2, 1e3),
+        "abrupt Stribeck": (1e6, 1e7, 1e-4, 1e6),
+        "no Stribeck decay": (1e6, 1e7, 1e-4, 0.0),
+    }
+
+    @jax.jit
+    @jax.vmap
+    def run(K, c, v0, xi):
+        scene = jb.seed_scene(K=K, c=c, v0=v0, xi=xi)
+        return jb.simulate(scene, jb.seed_state(), duration=2.0, save="end")
+
+    ends = run(*map(jnp.asarray, zip(*cases.values(), strict=True)))
+    for name, ending, attempts in zip(
+        cases, ends.ending, ends.accepted + ends.rejected, strict=True
+    ):
+        assert jb.Ending(int(ending)) == jb.Ending.WALKING, name
+        assert int(attempts) < 40000, name
