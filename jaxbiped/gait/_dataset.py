@@ -29,8 +29,8 @@ def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset"
     """States, foot forces, penetrations and energies along a trajectory, labelled, in SI units.
 
     Variables have the dimension `time` [s]; forces and penetrations also `leg` (1, 2). Attributes
-    hold how the motion ended and every parameter of the scene. Write it with `to_netcdf` or
-    `to_zarr`.
+    hold how the motion ended and every parameter of the scene. Write it with `to_netcdf` (or
+    `to_zarr`, with zarr installed).
 
     Raises:
         ValueError: a batch of trajectories.
