@@ -1,12 +1,12 @@
 """The options that every experiment takes."""
 
 import dataclasses
-import json
-import sys
 from pathlib import Path
 from typing import Any
 
 import tyro
+
+from jaxbiped.cli._report import Report
 
 
 @dataclasses.dataclass(frozen=True)
@@ -27,16 +27,11 @@ class Options:
 
     def say(self, text: str = "") -> None:
         """Prints for people, unless standard output belongs to the JSON."""
-        if str(self.json) != "-":
-            print(text, flush=True)
+        Report(self.json).say(text)
 
     def finish(self, numbers: dict[str, Any]) -> None:
         """Writes the numbers where `--json` says."""
-        text = json.dumps(numbers, indent=2)
-        if str(self.json) == "-":
-            sys.stdout.write(text + "\n")
-        elif self.json is not None:
-            self.json.write_text(text + "\n")
+        Report(self.json).finish(numbers)
 
 
 def parse(description: str) -> Options:

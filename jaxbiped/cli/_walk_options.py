@@ -1,58 +1,58 @@
 """Options of `jaxbiped walk`: every parameter of the seed's scene by its paper name."""
 
 import dataclasses
+from inspect import signature
 from pathlib import Path
-from typing import Annotated
 
-from tyro.conf import arg
-
-from jaxbiped._checks import check_positive, check_writable_directory, check_writable_file
+from jaxbiped._checks import check_writable_directory, check_writable_file
 from jaxbiped.dynamics._state import State, checked_state, seed_state
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
+
+_SEED = {
+    parameter.name: parameter.default for parameter in signature(seed_scene).parameters.values()
+}
+_START = {name: float(value) for name, value in seed_state()._asdict().items()}
 
 
 @dataclasses.dataclass(frozen=True)
 class SceneOptions:
     """Parameters of the seed's scene (SI units)."""
 
-    slope: float = 0.02
+    slope: float = _SEED["slope"]
     """Angle of the slope, downhill positive [rad]."""
-    m: float = 1.0
+    m: float = _SEED["m"]
     """Mass of one leg [kg]."""
-    J: float = 0.0096
+    J: float = _SEED["J"]
     """Moment of inertia of one leg about its centre of mass [kg m^2]."""
-    l: float = 0.40
+    l: float = _SEED["l"]
     """Hip to sole [m]."""
-    d: float = 0.10
+    d: float = _SEED["d"]
     """Hip to the leg's centre of mass [m]."""
-    r: float = 0.08
+    r: float = _SEED["r"]
     """Foot radius [m]."""
-    hip_mass: float = 0.0
+    hip_mass: float = _SEED["hip_mass"]
     """Point mass at the hip [kg]."""
-    g: float = 9.8
+    g: float = _SEED["g"]
     """Gravitational acceleration [m/s^2]."""
-    n: float = 1.5
+    n: float = _SEED["n"]
     """Exponent of the contact law."""
-    K: float = 1e6
+    K: float = _SEED["K"]
     """Contact stiffness [N/m^n]."""
-    c: float = 1e7
+    c: float = _SEED["c"]
     """Contact damping [N s/m^2]."""
-    mu_static: float = 0.50
+    mu_static: float = _SEED["mu_static"]
     """Static friction coefficient."""
-    mu_kinetic: float = 0.40
+    mu_kinetic: float = _SEED["mu_kinetic"]
     """Kinetic friction coefficient."""
-    v0: float = 1e-4
+    v0: float = _SEED["v0"]
     """Slip speed of the friction's peak [m/s]."""
-    xi: float = 1000.0
+    xi: float = _SEED["xi"]
     """Stribeck rate [s/m]."""
 
     def scene(self) -> Scene:
         """The scene that these parameters describe; raises `ArgumentError`."""
         return seed_scene(**dataclasses.asdict(self))
-
-
-_START = {name: float(value) for name, value in seed_state()._asdict().items()}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,7 +87,7 @@ class OutputOptions:
 
     out: Path | None = None
     """Folder for pictures, an animation and the trajectory."""
-    json: Annotated[Path | None, arg(name="json")] = None
+    json: Path | None = None
     """File for the numbers in SI units; - prints only them."""
 
     def check(self) -> None:
@@ -110,7 +110,3 @@ class SolveOptions:
     """Relative tolerance."""
     atol: float | None = None
     """Absolute tolerance (SI units); a hundredth of the relative one unless given."""
-
-    def check(self) -> None:
-        """Raises `ArgumentError` for a duration that is not positive."""
-        check_positive("--duration", self.duration, "s")

@@ -65,8 +65,13 @@ def at_steps(
     scene: Scene, trajectory: Trajectory, function: Callable[[Scene, State], PyTree]
 ) -> PyTree:
     """`function(scene, state)` at the ends of the solver's steps, as NumPy arrays."""
-    size = len(trajectory.t)
-    states = State(*[jnp.asarray(_padded(np.asarray(leaf))) for leaf in trajectory.state])
+    return applied(scene, trajectory.state, function)
+
+
+def applied(scene: Scene, state: State, function: Callable[[Scene, State], PyTree]) -> PyTree:
+    """`function(scene, state)` at states with leaves of shape (n,), as NumPy arrays."""
+    size = len(state.hip_x)
+    states = State(*[jnp.asarray(_padded(np.asarray(leaf))) for leaf in state])
     values = _apply(function, _as_arrays(scene), states)
     return jax.tree_util.tree_map(lambda leaf: np.asarray(leaf)[:size], values)
 

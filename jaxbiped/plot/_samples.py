@@ -2,7 +2,6 @@
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -11,13 +10,12 @@ import numpy as np
 from jaxbiped.dynamics._feet import Feet, feet, touches
 from jaxbiped.dynamics._forces import FootForces, foot_forces
 from jaxbiped.dynamics._state import State
+from jaxbiped.gait._samples import applied
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
 _EVEN = 2048
 """Evenly spaced times; a fixed number, so that evaluating them compiles once."""
-_BLOCK = 4096
-"""Lengths are padded to multiples of this before feet and forces are computed, likewise."""
 
 
 class Samples(NamedTuple):
@@ -81,15 +79,9 @@ def sampled(
 
 def contacts(scene: Scene, state: State) -> Contacts:
     """Feet and forces at states with leaves of shape (n,), as NumPy arrays."""
-    length = len(state.hip_x)
-    room = -length % _BLOCK
-    padded = jtu.tree_map(lambda leaf: np.pad(leaf, (0, room), mode="edge"), state)
-    # A parameter that is a plain number would be a constant of the program, and compiled anew.
-    found = _contacts(jtu.tree_map(jnp.asarray, scene), padded)
-    return jtu.tree_map(lambda leaf: np.asarray(leaf)[:length], found)
+    return applied(scene, state, _contacts)
 
 
-@eqx.filter_jit
 def _contacts(scene: Scene, state: State) -> Contacts:
     both = feet(scene, state)
     touching = tuple(jnp.broadcast_to(touches(foot), state.hip_x.shape) for foot in both)
