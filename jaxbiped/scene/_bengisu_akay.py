@@ -49,3 +49,6 @@ class BengisuAkay(AbstractFrictionLaw):
         beyond = jnp.where(sticking, 0.0, speed - self.v0)
         decay = self.mu_kinetic + (self.mu_static - self.mu_kinetic) * jnp.exp(-self.xi * beyond)
         return -normal_force * jnp.where(sticking, rise, jnp.sign(slip_speed) * decay)
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        return slip_speed - self.v0, slip_speed + self.v0

@@ -28,3 +28,6 @@ class RegularisedCoulomb(AbstractFrictionLaw):
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         return -self.mu * normal_force * jnp.tanh(slip_speed / self.v_d)
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        return ()

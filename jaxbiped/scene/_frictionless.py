@@ -11,3 +11,6 @@ class Frictionless(AbstractFrictionLaw):
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         return jnp.zeros_like(normal_force)
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        return ()

@@ -28,6 +28,9 @@ class Hertz(AbstractNormalLaw):
     def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
         return self.elastic_force(penetration)
 
+    def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
+        return ()
+
     def elastic_force(self, penetration: Scalar) -> Scalar:
         return hertz_force(self.K, self.n, penetration)
 

@@ -23,6 +23,14 @@ class AbstractNormalLaw(eqx.Module):
         """The part of the force that stores energy [N], as if the foot were held at rest."""
 
     @abc.abstractmethod
+    def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
+        """Functions whose zeros are where the force's first derivatives jump inside contact.
+
+        None for a law that is smooth for every `penetration` above zero. Touchdown itself is
+        known to everyone and not among them.
+        """
+
+    @abc.abstractmethod
     def elastic_energy(self, penetration: Scalar) -> Scalar:
         """Energy stored in the contact [J]: the integral of `elastic_force`."""
 
@@ -33,6 +41,10 @@ class AbstractFrictionLaw(eqx.Module):
     @abc.abstractmethod
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         """Tangential force [N] along the slope, opposing `slip_speed` [m/s]."""
+
+    @abc.abstractmethod
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        """Functions whose zeros are where the force's derivative by the slip speed jumps."""
 
 
 def power(base: Scalar, exponent: Scalar) -> Scalar:

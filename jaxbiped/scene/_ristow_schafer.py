@@ -38,6 +38,11 @@ class RistowSchafer(AbstractNormalLaw):
         force = self.K * power(depth, self.n) + self.c * depth * rate
         return jnp.where(touching & (force > 0.0), force, 0.0)
 
+    def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
+        """The reaction over the penetration: it leaves zero where this does."""
+        depth = jnp.where(penetration > 0.0, penetration, 1.0)
+        return (self.K * power(depth, self.n - 1.0) + self.c * rate,)
+
     def elastic_force(self, penetration: Scalar) -> Scalar:
         return hertz_force(self.K, self.n, penetration)
 

@@ -47,3 +47,6 @@ class SmoothBengisuAkay(AbstractFrictionLaw):
         decay = jnp.exp(-self.xi * beyond)
         level = self.mu_kinetic + (self.mu_static - self.mu_kinetic) * decay
         return -normal_force * rise * level
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        return ()

@@ -48,6 +48,9 @@ class SmoothRistowSchafer(AbstractNormalLaw):
         force = hertz_force(self.K, self.n, depth) + self.c * depth * rate
         return smooth_ramp(force, self.force_width)
 
+    def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
+        return ()
+
     def elastic_force(self, penetration: Scalar) -> Scalar:
         return hertz_force(self.K, self.n, smooth_ramp(penetration, self.depth_width))
 

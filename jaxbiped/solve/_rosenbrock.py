@@ -15,7 +15,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.solve._fence import fenced
-from jaxbiped.solve._linearisation import Components, linearise, split
+from jaxbiped.solve._linearisation import AbstractLinearisation, Components, linearise, split
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
@@ -136,15 +136,24 @@ def _step(
 
     span = jnp.asarray(t1 - t0, dtype=dtype)
     control = jnp.asarray(terms.contr(t0, t1), dtype=dtype)
-    stages = _stages(tableau, field, jnp.asarray(t0), start, span, control)
-    last = len(tableau.alpha) - 1
-    end = _plus(start, stages.weighted((*tableau.a[-1], 1.0)))
-    error = stages.weighted(tableau.error or (*[0.0] * last, 1.0))
+    stages = stages_of(tableau, field, jnp.asarray(t0), start, span, control)
+    end = _plus(start, stages.weighted(end_weights(tableau)))
+    error = stages.weighted(error_weights(tableau))
     dense = tuple(join(stages.weighted(row)) for row in tableau.dense)
     return join(end), join(error), dense
 
 
-class _Stages(NamedTuple):
+def end_weights(tableau: RosenbrockTableau) -> Row:
+    """Weights of the stages that make the new value from the old."""
+    return (*tableau.a[-1], 1.0)
+
+
+def error_weights(tableau: RosenbrockTableau) -> Row:
+    """Weights of the stages that make the error estimate."""
+    return tableau.error or (*[0.0] * (len(tableau.alpha) - 1), 1.0)
+
+
+class Stages(NamedTuple):
     """The stages of a step, of which only the kept components are computed one by one.
 
     A direct component p, whose rate is the kept component s, obeys a linear recurrence: stage by
@@ -154,6 +163,9 @@ class _Stages(NamedTuple):
 
     start: Components
     step: Scalar
+    lin: AbstractLinearisation
+    jacobian: Any
+    factors: Any
     direct: dict[int, int]
     kept: list[int]
     matrix: np.ndarray
@@ -186,7 +198,7 @@ class _Stages(NamedTuple):
 
 
 def _recurrence(tableau: RosenbrockTableau) -> tuple[np.ndarray, np.ndarray]:
-    """B and b of `_Stages`."""
+    """B and b of `Stages`."""
     size = len(tableau.alpha)
     a, c = np.zeros((size, size)), np.zeros((size, size))
     for i in range(1, size):
@@ -195,14 +207,14 @@ def _recurrence(tableau: RosenbrockTableau) -> tuple[np.ndarray, np.ndarray]:
     return inverse @ (a + np.eye(size)), inverse @ np.ones(size)
 
 
-def _stages(
+def stages_of(
     tableau: RosenbrockTableau,
     field: Callable[[Scalar, Components], Components],
     t: Scalar,
     start: Components,
     span: Scalar,
     control: Scalar,
-) -> _Stages:
+) -> Stages:
     """All stages of a step.
 
     `span` is the step in the time that `field` sees and `control` the same step as the state sees
@@ -221,7 +233,10 @@ def _stages(
         lambda: (picked(lin.evaluate(t, start)), picked(lin.time_derivative()), lin.jacobian()),
     )
     factors = fenced(moves, lambda: lin.factorise(jacobian, step))
-    stages = _Stages(start, step, lin.direct(), kept, *_recurrence(tableau), increments=[])
+    recurrence = _recurrence(tableau)
+    stages = Stages(
+        start, step, lin, jacobian, factors, lin.direct(), kept, *recurrence, increments=[]
+    )
     last_rate = slope
 
     def stage(i: int) -> tuple[Components, Components | None]:

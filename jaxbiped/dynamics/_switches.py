@@ -1,0 +1,53 @@
+"""Where the vector field or its Jacobian jumps."""
+
+from typing import Any, NamedTuple
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._forces import foot_force
+from jaxbiped.dynamics._state import State
+from jaxbiped.scene._scene import Scene
+
+
+class Switch(NamedTuple):
+    """A surface in state space across which the vector field is not smooth.
+
+    Attributes:
+        value: a function of the state that is zero on the surface, positive on one side.
+        live: whether the field jumps there at all near this state (boolean): friction has no
+            corner under a foot that carries nothing.
+        force_jumps: whether the field itself jumps, not its Jacobian alone. Known before
+            anything runs.
+    """
+
+    value: Scalar
+    live: Any
+    force_jumps: bool = False
+
+
+def switches(scene: Scene, state: State) -> tuple[Switch, ...]:
+    """Every switch of a scene: touchdown, reaction leaving zero, slip at ±v0, clearance rule.
+
+    Source: the seed paper, section 2.2, whose laws have these corners.
+    """
+    both = feet(scene, state)
+    rates = (state.omega_1, state.omega_2)
+    return tuple(
+        switch
+        for foot, rate in zip(both, rates, strict=True)
+        for switch in _foot_switches(scene, foot, rate)
+    )
+
+
+def _foot_switches(scene: Scene, foot: Foot, rate: Scalar) -> list[Switch]:
+    below, touching = foot.penetration > 0.0, touches(foot)
+    admitted = True if foot.admitted is None else foot.admitted
+    carries = foot_force(scene, foot).normal > 0.0
+    found = [Switch(foot.penetration, admitted)]
+    reaction = scene.normal.switches(foot.penetration, foot.penetration_rate)
+    found += [Switch(value, touching) for value in reaction]
+    found += [Switch(value, carries) for value in scene.friction.switches(foot.slip_speed)]
+    if foot.admitted is not None:
+        pressed = below & (scene.normal.force(foot.penetration, foot.penetration_rate) > 0.0)
+        found.append(Switch(rate, pressed, force_jumps=True))
+    return found

@@ -1,0 +1,163 @@
+"""One passage: from a state to the next arrival at a section."""
+
+from typing import Any, NamedTuple
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns
+from jaxbiped.solve._ending import Ending
+from jaxbiped.solve._landing import Landed, Landing, Watch
+from jaxbiped.solve._tangents import (
+    TangentControl,
+    TangentSolver,
+    VariationalField,
+    worst_norm,
+)
+
+_FIRST_STEP = 1e-5
+_SMALLEST_STEP = 1e-12
+_SAFETY = 0.8
+
+
+class Precision(NamedTuple):
+    """How exactly to solve.
+
+    Attributes:
+        rtol: relative tolerance of the state; the absolute one (SI) is a hundredth of it.
+        tangent_rtol: relative tolerance of the columns.
+    """
+
+    rtol: Any
+    tangent_rtol: Any
+
+
+class Passage(NamedTuple):
+    """An arrival at a section, or what came instead.
+
+    Attributes:
+        y: state on the section; with its columns, derivatives on the section, where the solve
+            carried any.
+        time: duration of the passage [s]; with columns, `time_columns` (n,) are its derivatives.
+        flow: the columns at a fixed time, before the motion of the arrival is taken off.
+        code: 0 for an arrival, else that of an `Ending`.
+        landed: what the step-size control knows at the end.
+        attempted: number of steps attempted.
+        nodes: times and states at the ends of the accepted steps, where saved.
+    """
+
+    y: Any
+    time: Scalar
+    time_columns: Any
+    flow: Any
+    code: Scalar
+    landed: Landed
+    attempted: Scalar
+    nodes: Any
+
+
+def passage(
+    watch: Watch,
+    solver: diffrax.AbstractAdaptiveSolver,
+    y0: Any,
+    args: Any,
+    *,
+    precision: Precision,
+    time_limit: Any,
+    max_solver_steps: int,
+    columns_only_steer: bool = False,
+    save_nodes: bool = False,
+) -> Passage:
+    """Solves from `y0` until the section of `watch`, a misfortune, or `time_limit` [s].
+
+    With `y0` a `Tangents` and `args` a `Seeded` the columns are carried along under
+    `precision.tangent_rtol`.
+    """
+    carries = isinstance(y0, Tangents)
+    controller: Any = diffrax.PIDController(
+        rtol=precision.rtol,
+        atol=1e-2 * precision.rtol,
+        norm=worst_norm if carries else rms_norm,
+        dtmin=_SMALLEST_STEP,
+        safety=_SAFETY,
+        force_dtmin=True,
+    )
+    field: Any = watch.field
+    if carries:
+        controller = TangentControl.around(controller, precision.tangent_rtol)
+        solver = TangentSolver(watch.field, solver, columns_only_steer)
+        field = VariationalField(watch.field)
+    end = diffrax.SubSaveAt(t1=True)
+    every = diffrax.SubSaveAt(t0=True, steps=True, fn=_plain_node)
+    subs = [end, every] if save_nodes else [end]
+    limit = jnp.asarray(time_limit, dtype=jnp.result_type(*jtu.tree_leaves(y0)))
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(field),
+        solver,
+        t0=jnp.zeros_like(limit),
+        t1=limit,
+        dt0=jnp.minimum(jnp.full_like(limit, _FIRST_STEP), limit),
+        y0=y0,
+        args=args,
+        saveat=diffrax.SaveAt(subs=subs, controller_state=True),
+        stepsize_controller=Landing.around(controller, watch),
+        max_steps=max_solver_steps,
+        throw=False,
+    )
+    times: Any = solution.ts
+    states: Any = solution.ys
+    landed: Any = solution.controller_state
+    last = jtu.tree_map(lambda leaf: leaf[-1], states[0])
+    y, time, time_columns = _onto_section(watch, last, times[0][-1], args)
+    return Passage(
+        y=y,
+        time=time,
+        time_columns=time_columns,
+        flow=last.columns if carries else None,
+        code=_code(solution, landed),
+        landed=landed,
+        attempted=solution.stats["num_steps"],
+        nodes=(times[1], states[1]) if save_nodes else None,
+    )
+
+
+def _plain_node(t: Any, y: Any, args: Any) -> PyTree:
+    return y.state if isinstance(y, Tangents) else y
+
+
+def _code(solution: diffrax.Solution, landed: Landed) -> Scalar:
+    results = diffrax.RESULTS
+    out_of_steps = (solution.result == results.max_steps_reached) | (
+        solution.result == results.successful
+    )
+    failed = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), int(Ending.SOLVER_FAILED))
+    ended = jnp.where(landed.code != 0, landed.code, failed)
+    return jnp.where(landed.arrived, 0, ended)
+
+
+def _onto_section(watch: Watch, y: Any, t: Any, args: Any) -> tuple[Any, Scalar, Any]:
+    """Takes the small overshoot back, in second order; derivatives follow the arrival."""
+    time = jax.lax.stop_gradient(t)
+
+    def back(state: PyTree, scene: PyTree) -> tuple[PyTree, Scalar]:
+        zero = jnp.zeros_like(time)
+        rate = watch.field(zero, state, scene)
+        assert watch.section is not None
+        section = watch.section
+        value, slope = jax.jvp(lambda s: section(scene, s)[0], (state,), (rate,))
+        past = value / slope
+        half = jtu.tree_map(lambda s, r: s - 0.5 * past * r, state, rate)
+        middle = watch.field(zero, half, scene)
+        return jtu.tree_map(lambda s, r: s - past * r, state, middle), time - past
+
+    if not isinstance(y, Tangents):
+        state, arrival = back(y, args)
+        return state, arrival, None
+    assert isinstance(args, Seeded)
+    (state, arrival), (columns, time_columns) = along_columns(back, y, args)
+    return Tangents(state, as_columns(columns)), arrival, time_columns
