@@ -18,8 +18,8 @@ from jaxbiped.solve._columns import Seeded, Tangents
 
 _OVERSHOOT = 1e-4
 """Largest part of a step that may lie past a switch."""
-_SMALLEST_STEP = 1e-13
-"""Step size [s] below which a switch is not approached any closer."""
+_MARGIN = 1e-12
+"""Time past a switch [s] that a step may always end, and aims at: the side must be beyond doubt."""
 _BISECTIONS = 40
 
 
@@ -120,9 +120,10 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
         parts = (plain_args(args), plain_state(y0), plain_state(y1_candidate))
         scene, before, after = jax.lax.stop_gradient(parts)
         crossed, part = self._crossings(t1 - t0, scene, before, after, controller_state)
-        past = (1.0 - part) > _OVERSHOOT * part
-        again = crossed.any & past & (t1 - t0 > 2.0 * _SMALLEST_STEP)  # t1 is rounded
-        target = t0 + jnp.maximum((t1 - t0) * part * (1.0 + 0.5 * _OVERSHOOT), _SMALLEST_STEP)
+        before_switch, span = (t1 - t0) * part, t1 - t0
+        far = span - before_switch > jnp.maximum(_OVERSHOOT * before_switch, 4.0 * _MARGIN)
+        again = crossed.any & far
+        target = t0 + before_switch * (1.0 + 0.5 * _OVERSHOOT) + _MARGIN
         target = jax.lax.stop_gradient(target)
         next_t1 = jnp.where(again, jnp.where(keep, target, jnp.minimum(next_t1, target)), next_t1)
         next_t0 = jnp.where(again, t0, next_t0)

@@ -41,10 +41,10 @@ class Passage(NamedTuple):
     """An arrival at a section, or what came instead.
 
     Attributes:
-        y: state on the section; with its columns, derivatives on the section, where the solve
-            carried any.
-        time: duration of the passage [s]; with columns, `time_columns` (n,) are its derivatives.
-        flow: the columns at a fixed time, before the motion of the arrival is taken off.
+        y: state on the section; with its columns at a fixed time, where the solve carried any.
+        time: duration of the passage [s].
+        on_section: its columns on the section, where the motion of the arrival is taken off.
+        time_columns: derivatives of the time of arrival, shape (n,).
         code: 0 for an arrival, else that of an `Ending`.
         landed: what the step-size control knows at the end.
         attempted: number of steps attempted.
@@ -53,8 +53,8 @@ class Passage(NamedTuple):
 
     y: Any
     time: Scalar
+    on_section: Any
     time_columns: Any
-    flow: Any
     code: Scalar
     landed: Landed
     attempted: Scalar
@@ -113,12 +113,12 @@ def passage(
     states: Any = solution.ys
     landed: Any = solution.controller_state
     last = jtu.tree_map(lambda leaf: leaf[-1], states[0])
-    y, time, time_columns = _onto_section(watch, last, times[0][-1], args)
+    y, time, on_section, time_columns = _onto_section(watch, last, times[0][-1], args)
     return Passage(
         y=y,
         time=time,
+        on_section=on_section,
         time_columns=time_columns,
-        flow=last.columns if carries else None,
         code=_code(solution, landed),
         landed=landed,
         attempted=solution.stats["num_steps"],
@@ -140,24 +140,36 @@ def _code(solution: diffrax.Solution, landed: Landed) -> Scalar:
     return jnp.where(landed.arrived, 0, ended)
 
 
-def _onto_section(watch: Watch, y: Any, t: Any, args: Any) -> tuple[Any, Scalar, Any]:
-    """Takes the small overshoot back, in second order; derivatives follow the arrival."""
+def arrival_at(watch: Watch, state: PyTree, args: PyTree) -> tuple[PyTree, Scalar]:
+    """The state on the section just before `state`, and how long before [s]."""
+    assert watch.section is not None
+    section = watch.section
+    rate = watch.field(jnp.zeros(()), state, args)
+    value, slope = jax.jvp(lambda s: section(args, s)[0], (state,), (rate,))
+    past = value / slope
+    return taken_back(watch, state, args, past), past
+
+
+def taken_back(watch: Watch, state: PyTree, args: PyTree, past: Scalar) -> PyTree:
+    """The state a very short time `past` [s] before, in second order."""
+    zero = jnp.zeros(())
+    rate = watch.field(zero, state, args)
+    half = jtu.tree_map(lambda s, r: s - 0.5 * past * r, state, rate)
+    return jtu.tree_map(lambda s, r: s - past * r, state, watch.field(zero, half, args))
+
+
+def _onto_section(watch: Watch, y: Any, t: Any, args: Any) -> tuple[Any, Scalar, Any, Any]:
+    """Takes the small overshoot back; its derivatives follow the arrival."""
     time = jax.lax.stop_gradient(t)
 
-    def back(state: PyTree, scene: PyTree) -> tuple[PyTree, Scalar]:
-        zero = jnp.zeros_like(time)
-        rate = watch.field(zero, state, scene)
-        assert watch.section is not None
-        section = watch.section
-        value, slope = jax.jvp(lambda s: section(scene, s)[0], (state,), (rate,))
-        past = value / slope
-        half = jtu.tree_map(lambda s, r: s - 0.5 * past * r, state, rate)
-        middle = watch.field(zero, half, scene)
-        return jtu.tree_map(lambda s, r: s - past * r, state, middle), time - past
+    def arrival(state: PyTree, scene: PyTree) -> tuple[PyTree, Scalar]:
+        reached, past = arrival_at(watch, state, scene)
+        return reached, time - past
 
     if not isinstance(y, Tangents):
-        state, arrival = back(y, args)
-        return state, arrival, None
+        return *arrival(y, args), None, None
     assert isinstance(args, Seeded)
-    (state, arrival), (columns, time_columns) = along_columns(back, y, args)
-    return Tangents(state, as_columns(columns)), arrival, time_columns
+    (state, at), (on_section, time_columns) = along_columns(arrival, y, args)
+    past = time - at
+    _, columns = along_columns(lambda s, a: taken_back(watch, s, a, past), y, args)
+    return Tangents(state, as_columns(columns)), at, as_columns(on_section), time_columns

@@ -1,0 +1,76 @@
+"""What a return map must know of a dynamical system."""
+
+import abc
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._forces import foot_forces
+from jaxbiped.dynamics._motion import vector_field
+from jaxbiped.dynamics._state import State, exchange_legs
+from jaxbiped.dynamics._switches import Switch, switches
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._ending import WATCHES, ending_events
+
+
+class AbstractSystem(eqx.Module):
+    """An autonomous system whose periodic orbits can be found and differentiated.
+
+    The state is a pytree of scalars, and so are the parameters `args`. Subclass it to study a
+    system of your own: the walker is only one of them, `Walking`.
+
+    Attributes:
+        drifting: positions of the state's leaves that need not return, only advance: no rate may
+            depend on them.
+    """
+
+    drifting: ClassVar[tuple[int, ...]] = ()
+
+    @abc.abstractmethod
+    def vector_field(self, t: Any, y: PyTree, args: PyTree) -> PyTree:
+        """Time derivative of the state, in the form that `diffrax.ODETerm` takes."""
+
+    @abc.abstractmethod
+    def switches(self, args: PyTree, y: PyTree) -> tuple[Switch, ...]:
+        """Surfaces across which the vector field is not smooth."""
+
+    @abc.abstractmethod
+    def ending(self, args: PyTree, y: PyTree) -> Scalar:
+        """Code of the `Ending` that has come, 0 where the motion goes on."""
+
+    @abc.abstractmethod
+    def renew(self, args: PyTree, y: PyTree) -> PyTree:
+        """What is done to the state at each arrival: a symmetry, an impact, or nothing."""
+
+    @abc.abstractmethod
+    def load(self, args: PyTree, y: PyTree) -> Scalar | None:
+        """A quantity whose largest value along the orbit is wanted, or None."""
+
+
+class Walking(AbstractSystem):
+    """The walker: legs exchanged at each footstep, the place along the slope left out."""
+
+    drifting: ClassVar[tuple[int, ...]] = (State._fields.index("hip_x"),)
+
+    def vector_field(self, t: Any, y: State, args: Scene) -> State:
+        return vector_field(t, y, args)
+
+    def switches(self, args: Scene, y: State) -> tuple[Switch, ...]:
+        return switches(args, y)
+
+    def ending(self, args: Scene, y: State) -> Scalar:
+        code = jnp.asarray(0)
+        for name, happens in ending_events(WATCHES).items():
+            code = jnp.where(happens(0.0, y, args), int(name), code)
+        return code
+
+    def renew(self, args: Scene, y: State) -> State:
+        return exchange_legs(y)
+
+    def load(self, args: Scene, y: State) -> Scalar:
+        """Normal force on the foot that carries more [N]."""
+        forces = foot_forces(args, y)
+        return jnp.maximum(forces.foot_1.normal, forces.foot_2.normal)

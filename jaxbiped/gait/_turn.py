@@ -1,0 +1,202 @@
+"""One turn of an orbit with its derivatives: the return map and its Jacobian."""
+
+from typing import Any, NamedTuple
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.gait._section import AbstractSection
+from jaxbiped.gait._system import AbstractSystem
+from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns
+from jaxbiped.solve._landing import Watch
+from jaxbiped.solve._passage import Passage, Precision, passage
+
+STATE_FLOOR = 0.1
+"""Size below which errors of derivatives by the state are absolute."""
+PARAMETER_FLOOR = 1e-4
+"""The same by the logarithm of a parameter: small sensitivities are wanted to digits as well."""
+
+
+class Turning(eqx.Module):
+    """How to turn: what does not change from one turn of the search to the next.
+
+    Attributes:
+        system, section: whose return map.
+        solver: one-step solver.
+        steps: arrivals that make one turn.
+        time_limit: longest time to the next arrival [s].
+        max_solver_steps: cap on the attempted steps to the next arrival.
+    """
+
+    system: AbstractSystem
+    section: AbstractSection
+    solver: diffrax.AbstractAdaptiveSolver
+    time_limit: Any
+    steps: int = eqx.field(static=True)
+    max_solver_steps: int = eqx.field(static=True)
+
+    def watch(self, args: PyTree, y: PyTree) -> Watch:
+        """What the solves land on: a section is looked at after the arrival's renewal."""
+        system, section = self.system, self.section
+
+        def arrives(args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
+            renewed = system.renew(args, y)
+            return section.value(args, renewed), section.counts(args, renewed)
+
+        return Watch(
+            field=system.vector_field,
+            switches=system.switches,
+            section=arrives,
+            ending=system.ending,
+            peak=None if eqx.filter_eval_shape(system.load, args, y) is None else system.load,
+        )
+
+
+class Turn(NamedTuple):
+    """One turn. With m recurring components, p parameters and n = m + p directions:
+
+    Attributes:
+        recurring: the m components that must return.
+        jacobian: their derivatives on the section, shape (m, n).
+        monodromy: their derivatives at a fixed time, shape (m, n).
+        period: duration [s]; `period_row` its derivatives, shape (n,).
+        advance: what the drifting components gained, shape (d,); `advance_rows` (d, n).
+        peak: largest load; `peak_row` (n,). Zeros where the system has none.
+        code: 0 or that of an `Ending`.
+        attempted: solver steps attempted.
+        jumps: crossings where the vector field itself jumped.
+        nodes: times and states at the ends of the steps of each passage, leaves (steps, …).
+    """
+
+    recurring: Scalar
+    jacobian: Scalar
+    monodromy: Scalar
+    period: Scalar
+    period_row: Scalar
+    advance: Scalar
+    advance_rows: Scalar
+    peak: Scalar
+    peak_row: Scalar
+    code: Scalar
+    attempted: Scalar
+    jumps: Scalar
+    nodes: Any
+
+
+def recurring_places(system: AbstractSystem, y: PyTree) -> list[int]:
+    """Positions of the leaves that must return."""
+    return [i for i in range(len(jtu.tree_leaves(y))) if i not in system.drifting]
+
+
+def recurring_of(system: AbstractSystem, y: PyTree) -> Scalar:
+    """The components that must return, shape (m,)."""
+    leaves = jtu.tree_leaves(y)
+    return jnp.stack([leaves[i] for i in recurring_places(system, y)])
+
+
+def state_with(system: AbstractSystem, like: PyTree, recurring: Scalar) -> PyTree:
+    """A state with these recurring components, and zero for the drifting ones."""
+    leaves, structure = jtu.tree_flatten(like)
+    places = recurring_places(system, like)
+    zero = jnp.zeros_like(recurring[0])
+    filled = [recurring[places.index(i)] if i in places else zero for i in range(len(leaves))]
+    return structure.unflatten(filled)
+
+
+def seeded(args: PyTree, active: tuple[int, ...], m: int) -> tuple[Seeded, Scalar]:
+    """Seeds for m directions of state and then one for each active parameter.
+
+    A parameter moves by its own size (its logarithm by one), or by one where it is zero. Also
+    these sizes, shape (p,).
+    """
+    leaves = jtu.tree_leaves(args)
+    values = [jax.lax.stop_gradient(leaves[i]) for i in active]
+    sizes = jnp.stack([jnp.where(v == 0.0, 1.0, v) for v in values]) if values else jnp.zeros(0)
+    seeds = jnp.concatenate([jnp.zeros((len(active), m)), jnp.diag(sizes)], axis=1)
+    floors = jnp.asarray([STATE_FLOOR] * m + [PARAMETER_FLOOR] * len(active))
+    return Seeded(args, seeds, floors, active), sizes
+
+
+def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: Any) -> Turn:
+    """Follows the orbit from `y` for one turn, with derivatives; nothing where `idle`."""
+    places = recurring_places(turning.system, y)
+    count, n = len(jtu.tree_leaves(y)), args.seeds.shape[1]
+    start = jnp.zeros((count, n)).at[jnp.asarray(places), jnp.arange(len(places))].set(1.0)
+    watch = turning.watch(args.args, y)
+    limit = jnp.where(idle, 0.0, turning.time_limit)
+
+    def one(
+        before: tuple[Tangents, Scalar], _: None
+    ) -> tuple[tuple[Tangents, Scalar], tuple[Passage, Scalar, Scalar]]:
+        y0, failed = before
+        found = passage(
+            watch,
+            turning.solver,
+            y0,
+            args,
+            precision=precision,
+            time_limit=jnp.where(failed != 0, 0.0, limit),
+            max_solver_steps=turning.max_solver_steps,
+            save_nodes=True,
+        )
+        def renewed(columns: Scalar) -> Tangents:
+            arrived = Tangents(found.y.state, columns)
+            state, moved = along_columns(lambda s, a: turning.system.renew(a, s), arrived, args)
+            return Tangents(state, as_columns(moved))
+
+        code = jnp.where(failed != 0, failed, found.code)
+        on_section = renewed(found.on_section).columns
+        return (renewed(found.y.columns), code), (found, on_section, _peak_row(watch, found, args))
+
+    begin = (Tangents(y, start), jnp.asarray(0))
+    if turning.steps == 1:
+        (end, code), last = one(begin, None)
+        every = jax.tree.map(lambda leaf: leaf[None], last)
+    else:
+        (end, code), every = jax.lax.scan(one, begin, length=turning.steps)
+    passages, on_section, peak_rows = every
+    return _turn(turning, y, end, code, passages, on_section[-1], peak_rows)
+
+
+def _turn(
+    turning: Turning,
+    y: PyTree,
+    end: Tangents,
+    code: Scalar,
+    passages: Passage,
+    on_section: Scalar,
+    peak_rows: Scalar,
+) -> Turn:
+    places = jnp.asarray(recurring_places(turning.system, y))
+    drifting = jnp.asarray(turning.system.drifting, dtype=int)
+    before, after = jnp.stack(jtu.tree_leaves(y)), jnp.stack(jtu.tree_leaves(end.state))
+    landed = passages.landed
+    highest = jnp.asarray(0) if landed.peak is None else jnp.argmax(landed.peak)
+    return Turn(
+        recurring=after[places],
+        jacobian=on_section[places],
+        monodromy=end.columns[places],
+        period=jnp.sum(passages.time),
+        period_row=passages.time_columns[-1],
+        advance=(after - before)[drifting],
+        advance_rows=on_section[drifting],
+        peak=jnp.zeros(()) if landed.peak is None else landed.peak[highest],
+        peak_row=peak_rows[highest],
+        code=code,
+        attempted=jnp.sum(passages.attempted),
+        jumps=jnp.sum(landed.jumps),
+        nodes=passages.nodes,
+    )
+
+
+def _peak_row(watch: Watch, found: Passage, args: Seeded) -> Scalar:
+    if watch.peak is None:
+        return jnp.zeros(args.seeds.shape[1])
+    peak = watch.peak
+    _, row = along_columns(lambda s, a: peak(a, s), found.landed.at_peak, args)
+    return row
