@@ -84,21 +84,22 @@ class Path(NamedTuple):
 
 
 class Crossings(NamedTuple):
-    """Switches crossed by steps, leaves of shape (steps, switches).
+    """The switch that each step ends just past, if any; leaves of shape (steps,).
+
+    No step is taken to cross two at once.
 
     Attributes:
-        crossed: whether the step ends just past the switch.
-        slopes: rates of the switch functions there; 1 where not crossed.
-        near, back: times from the step's end back to just this and just the other side of the
-            switch [s]; 0 where not crossed.
-        gradients: of the switch functions by components and parameters, (steps, switches, c + p).
+        crossed: whether there is one.
+        past: time from the switch to the step's end [s]; 0 where there is none.
+        margin: time from the switch at which its sides are looked at [s].
+        early: how much earlier a change of components and parameters makes the crossing,
+            shape (steps, c + p).
     """
 
     crossed: Scalar
-    slopes: Scalar
-    near: Scalar
-    back: Scalar
-    gradients: Scalar
+    past: Scalar
+    margin: Scalar
+    early: Scalar
 
 
 def along_path(
@@ -139,7 +140,7 @@ def along_path(
         t = jax.lax.dynamic_slice_in_dim(times, start, CHUNK + 1)
         y = jax.lax.dynamic_slice_in_dim(states, start, CHUNK + 1)
         found = _crossings(rates, surfaces, y[:-1], y[1:], parameters)
-        latest = jnp.where(jnp.any(found.crossed, axis=1), t[1:], -jnp.inf)
+        latest = jnp.where(found.crossed, t[1:], -jnp.inf)
         latest = jax.lax.cummax(jnp.concatenate([switched[None], latest]))
         path = Path(y[:-1], y[1:], t[:-1], jnp.diff(t), latest[:-1])
         after = _chunk(rates, path, found, parameters, now, seeds, count)
@@ -162,7 +163,7 @@ def _chunk(
     part, share = path.clock()
     points = _stages(rates, path, part, share, parameters)
     # A step that ends past a switch belongs to the old side up to its end.
-    back = jnp.max(crossings.back, axis=1)[:, None]
+    back = jnp.where(crossings.crossed, crossings.past + crossings.margin, 0.0)[:, None]
     field = jax.vmap(lambda y: rates(jnp.concatenate([y, parameters])))
     points = points.at[:, 2].add(-back * field(points[:, 2]))
     jacobians = _gradients(rates, points, parameters)
@@ -180,12 +181,14 @@ def _chunk(
     seeded = jnp.broadcast_to(seeds, (firsts.shape[0], *seeds.shape))
     at_stages = stage_map @ jnp.concatenate([firsts, seeded], axis=1)
     at_stages = at_stages.reshape(-1, 3, c, seeds.shape[1])
-    bends = []
-    for k in range(count):
-        bend = _gradients(rates, points, parameters, at_stages[..., k], seeds[:, k])
-        moved = _with_seeds(at_stages[..., count:], seeds[:, count:])
-        bends.append((inverse @ _spread(bend @ moved, share))[:, 2 * c :])
-    sources = jnp.stack(bends, axis=-1)
+    moved = _with_seeds(at_stages[..., count:], seeds[:, count:])
+
+    def source(turned: Scalar, turned_seeds: Scalar) -> Scalar:
+        bend = _gradients(rates, points, parameters, turned, turned_seeds)
+        return (inverse @ _spread(bend @ moved, share))[:, 2 * c :]
+
+    by_direction = jax.vmap(source, in_axes=(-1, -1), out_axes=-1)
+    sources = by_direction(at_stages[..., :count], seeds[:, :count])
     ends = jnp.concatenate([firsts[1:], last[None]])
     jumps = _jumps(rates, path.after, crossings, parameters, ends, seeds, count)
 
@@ -281,12 +284,12 @@ def _crossings(
         rate = jnp.concatenate([rates(z), jnp.zeros_like(parameters)])
         past, gradients = values(z), jax.jacrev(values)(z)
         crossed = ((values(old) > 0.0) != (past > 0.0)) & (live(old) | live(z))
-        slopes = jnp.where(crossed, gradients @ rate, 1.0)
-        time_past = past / slopes
+        which = jnp.argmax(crossed)
+        gradient, found = gradients[which], crossed[which]
+        slope = jnp.where(found, gradient @ rate, 1.0)
+        time_past = jnp.where(found, past[which] / slope, 0.0)
         margin = jnp.maximum(_MARGIN, _SHARE * time_past)
-        near = jnp.where(crossed, jnp.maximum(time_past - margin, 0.0), 0.0)
-        back = jnp.where(crossed, time_past + margin, 0.0)
-        return Crossings(crossed, slopes, near, back, gradients)
+        return Crossings(found, time_past, margin, jnp.where(found, gradient / slope, 0.0))
 
     return jax.vmap(one)(before, after)
 
@@ -301,25 +304,52 @@ def _jumps(
     count: int,
 ) -> Scalar:
     """Jumps of C at the end of each step, shape (steps, c, q, v); zero where none is crossed."""
+    field = jax.vmap(lambda y: rates(jnp.concatenate([y, parameters])))
+    back = crossings.past[:, None] + crossings.margin[:, None] * jnp.array([-1.0, 1.0, -2.0, 2.0])
+    points = after[:, None] - back[..., None] * field(after)[:, None]
+    new, old, further, older = jnp.moveaxis(_gradients(rates, points, parameters), 1, 0)
+    # Extrapolated to the switch itself: the Jacobian varies fast on either side.
+    jump = 2.0 * (new - old) - (further - older)
+    moved = _with_seeds(firsts, seeds)
+    early = jnp.einsum("sz,szq->sq", crossings.early, moved[..., count:])
+    return jnp.einsum("scv,sq->scqv", jump @ moved[..., :count], early)
 
-    def one(after: Scalar, found: Crossings, first: Scalar) -> Scalar:
-        z = jnp.concatenate([after, parameters])
-        moved = jnp.concatenate([first, seeds])
-        turned, tangents = moved[:, :count], moved[:, count:]
-        rate = jnp.concatenate([rates(z), jnp.zeros_like(parameters)])
-        new, old = z - found.near[:, None] * rate, z - found.back[:, None] * rate
 
-        def change(new: Scalar, old: Scalar, direction: Scalar) -> Scalar:
-            after = jax.jvp(rates, (new,), (direction,))[1]
-            return after - jax.jvp(rates, (old,), (direction,))[1]
+def on_surface(
+    rates: Rates,
+    surface: Callable[[Scalar], Scalar],
+    z: Scalar,
+    bent: Bent,
+    seeds: Scalar,
+    count: int,
+) -> tuple[Bent, Bent]:
+    """Tangents at a fixed time turned into tangents on the surface g = 0 that `z` lies on.
 
-        by_direction = jax.vmap(change, in_axes=(None, None, -1), out_axes=-1)
-        changes = jax.vmap(by_direction, in_axes=(0, 0, None))(new, old, turned)
-        early = found.gradients @ tangents / found.slopes[:, None]
-        shares = jnp.where(found.crossed[:, None], early, 0.0)
-        return jnp.einsum("scv,sq->cqv", changes, shares)
+    A tangent V moves the arrival by τ_V = −dg·V/ġ and becomes V + f τ_V. Differentiated once more,
+    C becomes C + (J V) τ_Q + (J Q) τ_V + (J f) τ_V τ_Q + f τ_VQ, where τ_VQ keeps it on the surface.
+    Also the times: τ_V as `first` (v + q,) and τ_VQ as `second` (q, v).
+    """
+    c = bent.first.shape[0]
+    moved = jnp.concatenate([bent.first, seeds])
+    rate = rates(z)
+    flow = jnp.concatenate([rate, jnp.zeros(seeds.shape[0])])
 
-    return jax.vmap(one)(after, crossings, firsts)
+    def turned(along: Scalar) -> Scalar:
+        return jax.jvp(rates, (z,), (along,))[1]
+
+    gradient = jax.grad(surface)(z)
+    slope = gradient @ flow
+    times = -(gradient @ moved) / slope
+    on = moved + flow[:, None] * times
+    bends = jax.vmap(turned, in_axes=-1, out_axes=-1)(moved)
+    by_v, by_q = times[:count], times[count:]
+    second = bent.second + jnp.einsum("cv,q->cqv", bends[:, :count], by_q)
+    second = second + jnp.einsum("cq,v->cqv", bends[:, count:], by_v)
+    second = second + jnp.einsum("c,q,v->cqv", turned(flow), by_q, by_v)
+    curved = jnp.einsum("aq,ab,bv->qv", on[:, count:], jax.hessian(surface)(z), on[:, :count])
+    both = -(curved + jnp.einsum("c,cqv->qv", gradient[:c], second)) / slope
+    second = second + jnp.einsum("c,qv->cqv", rate, both)
+    return Bent(on[:c], second), Bent(times, both)
 
 
 def bend(

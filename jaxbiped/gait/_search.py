@@ -40,14 +40,13 @@ class Method(eqx.Module):
     """How to search.
 
     Attributes:
-        name: "newton" (damped as Levenberg and Marquardt do where it fails) or "optax".
-        optimiser: of the squared residual, for "optax".
+        optimiser: of the squared residual, by its gradient; None for Newton's method, damped as
+            Levenberg and Marquardt do where it fails.
         most_turns: turns allowed.
         residual: largest change of a recurring component over a turn that counts as none.
     """
 
-    name: str = eqx.field(static=True)
-    optimiser: optax.GradientTransformation = eqx.field(static=True)
+    optimiser: optax.GradientTransformation | None = eqx.field(static=True)
     most_turns: int = eqx.field(static=True)
     residual: Any
 
@@ -134,9 +133,7 @@ def search(
     ending = jnp.where(
         end.stage == _Stage.FOUND,
         int(Search.FOUND),
-        jnp.where(
-            end.stage == _Stage.NO_RETURN, int(Search.NO_RETURN), int(Search.NOT_CONVERGED)
-        ),
+        jnp.where(end.stage == _Stage.NO_RETURN, int(Search.NO_RETURN), int(Search.NOT_CONVERGED)),
     )
     return Found(
         ending=ending,
@@ -162,7 +159,7 @@ def _begin(first: Scalar, off: Scalar, method: Method, shape: Any) -> _Progress:
         base_turn=nothing,
         damping=jnp.asarray(0.0),
         coarse=nothing,
-        optimiser=method.optimiser.init(first),
+        optimiser=None if method.optimiser is None else method.optimiser.init(first),
         code=jnp.asarray(0),
         turns=jnp.asarray(0),
         history=jnp.full(method.most_turns, jnp.nan),
@@ -176,7 +173,9 @@ def _progressed(now: _Progress, latest: Turn, method: Method) -> _Progress:
     residual = jnp.where(returned, jnp.max(jnp.abs(change)), jnp.inf)
     history = now.history.at[now.turns].set(residual)
     approaching = now.stage == _Stage.APPROACH
-    better = returned & ~approaching & ((residual < now.base_residual) | (method.name == "optax"))
+    better = (
+        returned & ~approaching & ((residual < now.base_residual) | (method.optimiser is not None))
+    )
 
     def chosen(new: Any, old: Any) -> Any:
         return jax.tree.map(lambda a, b: jnp.where(better, a, b), new, old)
@@ -222,7 +221,7 @@ def _step(
     m = base.shape[0]
     change = base_turn.recurring - base
     slope = base_turn.jacobian[:, :m] - jnp.eye(m)
-    if method.name == "optax":
+    if method.optimiser is not None:
         gradient = slope.T @ change
         step, optimiser = method.optimiser.update(gradient, now.optimiser, base)
         assert isinstance(step, jax.Array)

@@ -2,16 +2,15 @@
 
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._curvature import Bent, along_path, bend
+from jaxbiped.gait._curvature import Bent, along_path, bend, on_surface
 from jaxbiped.gait._turn import Turn, Turning, recurring_places
 from jaxbiped.solve._columns import Seeded, active_leaves, with_active
-from jaxbiped.solve._passage import arrival_at, taken_back
+from jaxbiped.solve._passage import arrival_at
 
 
 def second_turn(
@@ -61,27 +60,30 @@ def second_turn(
         state, scene = parts(z)
         return turning.system.switches(scene, state)
 
-    def renewed(z: Scalar, past: Scalar) -> Scalar:
+    def renewed(z: Scalar) -> Scalar:
         state, scene = parts(z)
-        return vector(turning.system.renew(scene, taken_back(watch, state, scene, past)))
+        return vector(turning.system.renew(scene, state))
 
-    def arrived(z: Scalar) -> Scalar:
+    def section(z: Scalar) -> Scalar:
         state, scene = parts(z)
-        section_state, past = arrival_at(watch, state, scene)
-        end = vector(turning.system.renew(scene, section_state))
-        return jnp.concatenate([end[places], -past[None], end[drifting]])
+        assert watch.section is not None
+        return watch.section(scene, state)[0]
 
     first = jnp.zeros((c, seeds.shape[1])).at[places].set(jnp.concatenate([turned, tangents], 1))
     bent = Bent(first, jnp.zeros((c, tangents.shape[1], count)))
     times, states = last.nodes
     for k in range(turning.steps):
         nodes = jnp.stack([leaf[k] for leaf in jtu.tree_leaves(states)], axis=-1)
-        bent = along_path(rates, surfaces, times[k], nodes, parameters, bent, seeds, count)
-        final = nodes[jnp.sum(jnp.isfinite(times[k])) - 1]
-        z = jnp.concatenate([final, parameters])
+        end = jnp.sum(jnp.isfinite(times[k])) - 1
+        # The last step ends on the section, not just past it.
+        arrived, past = arrival_at(watch, structure.unflatten(list(nodes[end])), args.args)
+        clock = times[k].at[end].add(-past)
+        nodes = nodes.at[end].set(vector(arrived))
+        bent = along_path(rates, surfaces, clock, nodes, parameters, bent, seeds, count)
+        z = jnp.concatenate([vector(arrived), parameters])
         if k + 1 < turning.steps:
-            _, past = arrival_at(watch, *parts(z))
-            past = jax.lax.stop_gradient(past)
-            _, bent = bend(lambda z, past=past: renewed(z, past), z, bent, seeds, count)
-    _, end = bend(arrived, z, bent, seeds, count)
-    return end.second
+            _, bent = bend(renewed, z, bent, seeds, count)
+    on_section, period = on_surface(rates, section, z, bent, seeds, count)
+    _, final = bend(renewed, z, on_section, seeds, count)
+    parted = [final.second[places], period.second[None], final.second[drifting]]
+    return jnp.concatenate(parted)

@@ -122,6 +122,7 @@ def seeded(args: PyTree, active: tuple[int, ...], m: int) -> tuple[Seeded, Scala
     return Seeded(args, seeds, floors, active), sizes
 
 
+@eqx.filter_jit  # for its trace cache
 def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: Any) -> Turn:
     """Follows the orbit from `y` for one turn, with derivatives; nothing where `idle`."""
     places = recurring_places(turning.system, y)
@@ -132,7 +133,7 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
 
     def one(
         before: tuple[Tangents, Scalar], _: None
-    ) -> tuple[tuple[Tangents, Scalar], tuple[Passage, Scalar, Scalar]]:
+    ) -> tuple[tuple[Tangents, Scalar], tuple[Passage, Scalar, Scalar, Scalar]]:
         y0, failed = before
         found = passage(
             watch,
@@ -144,6 +145,7 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
             max_solver_steps=turning.max_solver_steps,
             save_nodes=True,
         )
+
         def renewed(columns: Scalar) -> Tangents:
             arrived = Tangents(found.y.state, columns)
             state, moved = along_columns(lambda s, a: turning.system.renew(a, s), arrived, args)
@@ -151,7 +153,7 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
 
         code = jnp.where(failed != 0, failed, found.code)
         on_section = renewed(found.on_section).columns
-        return (renewed(found.y.columns), code), (found, on_section, _peak_row(watch, found, args))
+        return (renewed(found.y.columns), code), (found, on_section, *_peak(watch, found, args))
 
     begin = (Tangents(y, start), jnp.asarray(0))
     if turning.steps == 1:
@@ -159,8 +161,8 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
         every = jax.tree.map(lambda leaf: leaf[None], last)
     else:
         (end, code), every = jax.lax.scan(one, begin, length=turning.steps)
-    passages, on_section, peak_rows = every
-    return _turn(turning, y, end, code, passages, on_section[-1], peak_rows)
+    passages, on_section, *peaks = every
+    return _turn(turning, y, end, code, passages, on_section[-1], *peaks)
 
 
 def _turn(
@@ -170,13 +172,14 @@ def _turn(
     code: Scalar,
     passages: Passage,
     on_section: Scalar,
+    peaks: Scalar,
     peak_rows: Scalar,
 ) -> Turn:
     places = jnp.asarray(recurring_places(turning.system, y))
     drifting = jnp.asarray(turning.system.drifting, dtype=int)
     before, after = jnp.stack(jtu.tree_leaves(y)), jnp.stack(jtu.tree_leaves(end.state))
     landed = passages.landed
-    highest = jnp.asarray(0) if landed.peak is None else jnp.argmax(landed.peak)
+    highest = jnp.argmax(peaks)
     return Turn(
         recurring=after[places],
         jacobian=on_section[places],
@@ -185,7 +188,7 @@ def _turn(
         period_row=passages.time_columns[-1],
         advance=(after - before)[drifting],
         advance_rows=on_section[drifting],
-        peak=jnp.zeros(()) if landed.peak is None else landed.peak[highest],
+        peak=peaks[highest],
         peak_row=peak_rows[highest],
         code=code,
         attempted=jnp.sum(passages.attempted),
@@ -194,9 +197,29 @@ def _turn(
     )
 
 
-def _peak_row(watch: Watch, found: Passage, args: Seeded) -> Scalar:
+def _peak(watch: Watch, found: Passage, args: Seeded) -> tuple[Scalar, Scalar]:
+    """The largest load and its derivatives.
+
+    The solve landed just past the moment at which the load's rate is zero; that little time is
+    taken back, for the load's rate changes fast during an impact.
+    """
     if watch.peak is None:
-        return jnp.zeros(args.seeds.shape[1])
-    peak = watch.peak
-    _, row = along_columns(lambda s, a: peak(a, s), found.landed.at_peak, args)
-    return row
+        return jnp.zeros(()), jnp.zeros(args.seeds.shape[1])
+    load = watch.peak
+
+    def value(y: PyTree, a: PyTree) -> Scalar:
+        return load(a, y)
+
+    def rate(y: PyTree, a: PyTree) -> Scalar:
+        velocity = watch.field(jnp.zeros(()), y, a)
+        return jax.jvp(lambda y: load(a, y), (y,), (velocity,))[1]
+
+    at_peak = found.landed.at_peak
+    highest, row = along_columns(value, at_peak, args)
+    slope, slope_row = along_columns(rate, at_peak, args)
+    state = at_peak.state
+    velocity = watch.field(jnp.zeros(()), state, args.args)
+    bend = jax.jvp(lambda y: rate(y, args.args), (state,), (velocity,))[1]
+    turned = bend < 0.0
+    past = jnp.where(turned, slope / jnp.where(turned, bend, 1.0), 0.0)
+    return highest - 0.5 * past * slope, row - past * slope_row

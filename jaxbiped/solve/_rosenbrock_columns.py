@@ -98,7 +98,9 @@ def _derivatives(
     """
     start, size = stages.start, len(tableau.alpha)
     rows = [np.zeros(size), *(np.pad(row, (0, size - len(row))) for row in tableau.a)]
-    arguments = [[y + u for y, u in zip(start, stages.weighted(row), strict=True)] for row in rows[1:]]
+    arguments = [
+        [y + u for y, u in zip(start, stages.weighted(row), strict=True)] for row in rows[1:]
+    ]
     points = [jnp.stack(column) for column in zip(start, *arguments, strict=True)]
     increments = [stages.weighted(row) for row in np.eye(size)]
     directions = [jnp.stack(column) for column in zip(*increments, strict=True)]

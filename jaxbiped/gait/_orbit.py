@@ -1,0 +1,136 @@
+"""A periodic orbit, its stability and its sensitivities."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.gait._search import Found, Method, search
+from jaxbiped.gait._second_turn import second_turn
+from jaxbiped.gait._stability import Stability, stability_of
+from jaxbiped.gait._turn import Turn, Turning, recurring_places, seeded, state_with
+from jaxbiped.solve._passage import Precision
+
+CLOSENESS = 1e-3
+"""Distance of a multiplier from the unit circle that is flagged as a bifurcation."""
+
+
+class Slopes(NamedTuple):
+    """Derivatives of an orbit by p parameters, each moved by its own size (or by 1 where zero).
+
+    Attributes:
+        recurring: of the m recurring components on the section, shape (m, p).
+        period: of the period, shape (p,).
+        advance: of what the drifting components gain in a turn, shape (d, p).
+        peak: of the largest load, shape (p,).
+    """
+
+    recurring: Scalar
+    period: Scalar
+    advance: Scalar
+    peak: Scalar
+
+
+class Orbit(NamedTuple):
+    """A periodic orbit of a system with m recurring components and d drifting ones.
+
+    Attributes:
+        found: how the search went, and the last turn.
+        state: the state on the section, its drifting components zero.
+        stability: its Floquet multipliers.
+        slopes: its derivatives by the parameters; `slope_errors` their estimated errors.
+        radius_slopes: derivatives of the spectral radius, shape (p,); NaN where not asked for.
+        radius_errors: their estimated errors.
+        sizes: by how much each parameter moved, shape (p,).
+    """
+
+    found: Found
+    state: PyTree
+    stability: Stability
+    slopes: Slopes
+    slope_errors: Slopes
+    radius_slopes: Scalar
+    radius_errors: Scalar
+    sizes: Scalar
+
+
+def orbit_from(
+    turning: Turning,
+    args: PyTree,
+    active: tuple[int, ...],
+    guess: PyTree,
+    precision: Precision,
+    method: Method,
+    *,
+    radius: bool,
+) -> Orbit:
+    """Searches a periodic orbit from `guess` and differentiates it by the implicit function theorem.
+
+    `radius` asks for the derivatives of the spectral radius as well.
+    """
+    found = search(turning, args, active, guess, precision, method)
+    state = state_with(turning.system, guess, found.recurring)
+    m = found.recurring.shape[0]
+    rates = turning.system.vector_field(jnp.zeros(()), state, args)
+    velocity = jnp.stack(jtu.tree_leaves(rates))[
+        jnp.asarray(recurring_places(turning.system, state))
+    ]
+    last, coarse = found.last, found.coarse
+    stability = stability_of(last.monodromy[:, :m], coarse.monodromy[:, :m], velocity, CLOSENESS)
+    slopes, looser = (slopes_of(each) for each in (last, coarse))
+    # Where the force itself jumped, a column lacks the jump's own correction.
+    slopes = jax.tree.map(lambda leaf: jnp.where(last.jumps > 0, jnp.nan, leaf), slopes)
+    errors = jax.tree.map(lambda a, b: jnp.abs(a - b), slopes, looser)
+    seeds, sizes = seeded(args, active, m)
+    radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
+    if radius and active:
+        both = jax.tree.map(lambda a, b: jnp.stack([a, b]), last, coarse)
+        radius_slopes, looser_slopes = jax.lax.map(
+            lambda each: _radius_slopes(turning, args, active, guess, each), both
+        )
+        radius_errors = jnp.abs(radius_slopes - looser_slopes)
+    return Orbit(found, state, stability, slopes, errors, radius_slopes, radius_errors, sizes)
+
+
+def slopes_of(last: Turn) -> Slopes:
+    """x(p) = P(x(p), p) differentiated: dx = (I − P_x)⁻¹ P_p, and all else by the chain rule."""
+    m = last.recurring.shape[0]
+    by_state, by_parameter = last.jacobian[:, :m], last.jacobian[:, m:]
+    recurring = jnp.linalg.solve(jnp.eye(m) - by_state, by_parameter)
+
+    def total(rows: Scalar) -> Scalar:
+        return rows[..., m:] + rows[..., :m] @ recurring
+
+    return Slopes(recurring, total(last.period_row), total(last.advance_rows), total(last.peak_row))
+
+
+def _radius_slopes(
+    turning: Turning, args: PyTree, active: tuple[int, ...], like: PyTree, last: Turn
+) -> Scalar:
+    """Derivatives of the leading multiplier's absolute value, shape (p,).
+
+    dλ = wᵀ (dP_x) v with left and right eigenvectors, dP_x along the orbits' family.
+    """
+    m = last.recurring.shape[0]
+    jacobian = last.jacobian[:, :m]
+    vector, left = _leading(jacobian)
+    turned = jnp.stack([vector.real, vector.imag], axis=1)
+    family = slopes_of(last).recurring
+    seeds, _ = seeded(args, active, m)
+    none = jnp.zeros((len(active), 2))
+    second = second_turn(turning, seeds, like, last, turned, family, none, seeds.seeds[:, m:])
+    change = left @ (second[:m, :, 0] + 1j * second[:m, :, 1])
+    value = left @ (jacobian.astype(vector.dtype) @ vector)
+    slopes = (jnp.conj(value) * change).real / jnp.abs(value)
+    return jnp.where(last.jumps > 0, jnp.nan, slopes)
+
+
+def _leading(jacobian: Scalar) -> tuple[Scalar, Scalar]:
+    """Right and left eigenvectors of the largest eigenvalue, wᵀ v = 1."""
+    finite = jnp.all(jnp.isfinite(jacobian))
+    values, vectors = jnp.linalg.eig(jnp.where(finite, jacobian, jnp.eye(jacobian.shape[0])))
+    largest = jnp.argmax(jnp.abs(values))
+    return vectors[:, largest], jnp.linalg.inv(vectors)[largest]

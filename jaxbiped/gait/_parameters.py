@@ -1,0 +1,49 @@
+"""A scene's parameters by name."""
+
+from typing import Any
+
+import jax.tree_util as jtu
+
+from jaxbiped._checks import check_choice
+from jaxbiped.scene._scene import Scene
+
+_FIRST = ("K", "c", "xi")
+"""The parameters that sensitivities are first asked for."""
+
+
+def parameter_names(scene: Scene) -> tuple[str, ...]:
+    """Names of a scene's parameters: K, c and xi first, the others in the scene's order.
+
+    A name is the parameter's own, `K`; where two parts have one of that name, `normal.K`.
+    """
+    names = _names_by_leaf(scene)
+    first = [name for name in _FIRST if name in names]
+    return (*first, *(name for name in names if name not in first))
+
+
+def chosen_parameters(
+    scene: Scene, parameters: tuple[str, ...] | None
+) -> tuple[tuple[str, ...], tuple[int, ...]]:
+    """Names of the parameters asked for, all for None, and the positions of their leaves.
+
+    Raises:
+        ArgumentError: a name that the scene does not have.
+    """
+    by_leaf = _names_by_leaf(scene)
+    names = parameter_names(scene) if parameters is None else tuple(parameters)
+    for name in names:
+        check_choice("parameters", name, by_leaf)
+    return names, tuple(by_leaf.index(name) for name in names)
+
+
+def _names_by_leaf(scene: Scene) -> list[str]:
+    paths = [path for path, _ in jtu.tree_flatten_with_path(scene)[0]]
+    own = [_shown(path[-1:]) for path in paths]
+    return [
+        name if own.count(name) == 1 else _shown(path)
+        for name, path in zip(own, paths, strict=True)
+    ]
+
+
+def _shown(path: tuple[Any, ...]) -> str:
+    return ".".join(str(getattr(key, "name", key)) for key in path)

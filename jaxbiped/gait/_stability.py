@@ -1,0 +1,94 @@
+"""Stability of a periodic orbit: Floquet multipliers, their directions and their errors."""
+
+import enum
+from typing import NamedTuple
+
+import jax.numpy as jnp
+
+from jaxbiped._types import Scalar
+
+
+class Bifurcation(enum.IntEnum):
+    """What a multiplier on the unit circle announces. `str(bifurcation)` is its name in words.
+
+    - none: no multiplier within its error of the unit circle.
+    - fold: one at +1: two orbits meet and vanish.
+    - period doubling: one at −1.
+    - Neimark–Sacker: a complex pair.
+    """
+
+    NONE = 0
+    FOLD = 1
+    PERIOD_DOUBLING = 2
+    NEIMARK_SACKER = 3
+
+    def __str__(self) -> str:
+        if self is Bifurcation.NEIMARK_SACKER:
+            return "Neimark–Sacker"
+        return self.name.lower().replace("_", " ")
+
+
+class Stability(NamedTuple):
+    """Floquet multipliers of an orbit with m recurring components.
+
+    Attributes:
+        multipliers: largest first, without the trivial one; complex, shape (m − 1,).
+        errors: estimated errors of their absolute values' and arguments, shape (m − 1,).
+        directions: eigenvectors of the monodromy matrix, of unit length, shape (m, m − 1).
+        unit_error: distance from 1 of the multiplier that belongs to a shift of time. It must be
+            exactly 1: a free witness of the derivatives' error.
+        spectral_radius: largest absolute value.
+        bifurcation: code of a `Bifurcation`.
+    """
+
+    multipliers: Scalar
+    errors: Scalar
+    directions: Scalar
+    unit_error: Scalar
+    spectral_radius: Scalar
+    bifurcation: Scalar
+
+
+def stability_of(
+    monodromy: Scalar, witness: Scalar, velocity: Scalar, closeness: float
+) -> Stability:
+    """Multipliers of a monodromy matrix.
+
+    Args:
+        monodromy: derivative of one turn at a fixed time, shape (m, m).
+        witness: the same from a looser solve.
+        velocity: rates of the recurring components at the orbit, shape (m,).
+        closeness: distance from the unit circle that counts as on it, at least.
+    """
+    values, vectors, unit_error = _nontrivial(monodromy, velocity)
+    looser, _, _ = _nontrivial(witness, velocity)
+    distances = jnp.abs(values[:, None] - looser[None, :])
+    errors = jnp.maximum(jnp.min(distances, axis=1), unit_error)
+    near = jnp.abs(jnp.abs(values) - 1.0) <= jnp.maximum(errors, closeness)
+    real = jnp.abs(values.imag) <= 1e-12
+    kinds = jnp.where(
+        real,
+        jnp.where(values.real > 0.0, int(Bifurcation.FOLD), int(Bifurcation.PERIOD_DOUBLING)),
+        int(Bifurcation.NEIMARK_SACKER),
+    )
+    return Stability(
+        multipliers=values,
+        errors=errors,
+        directions=vectors,
+        unit_error=unit_error,
+        spectral_radius=jnp.abs(values[0]),
+        bifurcation=jnp.max(jnp.where(near, kinds, int(Bifurcation.NONE))),
+    )
+
+
+def _nontrivial(matrix: Scalar, velocity: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """Eigenvalues and vectors, largest first, without the one along the velocity; its error."""
+    finite = jnp.all(jnp.isfinite(matrix))
+    values, vectors = jnp.linalg.eig(jnp.where(finite, matrix, 0.0))
+    values = jnp.where(finite, values, jnp.nan)
+    # The velocity is an eigenvector: the one that it is made of.
+    parts = jnp.linalg.solve(vectors, velocity.astype(vectors.dtype))
+    trivial = jnp.argmax(jnp.where(jnp.isfinite(jnp.abs(parts)), jnp.abs(parts), 0.0))
+    size = jnp.where(jnp.arange(values.shape[0]) == trivial, -1.0, jnp.abs(values))
+    order = jnp.argsort(-size)[:-1]
+    return values[order], vectors[:, order], jnp.abs(values[trivial] - 1.0)
