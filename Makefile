@@ -1,16 +1,19 @@
-# Two commands: `make walk` runs the main job, `make test` all checks. Each sets up what it needs
-# in .venv inside this checkout; repeated runs do not set up again.
+# `make walk` runs the main job, `make gait` finds the periodic gait, `make test` runs all checks.
+# Each sets up what it needs in .venv inside this checkout; repeated runs do not set up again.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 OUT := out/walk
 
-.PHONY: walk test lint types clean
+.PHONY: walk gait test lint types clean
 
 walk: $(VENV)/.installed
 	$(BIN)/jaxbiped walk --out $(OUT)
 	@echo "Pictures, animation and trajectory: $(OUT)"
+
+gait: $(VENV)/.installed
+	$(BIN)/jaxbiped gait --out out/gait
 
 test: lint types
 	$(BIN)/python -m pytest -n 2 --dist loadfile

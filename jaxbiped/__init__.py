@@ -41,9 +41,16 @@ from jaxbiped.gait._footsteps import heel_strikes as heel_strikes
 from jaxbiped.gait._gait import Gait as Gait
 from jaxbiped.gait._gait import Measures as Measures
 from jaxbiped.gait._gait import find_gait as find_gait
+from jaxbiped.gait._gait_measures import gait_measures as gait_measures
+from jaxbiped.gait._gradient import AbstractGradient as AbstractGradient
+from jaxbiped.gait._gradient import Forward as Forward
+from jaxbiped.gait._gradient import Implicit as Implicit
+from jaxbiped.gait._gradient import Reverse as Reverse
 from jaxbiped.gait._ledger import EnergyLedger as EnergyLedger
 from jaxbiped.gait._ledger import energy_ledger as energy_ledger
 from jaxbiped.gait._parameters import parameter_names as parameter_names
+from jaxbiped.gait._return_map import Return as Return
+from jaxbiped.gait._return_map import return_map as return_map
 from jaxbiped.gait._search import Search as Search
 from jaxbiped.gait._section import AbstractSection as AbstractSection
 from jaxbiped.gait._section import HeelStrike as HeelStrike

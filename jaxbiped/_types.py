@@ -19,7 +19,9 @@ def as_float(value: Any) -> Any:
     What is no number is returned as it is, for the check that follows to refuse by name.
     """
     if isinstance(value, jax.Array | jax.core.Tracer):
-        return value if jnp.issubdtype(value.dtype, jnp.floating) else value.astype(float)
+        # A weak type would be a type of its own to `jit`.
+        floating = jnp.issubdtype(value.dtype, jnp.floating)
+        return jax.lax.convert_element_type(value, value.dtype if floating else float)
     try:
         return jnp.asarray(value, dtype=float)
     except (TypeError, ValueError):

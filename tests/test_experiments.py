@@ -36,6 +36,14 @@ EXPERIMENTS = {
         "numbers": {"compile_s", "rows", "errors"},
         "pictures": {"speed_batch.png"},
     },
+    "sensitivity_K_c_xi": {
+        "numbers": {"parameters", "points", "without_a_gait", "disagreement_with_neighbours"},
+        "pictures": {"sensitivity_K_c_xi.png"},
+    },
+    "gradient_accuracy": {
+        "numbers": {"reference_tolerance", "reference", "points"},
+        "pictures": {"gradient_accuracy.png"},
+    },
 }
 """For each script: keys its numbers must have, and pictures it must write."""
 
@@ -85,7 +93,29 @@ def _every_lane_arrives(numbers):
     assert all(row["failed"] == 0 and row["steps_per_second"] > 0 for row in ours)
 
 
+def _every_gait_is_found_with_its_elasticities(numbers):
+    assert numbers["without_a_gait"] == []
+    points = {name: row[len(row) // 2] for name, row in numbers["points"].items()}
+    for seed in points.values():
+        assert seed["measures"]["period"] == pytest.approx(0.440835, abs=1e-6)
+        assert seed["elasticities"]["peak_normal"][:2] == pytest.approx([0.139, 0.479], abs=1e-3)
+    for row in numbers["points"].values():
+        assert all(max(point["errors"]["period"]) < 1e-4 for point in row)
+
+
+def _both_precautions_make_derivatives_follow_their_tolerance(numbers):
+    points = numbers["points"]["exact laws"]
+    assert numbers["reference"]["exact laws"]["unit_multiplier"] < 1e-6
+    for name in ("norm", "both"):
+        assert points[name][-1]["unit_multiplier"] < 1e-3
+        assert points[name][-1]["period_slope"] < 1e-3
+    assert points["plain"][-1]["unit_multiplier"] > 1e-3
+    assert all(row[-1]["state"] < 1e-5 for row in points.values())
+
+
 CHECKS = {
+    "sensitivity_K_c_xi": _every_gait_is_found_with_its_elasticities,
+    "gradient_accuracy": _both_precautions_make_derivatives_follow_their_tolerance,
     "paper_figures_4_8": _walks_as_the_paper_says,
     "speed_single": _agrees_with_an_independent_solve,
     "speed_batch": _every_lane_arrives,

@@ -7,9 +7,14 @@ import tyro
 from tyro.conf import subcommand
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._walk import Walk
 
-_Command = Annotated[Walk, subcommand("walk")] | Annotated[None, subcommand("version")]
+_Command = (
+    Annotated[Walk, subcommand("walk")]
+    | Annotated[FindGait, subcommand("gait")]
+    | Annotated[None, subcommand("version")]
+)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -16,6 +16,7 @@ from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._state import State, checked_state, seed_state
 from jaxbiped.gait._orbit import Orbit, orbit_from
 from jaxbiped.gait._parameters import chosen_parameters
+from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._search import Method, Search
 from jaxbiped.gait._section import AbstractSection, MidStance
 from jaxbiped.gait._stability import Bifurcation
@@ -27,12 +28,10 @@ from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._passage import Precision
 from jaxbiped.solve._solvers import solver_named
 
-GAIT_ACCURACIES = ("balanced", "tight")
-_TANGENT_SHARE = 10.0
-"""Tolerance of the derivatives, in units of the state's."""
 _RESIDUAL_SHARE = 0.1
 """Residual that counts as none, in units of the state's tolerance."""
-_MOST_SOLVER_STEPS = {"balanced": 4096, "tight": 32768}
+_NOTHING = 1e-9
+"""A measure (SI units) that is zero but for the solve's error has no elasticity."""
 _PATIENCE = 50.0
 """Time allowed to the next arrival, in units of √(l/g)."""
 
@@ -44,16 +43,17 @@ class Measures(NamedTuple):
         period: duration of the cycle [s].
         step_length: advance along the slope in a cycle [m].
         speed: mean speed along the slope [m/s].
-        peak_normal: largest normal force on a foot [N].
-        spectral_radius: largest absolute value of a Floquet multiplier, the trivial one left out.
+        peak_normal: largest normal force on a foot [N]; None where the gradient mode has none.
+        spectral_radius: largest absolute value of a Floquet multiplier, the trivial one left out;
+            None where the gradient mode has none.
         state: the state on the section, hip_x zero.
     """
 
     period: Scalar
     step_length: Scalar
     speed: Scalar
-    peak_normal: Scalar
-    spectral_radius: Scalar
+    peak_normal: Any
+    spectral_radius: Any
     state: State
 
 
@@ -69,12 +69,14 @@ class Gait(eqx.Module):
         multiplier_errors: their estimated errors, shape (6,).
         directions: their eigenvectors in the space of hip_z … omega_2, shape (7, 6).
         monodromy: derivative of a cycle at a fixed time, shape (7, 7).
+        return_jacobian: derivatives on the section by the state: of the state that returns, the
+            period and the step length; shape (9, 7).
         unit_multiplier_error: distance from 1 of the multiplier that must be exactly 1.
         bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
         sensitivities: derivatives of the measures by each parameter, leaves of shape (p,).
         sensitivity_errors: their estimated errors: what a ten times looser solve changes.
         elasticities: d log |measure| / d log parameter, leaves of shape (p,); zero for a parameter
-            that is zero.
+            that is zero, NaN for a measure that is.
         turns: cycles that the search took.
         history: residual of each of them, NaN beyond the last.
         solver_steps: solver steps attempted in the last cycle.
@@ -90,6 +92,7 @@ class Gait(eqx.Module):
     multiplier_errors: Scalar
     directions: Scalar
     monodromy: Scalar
+    return_jacobian: Scalar
     unit_multiplier_error: Scalar
     bifurcation: Scalar
     sensitivities: Measures
@@ -186,14 +189,14 @@ def find_gait(
         solver=solver_named(solver),
         time_limit=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
         steps=int(period),
-        max_solver_steps=_MOST_SOLVER_STEPS[accuracy],
+        max_solver_steps=MOST_SOLVER_STEPS[accuracy],
     )
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
         most_turns=int(most),
         residual=_RESIDUAL_SHARE * rtol,
     )
-    precision = Precision(rtol, _TANGENT_SHARE * rtol)
+    precision = precision_of(accuracy)
     return _find(turning, scene, start, precision, how, names, active, radius_sensitivities)
 
 
@@ -215,7 +218,7 @@ def _find(
 ) -> Gait:
     orbit = orbit_from(turning, scene, active, start, precision, method, radius=radius)
     found, stability = orbit.found, orbit.stability
-    last = found.last
+    last, m = found.last, found.recurring.shape[0]
     lost = found.ending == int(Search.NO_RETURN)
 
     def known(tree: PyTree) -> PyTree:
@@ -245,9 +248,12 @@ def _find(
         multipliers=known(stability.multipliers),
         multiplier_errors=known(stability.errors),
         directions=known(stability.directions),
-        monodromy=known(last.monodromy[:, : found.recurring.shape[0]]),
+        monodromy=known(last.monodromy[:, :m]),
+        return_jacobian=known(
+            jnp.concatenate([last.jacobian, last.period_row[None], last.advance_rows])[:, :m]
+        ),
         unit_multiplier_error=known(stability.unit_error),
-        bifurcation=stability.bifurcation,
+        bifurcation=jnp.where(lost, int(Bifurcation.NONE), stability.bifurcation),
         sensitivities=known(jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes)),
         sensitivity_errors=known(jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), errors)),
         elasticities=known(_elasticities(scene, active, measures, slopes)),
@@ -274,6 +280,6 @@ def _elasticities(
     zero = jnp.stack([leaves[i] == 0.0 for i in active]) if active else jnp.zeros(0, dtype=bool)
 
     def relative(value: Scalar, slope: Scalar) -> Scalar:
-        return jnp.where(zero, 0.0, jnp.where(value == 0.0, jnp.nan, slope / value))
+        return jnp.where(zero, 0.0, jnp.where(jnp.abs(value) < _NOTHING, jnp.nan, slope / value))
 
     return jax.tree.map(relative, measures, slopes)

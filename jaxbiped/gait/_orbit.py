@@ -1,6 +1,6 @@
 """A periodic orbit, its stability and its sensitivities."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -67,7 +67,7 @@ def orbit_from(
     *,
     radius: bool,
 ) -> Orbit:
-    """Searches a periodic orbit from `guess` and differentiates it by the implicit function theorem.
+    """Searches a periodic orbit from `guess`; differentiates it by the implicit function theorem.
 
     `radius` asks for the derivatives of the spectral radius as well.
     """
@@ -84,9 +84,10 @@ def orbit_from(
     # Where the force itself jumped, a column lacks the jump's own correction.
     slopes = jax.tree.map(lambda leaf: jnp.where(last.jumps > 0, jnp.nan, leaf), slopes)
     errors = jax.tree.map(lambda a, b: jnp.abs(a - b), slopes, looser)
-    seeds, sizes = seeded(args, active, m)
+    _, sizes = seeded(args, active, m)
     radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
-    if radius and active:
+    differentiable = turning.steps == 1 or turning.system.renews_by_symmetry
+    if radius and active and differentiable:
         both = jax.tree.map(lambda a, b: jnp.stack([a, b]), last, coarse)
         radius_slopes, looser_slopes = jax.lax.map(
             lambda each: _radius_slopes(turning, args, active, guess, each), both
@@ -122,7 +123,7 @@ def _radius_slopes(
     seeds, _ = seeded(args, active, m)
     none = jnp.zeros((len(active), 2))
     second = second_turn(turning, seeds, like, last, turned, family, none, seeds.seeds[:, m:])
-    change = left @ (second[:m, :, 0] + 1j * second[:m, :, 1])
+    change = left @ jax.lax.complex(second[:m, :, 0], second[:m, :, 1])
     value = left @ (jacobian.astype(vector.dtype) @ vector)
     slopes = (jnp.conj(value) * change).real / jnp.abs(value)
     return jnp.where(last.jumps > 0, jnp.nan, slopes)

@@ -106,7 +106,7 @@ def search(
     precision: Precision,
     method: Method,
 ) -> Found:
-    """Searches from `guess`, which need not lie on the section, with 10 times looser solves first."""
+    """Searches from `guess`, on the section or not, with 10 times looser solves first."""
     first = recurring_of(turning.system, guess)
     seeds, _ = seeded(args, active, len(first))
     coarse = Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
@@ -190,7 +190,7 @@ def _progressed(now: _Progress, latest: Turn, method: Method) -> _Progress:
     )
     coarse_done = (now.stage == _Stage.COARSE) & (base_residual <= _COARSE)
     fine_done = (now.stage == _Stage.FINE) & (base_residual <= method.residual)
-    nowhere = ~returned & ~jnp.isfinite(base_residual)
+    nowhere = ~returned & ~jnp.isfinite(base_residual) & (now.stage < _Stage.FINE)
     stage = jnp.where(approaching, int(_Stage.COARSE), now.stage)
     stage = jnp.where(coarse_done, int(_Stage.FINE), stage)
     stage = jnp.where(fine_done, int(_Stage.FOUND), stage)

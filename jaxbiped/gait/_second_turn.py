@@ -7,7 +7,8 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._curvature import Bent, along_path, bend, on_surface
+from jaxbiped.gait._bent import Bent, bend, on_surface
+from jaxbiped.gait._curvature import along_path
 from jaxbiped.gait._turn import Turn, Turning, recurring_places
 from jaxbiped.solve._columns import Seeded, active_leaves, with_active
 from jaxbiped.solve._passage import arrival_at
@@ -47,7 +48,7 @@ def second_turn(
     watch = turning.watch(args.args, like)
 
     def parts(z: Scalar) -> tuple[PyTree, PyTree]:
-        return structure.unflatten(list(z[:c])), with_active(args, list(z[c:]))
+        return jtu.tree_unflatten(structure, list(z[:c])), with_active(args, list(z[c:]))
 
     def vector(y: PyTree) -> Scalar:
         return jnp.stack(jtu.tree_leaves(y))
@@ -76,7 +77,9 @@ def second_turn(
         nodes = jnp.stack([leaf[k] for leaf in jtu.tree_leaves(states)], axis=-1)
         end = jnp.sum(jnp.isfinite(times[k])) - 1
         # The last step ends on the section, not just past it.
-        arrived, past = arrival_at(watch, structure.unflatten(list(nodes[end])), args.args)
+        arrived, past = arrival_at(
+            watch, jtu.tree_unflatten(structure, list(nodes[end])), args.args
+        )
         clock = times[k].at[end].add(-past)
         nodes = nodes.at[end].set(vector(arrived))
         bent = along_path(rates, surfaces, clock, nodes, parameters, bent, seeds, count)

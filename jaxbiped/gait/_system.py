@@ -25,9 +25,12 @@ class AbstractSystem(eqx.Module):
     Attributes:
         drifting: positions of the state's leaves that need not return, only advance: no rate may
             depend on them.
+        renews_by_symmetry: whether `renew` maps motions to motions, as exchanging the legs does.
+            Second derivatives of cycles of several arrivals need it.
     """
 
     drifting: ClassVar[tuple[int, ...]] = ()
+    renews_by_symmetry: ClassVar[bool] = False
 
     @abc.abstractmethod
     def vector_field(self, t: Any, y: PyTree, args: PyTree) -> PyTree:
@@ -54,6 +57,7 @@ class Walking(AbstractSystem):
     """The walker: legs exchanged at each footstep, the place along the slope left out."""
 
     drifting: ClassVar[tuple[int, ...]] = (State._fields.index("hip_x"),)
+    renews_by_symmetry: ClassVar[bool] = True
 
     def vector_field(self, t: Any, y: State, args: Scene) -> State:
         return vector_field(t, y, args)

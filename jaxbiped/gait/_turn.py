@@ -2,7 +2,6 @@
 
 from typing import Any, NamedTuple
 
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -35,12 +34,12 @@ class Turning(eqx.Module):
 
     system: AbstractSystem
     section: AbstractSection
-    solver: diffrax.AbstractAdaptiveSolver
+    solver: Any
     time_limit: Any
     steps: int = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
 
-    def watch(self, args: PyTree, y: PyTree) -> Watch:
+    def watch(self, args: PyTree, y: PyTree, *, peak: bool = True) -> Watch:
         """What the solves land on: a section is looked at after the arrival's renewal."""
         system, section = self.system, self.section
 
@@ -48,12 +47,13 @@ class Turning(eqx.Module):
             renewed = system.renew(args, y)
             return section.value(args, renewed), section.counts(args, renewed)
 
+        loaded = eqx.filter_eval_shape(system.load, args, y) is not None
         return Watch(
             field=system.vector_field,
             switches=system.switches,
             section=arrives,
             ending=system.ending,
-            peak=None if eqx.filter_eval_shape(system.load, args, y) is None else system.load,
+            peak=system.load if peak and loaded else None,
         )
 
 
@@ -105,7 +105,7 @@ def state_with(system: AbstractSystem, like: PyTree, recurring: Scalar) -> PyTre
     places = recurring_places(system, like)
     zero = jnp.zeros_like(recurring[0])
     filled = [recurring[places.index(i)] if i in places else zero for i in range(len(leaves))]
-    return structure.unflatten(filled)
+    return jtu.tree_unflatten(structure, filled)
 
 
 def seeded(args: PyTree, active: tuple[int, ...], m: int) -> tuple[Seeded, Scalar]:
@@ -146,14 +146,15 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
             save_nodes=True,
         )
 
-        def renewed(columns: Scalar) -> Tangents:
-            arrived = Tangents(found.y.state, columns)
-            state, moved = along_columns(lambda s, a: turning.system.renew(a, s), arrived, args)
-            return Tangents(state, as_columns(moved))
-
+        arrived = Tangents(found.y.state, found.on_section)
+        state, moved = along_columns(lambda s, a: turning.system.renew(a, s), arrived, args)
+        on_section = as_columns(moved)
+        # At a fixed time the renewal comes earlier or later, and the motion after it with it.
+        rates = turning.system.vector_field(jnp.zeros(()), state, args.args)
+        velocity = jnp.stack(jtu.tree_leaves(rates))
+        columns = on_section - velocity[:, None] * found.time_columns
         code = jnp.where(failed != 0, failed, found.code)
-        on_section = renewed(found.on_section).columns
-        return (renewed(found.y.columns), code), (found, on_section, *_peak(watch, found, args))
+        return (Tangents(state, columns), code), (found, on_section, *_peak(watch, found, args))
 
     begin = (Tangents(y, start), jnp.asarray(0))
     if turning.steps == 1:

@@ -51,7 +51,7 @@ def with_active(args: Seeded, values: Sequence[Scalar]) -> PyTree:
     leaves, structure = jtu.tree_flatten(args.args)
     for i, value in zip(args.active, values, strict=True):
         leaves[i] = value
-    return structure.unflatten(leaves)
+    return jtu.tree_unflatten(structure, leaves)
 
 
 def along_columns(
@@ -61,7 +61,7 @@ def along_columns(
     state, structure = jtu.tree_flatten(y.state)
 
     def of_leaves(state: list[Scalar], moved: list[Scalar]) -> Any:
-        return function(structure.unflatten(state), with_active(args, moved))
+        return function(jtu.tree_unflatten(structure, state), with_active(args, moved))
 
     def along(column: Scalar, seed: Scalar) -> Any:
         tangents = (list(column), list(seed))

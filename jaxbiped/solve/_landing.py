@@ -13,8 +13,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.solve._fence import fenced
 from jaxbiped.solve._columns import Seeded, Tangents
+from jaxbiped.solve._fence import fenced
 
 _OVERSHOOT = 1e-4
 """Largest part of a step that may lie past a switch."""
@@ -41,7 +41,7 @@ class Watch(eqx.Module):
         static=True, default=None
     )
     ending: Callable[[PyTree, PyTree], Scalar] | None = eqx.field(static=True, default=None)
-    peak: Callable[[PyTree, PyTree], Scalar] | None = eqx.field(static=True, default=None)
+    peak: Callable[[PyTree, PyTree], Any] | None = eqx.field(static=True, default=None)
 
 
 class Landed(NamedTuple):
@@ -171,7 +171,9 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
             roots = _cubic_root(parts[0], parts[2], parts[1], parts[3])
             return jnp.min(jnp.where(jnp.stack(crossed), roots, 1.0))
 
-        part = jnp.where(any_crossed, fenced(any_crossed, locate), 1.0) if crossed else 1.0
+        part = jnp.ones_like(span)
+        if crossed:
+            part = jnp.where(any_crossed, fenced(any_crossed, locate), part)
         none = jnp.asarray(False)
         found = _Crossed(
             any_crossed,
@@ -203,9 +205,9 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
             at_peak = jtu.tree_map(lambda a, b: jnp.where(record, a, b), y1, at_peak)
         return Landed(
             inner=inner,
-            accepted=old.accepted + keep,
-            landings=old.landings + (keep & crossed.switch),
-            jumps=old.jumps + (keep & crossed.jump),
+            accepted=old.accepted + jnp.where(keep, 1, 0),
+            landings=old.landings + jnp.where(keep & crossed.switch, 1, 0),
+            jumps=old.jumps + jnp.where(keep & crossed.jump, 1, 0),
             arrived=keep & crossed.section,
             code=code,
             peak=peak,

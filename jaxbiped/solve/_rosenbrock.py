@@ -172,7 +172,7 @@ class Stages(NamedTuple):
     vector: np.ndarray
     increments: list[Components]
 
-    def weighted(self, weights: Sequence[float]) -> Components:
+    def weighted(self, weights: Sequence[float] | np.ndarray) -> Components:
         """Σ_j weights_j u_j for every component."""
         row = np.asarray(weights)
         count = len(row)

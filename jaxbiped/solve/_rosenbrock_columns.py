@@ -121,7 +121,9 @@ def _derivatives(
         pulls = fenced(moves, lambda: jax.vmap(of)(points, directions))
 
         def pulled() -> Any:
-            return jax.vmap(lambda pull: jax.vmap(lambda *e: pull(list(e)))(*unit))(pulls)
+            # A linear field leaves nothing to pull through: the size is said, not read off.
+            every = jax.vmap(lambda pull: jax.vmap(lambda *e: pull(list(e)))(*unit), axis_size=size)
+            return every(pulls)
 
         state_part, parameter_part = fenced(moves, pulled)
         return jnp.stack([*(state_part[i] for i in order), *parameter_part], axis=-1)

@@ -147,7 +147,7 @@ class TangentControl(diffrax.AbstractAdaptiveStepSizeController):
         y0: Tangents,
         y1_candidate: Tangents,
         args: Seeded,
-        y_error: Tangents,
+        y_error: Any,
         error_order: Any,
         controller_state: Any,
     ) -> Any:

@@ -1,0 +1,248 @@
+"""Errors of a footstep and of its derivatives against tolerance, for four ways of stepping.
+
+Writes gradient_accuracy.png. The steps are chosen for the state alone ("plain"), or end just past
+every switch of the vector field ("landing"), or are chosen for the derivatives as well ("norm"), or
+both. Derivatives are always those of the solver's own steps. Laws: the seed's, and smoothed ones.
+"""
+
+import dataclasses
+import time
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+from _options import Options, parse
+
+import jaxbiped as jb
+from jaxbiped.gait._orbit import slopes_of
+from jaxbiped.gait._parameters import chosen_parameters
+from jaxbiped.gait._stability import stability_of
+from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with, turn
+from jaxbiped.solve._passage import Precision
+
+TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+QUICK_TOLERANCES = (1e-5, 1e-6)
+REFERENCE, QUICK_REFERENCE = 1e-10, 1e-9
+"""Tolerance of the state and of its columns, with both precautions, that counts as exact."""
+TANGENT_SHARE = 10.0
+"""Tolerance of the columns, in units of the state's."""
+UNHEARD = 1e30
+"""Tolerance of the columns where they have no say in the steps."""
+MOST_STEPS = 32768
+STEPPINGS = {
+    "plain": (False, False),
+    "landing": (True, False),
+    "norm": (False, True),
+    "both": (True, True),
+}
+"""Whether steps end at switches, and whether columns enter the norm."""
+ERRORS = {
+    "state": "state [m, rad, m/s, rad/s]",
+    "period_s": "period [s]",
+    "unit_multiplier": "multiplier that is exactly 1",
+    "period_slope": "d period / d log K [relative]",
+}
+
+
+class Stepped(jb.AbstractSystem):
+    """The walker, its switches hidden from the solver or not.
+
+    Attributes:
+        lands: whether steps end just past every switch.
+    """
+
+    drifting = jb.Walking.drifting
+    lands: bool = eqx.field(static=True)
+
+    def vector_field(self, t: Any, y: jb.State, args: jb.Scene) -> jb.State:
+        """The walker's."""
+        return jb.vector_field(t, y, args)
+
+    def switches(self, args: jb.Scene, y: jb.State) -> tuple[jb.Switch, ...]:
+        """The walker's, or none."""
+        return jb.switches(args, y) if self.lands else ()
+
+    def ending(self, args: jb.Scene, y: jb.State) -> Any:
+        """The walker's."""
+        return jb.Walking().ending(args, y)
+
+    def renew(self, args: jb.Scene, y: jb.State) -> jb.State:
+        """Legs exchanged."""
+        return jb.exchange_legs(y)
+
+    def load(self, args: jb.Scene, y: jb.State) -> None:
+        """No largest load: no step is spent on it."""
+        return None
+
+
+class Point(NamedTuple):
+    """What was measured at one tolerance; errors as `ERRORS` says."""
+
+    rtol: float
+    steps: int
+    state: float
+    period_s: float
+    unit_multiplier: float
+    period_slope: float
+
+
+class Exact(NamedTuple):
+    """A gait's state on the section, and the reference footstep from there."""
+
+    start: jb.State
+    turn: Turn
+
+
+def laws(quick: bool) -> dict[str, jb.Scene]:
+    """The scenes by the name of their laws."""
+    seed = jb.seed_scene()
+    normal, friction = seed.normal, seed.friction
+    smooth = dataclasses.replace(
+        seed,
+        normal=jb.SmoothRistowSchafer(K=normal.K, c=normal.c, n=normal.n),
+        friction=jb.SmoothBengisuAkay(
+            friction.mu_static, friction.mu_kinetic, friction.v0, friction.xi
+        ),
+    )
+    return {"exact laws": seed} if quick else {"exact laws": seed, "smoothed laws": smooth}
+
+
+def footstep(scene: jb.Scene, start: jb.State, lands: bool, precision: Precision) -> Turn:
+    """One footstep from mid-stance, with derivatives by the state and by log K.
+
+    Tolerances are traced: all of them share one compiled program.
+    """
+    turning = Turning(
+        system=Stepped(lands),
+        section=jb.MidStance(),
+        solver=jb.Rodas4(),
+        time_limit=jnp.asarray(10.0),
+        steps=1,
+        max_solver_steps=MOST_STEPS,
+    )
+    _, active = chosen_parameters(scene, ("K",))
+    seeds, _ = seeded(scene, active, len(start) - 1)
+    traced = Precision(*map(jnp.asarray, precision))
+    return turn(turning, seeds, start, traced, jnp.asarray(False))
+
+
+def exact_gait(scene: jb.Scene, rtol: float) -> Exact:
+    """The gait by Newton's method on the return map, solved at the reference's own tolerance.
+
+    `find_gait` would find the same; this needs no other program compiled.
+    """
+    system, y = jb.Walking(), jb.seed_state()
+    first = footstep(scene, y, True, Precision(1e-6, 1e-5))
+    x = first.recurring
+    for tolerance in (1e-6, rtol, rtol, rtol):
+        y = state_with(system, y, x)
+        last = footstep(scene, y, True, Precision(tolerance, tolerance))
+        m, change = len(x), last.recurring - x
+        found, x = x, x + jnp.linalg.solve(jnp.eye(m) - last.jacobian[:, :m], change)
+        if jnp.max(jnp.abs(change)) < 1e-2 * rtol:
+            break
+    return Exact(state_with(system, y, found), last)
+
+
+def measured(scene: jb.Scene, exact: Exact, stepping: str, rtol: float) -> Point:
+    lands, heard = STEPPINGS[stepping]
+    precision = Precision(rtol, TANGENT_SHARE * rtol if heard else UNHEARD)
+    found = footstep(scene, exact.start, lands, precision)
+    slope, true_slope = (float(slopes_of(each).period[0]) for each in (found, exact.turn))
+    return Point(
+        rtol=rtol,
+        steps=int(found.attempted),
+        state=float(jnp.max(jnp.abs(found.recurring - exact.turn.recurring))),
+        period_s=abs(float(found.period - exact.turn.period)),
+        unit_multiplier=unit_error(scene, exact.start, found),
+        period_slope=abs(slope / true_slope - 1.0),
+    )
+
+
+def unit_error(scene: jb.Scene, start: jb.State, found: Turn) -> float:
+    """Distance from 1 of the multiplier of the direction along the orbit."""
+    system = jb.Walking()
+    m = len(found.recurring)
+    velocity = recurring_of(system, jb.vector_field(0.0, start, scene))
+    square = found.monodromy[:, :m]
+    return float(stability_of(square, square, velocity, 1e-3).unit_error)
+
+
+def residual(exact: Exact) -> float:
+    """Largest change of a component of the state over the reference footstep, SI units."""
+    before = recurring_of(jb.Walking(), exact.start)
+    return float(jnp.max(jnp.abs(exact.turn.recurring - before)))
+
+
+def report(options: Options, points: dict[str, list[Point]]) -> None:
+    options.say(
+        f"{'stepping':10}{'rtol':>8}{'steps':>8}{'state':>10}{'period [s]':>12}"
+        f"{'multiplier':>12}{'d/dlogK':>10}"
+    )
+    for name, row in points.items():
+        for p in row:
+            options.say(
+                f"{name:10}{p.rtol:8.0e}{p.steps:8d}{p.state:10.1e}{p.period_s:12.1e}"
+                f"{p.unit_multiplier:12.1e}{p.period_slope:10.1e}"
+            )
+
+
+def picture(options: Options, found: dict[str, dict[str, list[Point]]]) -> None:
+    rows = len(found)
+    figure, grid = plt.subplots(
+        rows, 4, figsize=(14, 0.8 + 3.4 * rows), layout="constrained", sharex=True, squeeze=False
+    )
+    for axes_row, (law, points) in zip(grid, found.items(), strict=True):
+        for axes, (key, label) in zip(axes_row, ERRORS.items(), strict=True):
+            for marker, (name, row) in zip("osd^", points.items(), strict=True):
+                errors = [getattr(p, key) for p in row]
+                axes.loglog([p.steps for p in row], errors, f"{marker}-", ms=4, label=name)
+            axes.set_title(f"{law}: {label}", fontsize=9)
+            axes.grid(alpha=0.3)
+        axes_row[0].set_ylabel("error")
+    for axes in grid[-1]:
+        axes.set_xlabel("attempted steps of a footstep")
+    grid[0, 0].legend(fontsize=8)
+    figure.savefig(options.path("gradient_accuracy.png"), dpi=150)
+    plt.close(figure)
+
+
+def main() -> None:
+    options = parse(__doc__ or "")
+    levels = QUICK_TOLERANCES if options.quick else TOLERANCES
+    reference = QUICK_REFERENCE if options.quick else REFERENCE
+    found: dict[str, dict[str, list[Point]]] = {}
+    references: dict[str, Any] = {}
+    for law, scene in laws(options.quick).items():
+        began = time.perf_counter()
+        exact = exact_gait(scene, reference)
+        found[law] = {
+            name: [measured(scene, exact, name, rtol) for rtol in levels] for name in STEPPINGS
+        }
+        references[law] = {
+            "period_s": float(exact.turn.period),
+            "period_slope_s": float(slopes_of(exact.turn).period[0]),
+            "steps": int(exact.turn.attempted),
+            "unit_multiplier": unit_error(scene, exact.start, exact.turn),
+            "residual": residual(exact),
+        }
+        options.say(f"\n{law}, in {time.perf_counter() - began:.0f} s")
+        options.say(f"reference: {references[law]}")
+        report(options, found[law])
+    picture(options, found)
+    options.finish(
+        {
+            "tangent_share": TANGENT_SHARE,
+            "reference_tolerance": reference,
+            "reference": references,
+            "points": {
+                law: {name: [p._asdict() for p in row] for name, row in points.items()}
+                for law, points in found.items()
+            },
+        }
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,212 @@
+"""`jaxbiped gait`: find the periodic gait and print its stability and sensitivities."""
+
+import dataclasses
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from tyro.conf import OmitArgPrefixes
+
+from jaxbiped import _clock
+from jaxbiped._checks import check_choice
+from jaxbiped.cli._report import Report, table
+from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
+from jaxbiped.dynamics._state import State
+from jaxbiped.gait._gait import Gait, Measures, find_gait
+from jaxbiped.gait._search import Search
+from jaxbiped.gait._section import AbstractSection, HeelStrike, MidStance
+from jaxbiped.gait._stability import Bifurcation
+
+_SECTIONS: dict[str, type[AbstractSection]] = {"mid-stance": MidStance, "heel-strike": HeelStrike}
+_UNITS = {
+    "period": "period_s",
+    "step_length": "step_length_m",
+    "speed": "speed_m_s",
+    "peak_normal": "peak_normal_N",
+    "spectral_radius": "spectral_radius",
+}
+"""Fields of `Measures` and their names with units."""
+_MOST_ROWS = 64
+
+
+@dataclasses.dataclass(frozen=True)
+class FindGait:
+    """Find the periodic gait near a start; print its multipliers and its elasticities."""
+
+    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
+        default_factory=SceneOptions
+    )
+    start: Annotated[StartOptions, OmitArgPrefixes] = dataclasses.field(
+        default_factory=StartOptions
+    )
+    output: Annotated[OutputOptions, OmitArgPrefixes] = dataclasses.field(
+        default_factory=OutputOptions
+    )
+    accuracy: str = "balanced"
+    """How accurately to solve: balanced or tight."""
+    period: int = 1
+    """Footsteps in a cycle."""
+    section: str = "mid-stance"
+    """Where a cycle begins: mid-stance or heel-strike."""
+
+    def run(self) -> int:
+        """Runs the command; returns the exit code."""
+        imported = time.perf_counter()
+        scene, state = self.scene.scene(), self.start.state()
+        check_choice("section", self.section, _SECTIONS)
+        self.output.check()
+        section = _SECTIONS[self.section]()
+        gait = find_gait(scene, state, period=self.period, section=section, accuracy=self.accuracy)
+        found = gait.outcome is Search.FOUND  # waits for the result
+        wall = {
+            "import": imported - _clock.IMPORT_BEGAN,
+            "total": time.perf_counter() - _clock.IMPORT_BEGAN,
+        }
+        numbers = gait_numbers(gait) | {"wall_s": wall}
+        report = Report(self.output.json)
+        if found:
+            _print(report, numbers, gait)
+        else:
+            report.say(_failure(numbers, gait))
+        if found and self.output.out is not None:
+            for path in write_figures(gait, self.output.out):
+                report.say(f"wrote {path}")
+        report.finish(numbers)
+        return 0 if found else 1
+
+
+def write_figures(gait: Gait, out: Path) -> list[Path]:
+    """Writes the figures of a gait; returns their paths."""
+    from jaxbiped import plot
+
+    figures: dict[str, Callable[..., Any]] = {
+        "multipliers.png": plot.multipliers,
+        "elasticities.png": plot.elasticities,
+        "orbit.png": plot.gait_orbit,
+    }
+    for name, draw in figures.items():
+        draw(gait).savefig(out / name)
+    return [out / name for name in figures]
+
+
+def gait_numbers(gait: Gait) -> dict[str, Any]:
+    """What is known of a gait in SI units, ready for JSON: None for what is not a finite number."""
+    measures = gait.measures
+    values = np.asarray(gait.multipliers).tolist()
+    numbers = {
+        "ending": str(gait.outcome),
+        "period_s": float(measures.period),
+        "step_length_m": float(measures.step_length),
+        "speed_m_s": float(measures.speed),
+        "peak_normal_N": float(measures.peak_normal),
+        "state": {name: float(value) for name, value in measures.state._asdict().items()},
+        "residual": float(gait.residual),
+        "multipliers": [_parts(value) for value in values],
+        "multiplier_errors": np.asarray(gait.multiplier_errors).tolist(),
+        "unit_multiplier_error": float(gait.unit_multiplier_error),
+        "spectral_radius": float(measures.spectral_radius),
+        "stable": bool(gait.stable),
+        "bifurcation": str(gait.critical if gait.outcome is Search.FOUND else Bifurcation.NONE),
+        "sensitivities": _by_parameter(gait.parameters, gait.sensitivities),
+        "sensitivity_errors": _by_parameter(gait.parameters, gait.sensitivity_errors),
+        "elasticities": _by_parameter(gait.parameters, gait.elasticities),
+        "walk_ending": str(gait.walk_outcome),
+        "solver_steps": int(gait.solver_steps),
+    }
+    return _finite(numbers)
+
+
+def _parts(value: complex) -> list[float]:
+    """Real and imaginary part, both NaN where the number is not known."""
+    return [value.real, value.imag] if np.isfinite(value) else [math.nan, math.nan]
+
+
+def _by_parameter(parameters: tuple[str, ...], values: Measures) -> dict[str, dict[str, float]]:
+    columns = {name: np.asarray(getattr(values, field)) for field, name in _UNITS.items()}
+    columns |= {f"state.{name}": np.asarray(getattr(values.state, name)) for name in State._fields}
+    return {
+        parameter: {name: float(column[k]) for name, column in columns.items()}
+        for k, parameter in enumerate(parameters)
+    }
+
+
+def _finite(thing: Any) -> Any:
+    """The same with None for every number that is not finite."""
+    if isinstance(thing, dict):
+        return {key: _finite(value) for key, value in thing.items()}
+    if isinstance(thing, list):
+        return [_finite(value) for value in thing]
+    return None if isinstance(thing, float) and not math.isfinite(thing) else thing
+
+
+def _failure(numbers: dict[str, Any], gait: Gait) -> str:
+    """One sentence on a search that found no gait."""
+    residual, turns = numbers["residual"], int(gait.turns)
+    returned = "no trial returned" if residual is None else f"residual {residual:.2e}"
+    lost = "every trial walked on"
+    if int(gait.walk_ending) != 0:
+        lost = f"the last trial that did not return ended {numbers['walk_ending']!r}"
+    best = ", ".join(f"{name} = {_shown(value, '.6g')}" for name, value in numbers["state"].items())
+    return (
+        f"no gait found: {numbers['ending']} after {turns} cycle{'s' * (turns != 1)}, "
+        f"{returned}; {lost}; best state {best}"
+    )
+
+
+def _print(report: Report, numbers: dict[str, Any], gait: Gait) -> None:
+    report.say(_gait_table(numbers, int(gait.turns)))
+    report.say()
+    report.say(_multiplier_table(numbers))
+    report.say(
+        f"the multiplier that must be 1 is off by {_shown(numbers['unit_multiplier_error'], '.1e')}"
+    )
+    report.say(
+        f"spectral radius {_shown(numbers['spectral_radius'], '.6f')}: "
+        + ("stable" if numbers["stable"] else "NOT STABLE")
+    )
+    if gait.critical is not Bifurcation.NONE:
+        report.say(f"AT A BIFURCATION: {gait.critical} (a multiplier lies on the unit circle)")
+    report.say()
+    report.say("elasticities, d log measure / d log parameter")
+    report.say(_elasticity_table(numbers["elasticities"]))
+    wall = numbers["wall_s"]
+    report.say(f"import {wall['import']:.1f} s, total {wall['total']:.1f} s")
+
+
+def _gait_table(numbers: dict[str, Any], turns: int) -> str:
+    rows = [
+        ("period s", _shown(numbers["period_s"], ".7f")),
+        ("step length m", _shown(numbers["step_length_m"], ".7f")),
+        ("speed m/s", _shown(numbers["speed_m_s"], ".7f")),
+        ("peak force N", _shown(numbers["peak_normal_N"], ".3f")),
+        ("residual", _shown(numbers["residual"], ".1e")),
+        ("cycles of search", str(turns)),
+        ("solver steps", str(numbers["solver_steps"])),
+    ]
+    return table(("gait", "value"), rows, most=_MOST_ROWS)
+
+
+def _multiplier_table(numbers: dict[str, Any]) -> str:
+    rows = []
+    pairs = zip(numbers["multipliers"], numbers["multiplier_errors"], strict=True)
+    for k, ((real, imaginary), error) in enumerate(pairs):
+        size = None if real is None or imaginary is None else math.hypot(real, imaginary)
+        shown = [_shown(value, "z.6f") for value in (real, imaginary, size)]
+        rows.append((str(k + 1), *shown, _shown(error, ".1e")))
+    return table(("multiplier", "real", "imaginary", "absolute", "error"), rows, most=_MOST_ROWS)
+
+
+def _elasticity_table(elasticities: dict[str, dict[str, float | None]]) -> str:
+    head = ("parameter", "period", "length", "speed", "peak", "radius")
+    rows = [
+        (parameter, *(_shown(values[name], ".4g") for name in _UNITS.values()))
+        for parameter, values in elasticities.items()
+    ]
+    return table(head, rows, most=_MOST_ROWS)
+
+
+def _shown(value: float | None, form: str) -> str:
+    return "unknown" if value is None else format(value, form)

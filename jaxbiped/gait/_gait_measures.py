@@ -1,0 +1,119 @@
+"""Measures of the periodic gait as a function of the scene that JAX can differentiate."""
+
+import equinox as eqx
+import equinox.internal as eqxi
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._state import State, seed_state
+from jaxbiped.gait._gait import Gait, Measures, find_gait
+from jaxbiped.gait._gradient import AbstractGradient, Implicit
+from jaxbiped.gait._parameters import chosen_parameters
+from jaxbiped.gait._return_map import return_map
+from jaxbiped.gait._section import AbstractSection
+from jaxbiped.scene._scene import Scene
+
+_RECURRING = State._fields[1:]
+
+
+def gait_measures(
+    scene: Scene,
+    guess: State | None = None,
+    *,
+    gradient: AbstractGradient | None = None,
+    period: int = 1,
+    section: AbstractSection | None = None,
+    accuracy: str = "balanced",
+) -> Measures:
+    """Measures of the gait that `find_gait` finds, differentiable by the scene.
+
+    - `Implicit()` (the default): both modes, all measures, one search.
+    - `Forward()`, `Reverse()`: the gait is searched without derivatives, and one differentiable
+      Newton correction of it carries them; no peak force and no spectral radius (None).
+
+    NaN where no gait is found.
+
+    Args:
+        scene, guess, period, section, accuracy: as for `find_gait`.
+        gradient: how to differentiate.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled.
+        RuntimeError: a second derivative through `Implicit()`, or reverse mode through `Forward()`.
+        TypeError: forward mode through `Reverse()`.
+    """
+    gradient = Implicit() if gradient is None else gradient
+    if not isinstance(gradient, AbstractGradient):
+        raise ArgumentError(
+            f"gradient = {gradient!r} is not allowed: choose Implicit(), Forward() or Reverse()."
+        )
+    scene = jtu.tree_map(as_float, scene)
+    implicit = isinstance(gradient, Implicit)
+    gait = find_gait(
+        jax.lax.stop_gradient(scene),
+        seed_state() if guess is None else jax.lax.stop_gradient(guess),
+        period=period,
+        section=section,
+        parameters=None if implicit else (),
+        accuracy=accuracy,
+        radius_sensitivities=implicit,
+    )
+    if implicit:
+        return _by_theorem(scene, gait)
+    return _by_correction(scene, gait, gradient, period, section, accuracy)
+
+
+def _by_theorem(scene: Scene, gait: Gait) -> Measures:
+    _, active = chosen_parameters(scene, gait.parameters)
+    leaves = jtu.tree_leaves(scene)
+    parameters = jnp.stack([leaves[i] for i in active])
+    found = _where_found(gait, gait.measures)
+    return _attached(found, gait.sensitivities, parameters)
+
+
+@eqx.filter_custom_jvp
+def _attached(values: Measures, slopes: Measures, parameters: Scalar) -> Measures:
+    """The values, with derivatives known beforehand: linear, so both modes follow from it."""
+    return values
+
+
+@_attached.def_jvp
+def _attached_jvp(primals: tuple, tangents: tuple) -> tuple[Measures, Measures]:
+    values, slopes, _ = primals
+    moved = tangents[2]
+    # A second derivative would need slopes that are themselves differentiated.
+    slopes, _ = eqxi.nondifferentiable((slopes, primals[2]), name=_SECOND)
+    return values, jtu.tree_map(lambda slope: slope @ moved, slopes)
+
+
+_SECOND = "gait_measures by Implicit(), which has first derivatives only; a second"
+
+
+def _by_correction(
+    scene: Scene,
+    gait: Gait,
+    gradient: AbstractGradient,
+    period: int,
+    section: AbstractSection | None,
+    accuracy: str,
+) -> Measures:
+    """Newton's correction at the gait changes nothing but has the gait's derivatives."""
+    state = gait.measures.state
+    once = return_map(
+        scene, state, section=section, steps=period, gradient=gradient, accuracy=accuracy
+    )
+    change = jnp.stack([getattr(once.state, n) - getattr(state, n) for n in _RECURRING])
+    size = len(_RECURRING)
+    step = jnp.linalg.solve(jnp.eye(size) - gait.return_jacobian[:size], change)
+    moved = {n: getattr(state, n) + step[i] for i, n in enumerate(_RECURRING)}
+    by_period, by_length = gait.return_jacobian[size:]
+    time, length = once.time + by_period @ step, once.state.hip_x + by_length @ step
+    measures = Measures(time, length, length / time, None, None, state._replace(**moved))
+    return _where_found(gait, measures)
+
+
+def _where_found(gait: Gait, measures: Measures) -> Measures:
+    return jtu.tree_map(lambda leaf: jnp.where(gait.ending == 0, leaf, jnp.nan), measures)

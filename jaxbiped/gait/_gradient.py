@@ -1,0 +1,76 @@
+"""Gradient modes: how a derivative is taken, and what each can do."""
+
+from typing import TYPE_CHECKING
+
+import equinox as eqx
+
+from jaxbiped._checks import ArgumentError
+
+if TYPE_CHECKING:
+    from typing import ClassVar
+    from typing import ClassVar as AbstractClassVar
+else:
+    from typing import ClassVar
+
+    from equinox import AbstractClassVar
+
+
+class AbstractGradient(eqx.Module):
+    """A way to take derivatives. Each declares what it supports.
+
+    Attributes:
+        forward: whether `jax.jvp` and `jax.jacfwd` work.
+        reverse: whether `jax.vjp`, `jax.grad` and `jax.jacrev` work.
+        anywhere: whether it works off a periodic orbit.
+    """
+
+    forward: AbstractClassVar[bool]
+    reverse: AbstractClassVar[bool]
+    anywhere: AbstractClassVar[bool]
+
+
+class Forward(AbstractGradient):
+    """Tangents carried along the motion, their errors controlled: for few directions.
+
+    Every direction is one solve of its own under `jax.jacfwd`, in lockstep.
+    """
+
+    forward: ClassVar[bool] = True
+    reverse: ClassVar[bool] = False
+    anywhere: ClassVar[bool] = True
+
+
+class Reverse(AbstractGradient):
+    """Reverse mode through the solver's steps, with checkpoints: for many parameters.
+
+    The steps are chosen so that the derivatives by the whole state keep the derivatives'
+    tolerance; reverse mode then is those derivatives' transpose.
+    """
+
+    forward: ClassVar[bool] = False
+    reverse: ClassVar[bool] = True
+    anywhere: ClassVar[bool] = True
+
+
+class Implicit(AbstractGradient):
+    """The implicit function theorem at a periodic orbit: every derivative, once, for both modes.
+
+    First derivatives only: a second one is refused.
+    """
+
+    forward: ClassVar[bool] = True
+    reverse: ClassVar[bool] = True
+    anywhere: ClassVar[bool] = False
+
+
+def check_anywhere(gradient: AbstractGradient, what: str) -> None:
+    """Raises `ArgumentError` for a mode that needs a periodic orbit."""
+    if not isinstance(gradient, AbstractGradient):
+        raise ArgumentError(
+            f"gradient = {gradient!r} is not allowed: it must be Forward() or Reverse()."
+        )
+    if not gradient.anywhere:
+        raise ArgumentError(
+            f"gradient = {type(gradient).__name__}() is not allowed for {what}, which need not be "
+            "periodic: choose Forward() or Reverse()."
+        )

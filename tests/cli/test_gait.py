@@ -1,0 +1,144 @@
+"""`jaxbiped gait` as a user meets it."""
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import jaxbiped as jb
+from jaxbiped.cli import _gait as command
+from jaxbiped.cli import main
+
+MEASURES = {"period_s", "step_length_m", "speed_m_s", "peak_normal_N", "spectral_radius"}
+
+
+def _run(*arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main(["gait", *arguments])
+    return stopped.value.code
+
+
+def _read(path):
+    """A JSON file; NaN and Infinity are no JSON."""
+
+    def refuse(name):
+        raise AssertionError(name)
+
+    return json.loads(path.read_text(), parse_constant=refuse)
+
+
+@pytest.fixture(scope="module")
+def gait(tmp_path_factory):
+    """The command run once, with every output: exit code, folder and the gait."""
+    folder = tmp_path_factory.mktemp("gait")
+    found = []
+
+    def find(*arguments, **options):
+        found.append(jb.find_gait(*arguments, **options))
+        return found[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(command, "find_gait", find)
+        code = _run("--out", str(folder / "out"), "--json", str(folder / "gait.json"))
+    return code, folder, found[0]
+
+
+@pytest.fixture(scope="module")
+def numbers(gait):
+    code, folder, _ = gait
+    assert code == 0
+    return _read(folder / "gait.json")
+
+
+def test_json_keys(numbers):
+    assert set(numbers) == {
+        "ending", "period_s", "step_length_m", "speed_m_s", "peak_normal_N", "state", "residual",
+        "multipliers", "multiplier_errors", "unit_multiplier_error", "spectral_radius", "stable",
+        "bifurcation", "sensitivities", "sensitivity_errors", "elasticities", "walk_ending",
+        "solver_steps", "wall_s",
+    }  # fmt: skip
+    states = {f"state.{name}" for name in numbers["state"]}
+    assert len(states) == 8
+    for table in ("sensitivities", "sensitivity_errors", "elasticities"):
+        assert {"K", "c", "xi", "slope", "hip_mass"} <= set(numbers[table])
+        assert set(numbers[table]["K"]) == MEASURES | states
+    assert set(numbers["wall_s"]) == {"import", "total"}
+
+
+def test_the_seed_walker_s_gait(numbers):
+    assert numbers["ending"] == "found"
+    assert numbers["period_s"] == pytest.approx(0.4408349, abs=1e-6)
+    assert numbers["step_length_m"] == pytest.approx(0.1792270, abs=1e-6)
+    assert numbers["speed_m_s"] == pytest.approx(0.1792270 / 0.4408349, abs=1e-5)
+    assert numbers["stable"] is True
+    assert numbers["bifurcation"] == "none"
+    assert numbers["unit_multiplier_error"] < 1e-4
+    assert numbers["residual"] < 1e-6
+
+
+def test_multipliers_are_the_largest_first(numbers):
+    sizes = [math.hypot(*value) for value in numbers["multipliers"]]
+    assert len(sizes) == len(numbers["multiplier_errors"]) == 6
+    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[0] == pytest.approx(numbers["spectral_radius"])
+
+
+def test_elasticities_are_relative_sensitivities(numbers):
+    slopes, relative = numbers["sensitivities"]["slope"], numbers["elasticities"]["slope"]
+    for name in MEASURES:
+        assert relative[name] == pytest.approx(0.02 * slopes[name] / numbers[name], rel=1e-6)
+
+
+def test_writes_pictures(gait):
+    _, folder, _ = gait
+    names = {path.name for path in (folder / "out").iterdir()}
+    assert names == {"multipliers.png", "elasticities.png", "orbit.png"}
+    for name in names:
+        with Image.open(folder / "out" / name) as picture:
+            assert min(picture.size) > 100
+
+
+def test_a_search_that_fails_says_so(gait, tmp_path, capsys, monkeypatch):
+    unknown = np.asarray(np.nan)
+    lost = dataclasses.replace(
+        gait[2],
+        ending=np.asarray(int(jb.Search.NOT_CONVERGED)),
+        walk_ending=np.asarray(int(jb.Ending.FELL_FORWARD)),
+        residual=np.asarray(0.0123),
+        measures=gait[2].measures._replace(period=unknown),
+        multipliers=np.full(6, np.nan + 0j),
+    )
+    monkeypatch.setattr(command, "find_gait", lambda *arguments, **options: lost)
+    assert _run("--out", str(tmp_path / "out"), "--json", str(tmp_path / "gait.json")) == 1
+    printed = capsys.readouterr().out
+    assert len(printed.strip().splitlines()) == 1
+    for word in ("not converged", "1.23e-02", "fell forward", "hip_z = 0.399354"):
+        assert word in printed
+    numbers = _read(tmp_path / "gait.json")
+    assert numbers["ending"] == "not converged"
+    assert numbers["walk_ending"] == "fell forward"
+    assert numbers["period_s"] is None
+    assert numbers["multipliers"] == [[None, None]] * 6
+    assert numbers["stable"] is False
+    assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--accuracy", "nonsense"], ("accuracy", "nonsense", "balanced, tight")),
+        (["--K", "-1"], ("K", "-1", "above 0")),
+        (["--period", "0"], ("period", "0", "above 0")),
+        (["--section", "lunch"], ("section", "lunch", "mid-stance")),
+        (["--json", "/no/such/folder/x.json"], ("--json", "/no/such/folder/x.json", "folder")),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_code_2(arguments, words, capsys):
+    assert _run(*arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert len(printed.err.strip().splitlines()) == 1
+    assert all(word in printed.err for word in words)

@@ -1,0 +1,241 @@
+"""Analytic truths: an oscillator, a bouncing ball with drag, van der Pol's orbit."""
+
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import jaxbiped as jb
+from jaxbiped.gait._orbit import orbit_from
+from jaxbiped.gait._precision import precision_of
+from jaxbiped.gait._search import Method
+from jaxbiped.gait._turn import Turning
+
+
+class VanDerPol(jb.AbstractSystem):
+    def vector_field(self, t, y, args):
+        return y[1], args * (1.0 - y[0] * y[0]) * y[1] - y[0]
+
+    def switches(self, args, y):
+        return ()
+
+    def ending(self, args, y):
+        return jnp.asarray(0)
+
+    def renew(self, args, y):
+        return y
+
+    def load(self, args, y):
+        return None
+
+
+class Oscillator(jb.AbstractSystem):
+    """x'' + 2 ζ ω x' + ω² x = 0, given as (x, v) and (ω, ζ)."""
+
+    def vector_field(self, t, y, args):
+        omega, zeta = args
+        return y[1], -2.0 * zeta * omega * y[1] - omega * omega * y[0]
+
+    def switches(self, args, y):
+        return ()
+
+    def ending(self, args, y):
+        return jnp.asarray(0)
+
+    def renew(self, args, y):
+        return y
+
+    def load(self, args, y):
+        return None
+
+
+class Ball(jb.AbstractSystem):
+    """A ball in air with linear drag on a paddle: v⁺ = −e v⁻ + u at the ground."""
+
+    def vector_field(self, t, y, args):
+        drag, _, _ = args
+        return y[1], -9.8 - drag * y[1]
+
+    def switches(self, args, y):
+        return ()
+
+    def ending(self, args, y):
+        return jnp.asarray(0)
+
+    def renew(self, args, y):
+        _, restitution, paddle = args
+        return y[0], -restitution * y[1] + paddle
+
+    def load(self, args, y):
+        return None
+
+
+DOWN = jb.Section(lambda args, y: -y[0])
+TURNING_POINT = jb.Section(lambda args, y: y[1])
+MODES = {"forward": jb.Forward(), "reverse": jb.Reverse()}
+
+
+def derivative(function, mode):
+    return (jax.jacfwd if mode == "forward" else jax.jacrev)(function)
+
+
+def flight(drag, v):
+    """Time of flight and speed at the ground of a ball thrown up at v, in closed form."""
+    g, end = 9.8, 2.0 * v / 9.8
+
+    def height(t):
+        return (v + g / drag) * (1.0 - math.exp(-drag * t)) / drag - g * t / drag
+
+    t = brentq(height, 1e-3 * end, 2.0 * end, xtol=1e-15, rtol=1e-14)
+    return t, (v + g / drag) * math.exp(-drag * t) - g / drag
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_bouncing_ball_with_drag(mode):
+    v, args = 3.0, (0.3, 0.8, 1.0)
+
+    def bounce(v, drag):
+        r = jb.return_map(
+            (drag, jnp.asarray(args[1]), jnp.asarray(args[2])),
+            (jnp.asarray(0.0), v),
+            section=DOWN,
+            system=Ball(),
+            gradient=MODES[mode],
+            accuracy="tight",
+        )
+        return jnp.stack([r.state[1], r.time])
+
+    time, speed = flight(0.3, v)
+    reached = bounce(jnp.asarray(v), jnp.asarray(0.3))
+    assert reached == pytest.approx(np.array([-0.8 * speed + 1.0, time]), rel=1e-8)
+    ours = derivative(lambda both: bounce(*both), mode)(jnp.array([v, 0.3]))
+    # By the implicit function theorem on the closed form of the height.
+    h = 1e-5
+    for column, (dv, dk) in enumerate(((h, 0.0), (0.0, h))):
+        t1, s1 = flight(0.3 + dk, v + dv)
+        t0, s0 = flight(0.3 - dk, v - dv)
+        expected = np.array([-0.8 * (s1 - s0), t1 - t0]) / (2 * h)
+        assert np.asarray(ours)[:, column] == pytest.approx(expected, rel=2e-6)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_damped_oscillator_over_a_turn(mode):
+    """From a crossing of x = 0 downwards to the next: v → v exp(−2π ζ/√(1−ζ²))."""
+
+    def turned(both):
+        r = jb.return_map(
+            (both[1], both[2]),
+            (jnp.asarray(0.0), both[0]),
+            section=DOWN,
+            system=Oscillator(),
+            gradient=MODES[mode],
+            accuracy="tight",
+        )
+        return jnp.stack([r.state[1], r.time])
+
+    v, omega, zeta = -1.5, 2.0, 0.1
+    root = math.sqrt(1.0 - zeta**2)
+    factor, period = math.exp(-2 * math.pi * zeta / root), 2 * math.pi / (omega * root)
+    point = jnp.array([v, omega, zeta])
+    assert turned(point) == pytest.approx(np.array([v * factor, period]), rel=1e-7)
+    expected = np.array(
+        [
+            [factor, 0.0, v * factor * (-2 * math.pi / root**3)],
+            [0.0, -period / omega, period * zeta / root**2],
+        ]
+    )
+    assert np.asarray(derivative(turned, mode)(point)) == pytest.approx(
+        expected, rel=1e-5, abs=1e-6
+    )
+
+
+def test_van_der_pol_multiplier_and_its_sensitivities():
+    """λ = exp(∮ μ (1 − x²) dt); period, amplitude and λ against SciPy, and their derivatives."""
+
+    def reference(mu):
+        def rates(t, y):
+            f = mu * (1.0 - y[0] ** 2)
+            return [y[1], f * y[1] - y[0], f]
+
+        y = np.array([-2.0, 0.0])
+        crossing = lambda t, y: y[1]
+        crossing.direction = 1.0
+        for _ in range(12):
+            s = solve_ivp(
+                rates, (0.0, 9.0), [*y, 0.0], "DOP853", events=crossing, rtol=1e-13, atol=1e-14
+            )
+            k = int(np.flatnonzero(s.t_events[0] > 1.0)[0])
+            y, total, period = s.y_events[0][k][:2], s.y_events[0][k][2], s.t_events[0][k]
+        return np.array([y[0], period, math.exp(total)])
+
+    turning = Turning(VanDerPol(), TURNING_POINT, jb.Rodas4(), 20.0, 1, 32768)
+    orbit = jax.jit(
+        lambda mu: orbit_from(
+            turning,
+            mu,
+            (0,),
+            (jnp.asarray(-2.1), jnp.asarray(0.1)),
+            precision_of("tight"),
+            Method(None, 40, 1e-10),
+            radius=True,
+        )
+    )(jnp.asarray(1.0))
+    expected = reference(1.0)
+    slopes = (reference(1.001) - reference(0.999)) / 0.002
+    assert int(orbit.found.ending) == 0
+    assert float(orbit.state[0]) == pytest.approx(expected[0], rel=1e-8)
+    assert float(orbit.found.last.period) == pytest.approx(expected[1], rel=1e-8)
+    assert float(orbit.stability.spectral_radius) == pytest.approx(expected[2], rel=1e-5)
+    assert float(orbit.stability.unit_error) < 1e-6
+    assert float(orbit.slopes.recurring[0, 0]) == pytest.approx(slopes[0], rel=1e-5)
+    assert float(orbit.slopes.period[0]) == pytest.approx(slopes[1], rel=1e-5)
+    assert float(orbit.radius_slopes[0]) == pytest.approx(slopes[2], rel=1e-4)
+
+
+def test_bouncing_ball_in_a_cycle_of_two():
+    """A fixed point is a cycle of two as well: multiplier and period follow."""
+    args = tuple(jnp.asarray(value) for value in (0.3, 0.8, 1.0))
+    found = []
+    for steps in (1, 2):
+        turning = Turning(Ball(), DOWN, jb.Rodas4(), 20.0, steps, 32768)
+        guess = (jnp.asarray(0.0), jnp.asarray(4.0))
+        how = Method(None, 40, 1e-10)
+        orbit = orbit_from(turning, args, (0,), guess, precision_of("tight"), how, radius=True)
+        found.append(orbit)
+    once, twice = found
+    assert float(twice.found.last.period) == pytest.approx(2 * float(once.found.last.period))
+    one, two = (float(orbit.found.last.jacobian[1, 1]) for orbit in found)
+    assert two == pytest.approx(one**2, rel=1e-6)
+    for leaf in ("recurring", "period"):
+        a, b = (np.asarray(getattr(orbit.slopes, leaf)) for orbit in found)
+        assert b == pytest.approx(a * (2.0 if leaf == "period" else 1.0), rel=1e-6)
+    assert np.isfinite(float(once.radius_slopes[0]))
+    assert np.isnan(float(twice.radius_slopes[0]))  # an impact is no symmetry of the motion
+
+
+def test_modes_that_do_not_fit_are_refused():
+    state, args = (jnp.asarray(0.0), jnp.asarray(3.0)), (0.3, 0.8, 1.0)
+
+    def bounce(v, gradient):
+        start = (state[0], v)
+        found = jb.return_map(args, start, section=DOWN, system=Ball(), gradient=gradient)
+        return found.time
+
+    with pytest.raises(jb.ArgumentError, match="Implicit"):
+        bounce(state[1], jb.Implicit())
+    with pytest.raises(RuntimeError, match="no reverse mode"):
+        jax.grad(lambda v: bounce(v, jb.Forward()))(state[1])
+    with pytest.raises(TypeError, match="forward-mode"):
+        jax.jvp(lambda v: bounce(v, jb.Reverse()), (state[1],), (state[1],))
+
+
+def test_what_does_not_return_says_so():
+    up = jb.Section(lambda args, y: y[0] - 100.0)
+    args = (0.3, 0.8, 1.0)
+    state = (jnp.asarray(0.0), jnp.asarray(3.0))
+    found = jb.return_map(args, state, section=up, system=Ball(), time_limit=1.0)
+    assert jb.Ending(int(found.code)) == jb.Ending.OUT_OF_STEPS

@@ -1,0 +1,137 @@
+"""Figures of a periodic gait, from one made by hand: nothing is compiled."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+import jaxbiped as jb
+from jaxbiped.plot import elasticities, gait_orbit, multipliers
+
+PARAMETERS = ("K", "c", "l", "hip_mass")
+FIGURES = [multipliers, elasticities, gait_orbit]
+
+
+def _measures(shape=()):
+    ones = np.ones(shape)
+    return jb.Measures(*([ones] * 5), jb.State(*([ones] * 8)))
+
+
+def _orbit(passes, m=200):
+    """Legs half a turn apart on the unit circle, exchanged at each pass; NaN at the end."""
+    angle = np.linspace(0.0, np.pi, m)
+    zero = np.zeros((passes, m))
+    states = jb.State(
+        zero, zero, zero + np.cos(angle), zero - np.cos(angle), zero, zero,
+        zero + np.sin(angle), zero - np.sin(angle),
+    )  # fmt: skip
+    pad = lambda leaf: np.pad(leaf, ((0, 0), (0, 3)), constant_values=np.nan)
+    return pad(zero + np.linspace(0.0, 0.4, m)), jb.State(*map(pad, states))
+
+
+def _gait(*, passes=1, values=(0.35 + 0.29j, 0.35 - 0.29j, 0.42, 3e-4, 0, 0), **changes):
+    values = np.asarray(values, dtype=complex)
+    state = jb.State(*(np.asarray(x) for x in (0.0, 0.4, 1.0, -1.0, 0.3, 0.0, 0.0, 0.0)))
+    largest = np.asarray([0.0065, -0.2, 0.5, 0.0])
+    known = {
+        "ending": np.asarray(0),
+        "measures": _measures()._replace(spectral_radius=np.max(np.abs(values)), state=state),
+        "multipliers": values,
+        "multiplier_errors": np.full(6, 1e-4),
+        "bifurcation": np.asarray(0),
+        "elasticities": _measures((4,))._replace(
+            period=largest, peak_normal=np.asarray([np.nan, 1e-9, -2.0, 0.0])
+        ),
+        "orbit": _orbit(passes),
+        "parameters": PARAMETERS,
+    }
+    nothing = dict.fromkeys(field.name for field in dataclasses.fields(jb.Gait))
+    return jb.Gait(**(nothing | known | changes))
+
+
+def test_multipliers_and_the_unit_circle():
+    figure = multipliers(_gait())
+    (ax,) = figure.axes
+    points = next(line for line in ax.lines if line.get_label() == "multipliers")
+    assert next(zip(*points.get_data(), strict=True)) == (0.35, 0.29)
+    (circle,) = [patch for patch in ax.patches if isinstance(patch, Circle)]
+    assert circle.radius == 1.0
+    assert "0.4545" in ax.get_title(loc="left")
+    assert ax.get_title(loc="left").endswith("\nstable")
+    texts = [text.get_text() for text in ax.texts]
+    assert "0.350 ± 0.290 i" in texts
+    assert any(text.startswith("3 near 0") for text in texts)
+
+
+def test_an_unstable_gait_stays_inside_the_frame_and_names_its_bifurcation():
+    errors = np.asarray([0.1, 1e-4, 1e-4, 1e-4, 1e-4, 1e-4])
+    values = (-1.6, 0.4, 0.1, 0.0, 0.0, 0.0)
+    gait = _gait(values=values, multiplier_errors=errors, bifurcation=np.asarray(2))
+    (ax,) = multipliers(gait).axes
+    assert "not stable" in ax.get_title(loc="left")
+    assert "period doubling" in ax.get_title(loc="left")
+    assert ax.get_xlim()[0] < -1.7
+    discs = [patch.radius for patch in ax.patches]
+    assert discs == [1.0, 0.1]
+
+
+def test_tornado_has_the_largest_on_top_and_says_every_number():
+    (ax,) = elasticities(_gait(), "period").axes
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["l", "c", "K", "hip_mass"]
+    assert [bar.get_width() for bar in ax.patches] == [0.5, -0.2, 0.0065, 0.0]
+    assert [text.get_text() for text in ax.texts] == ["+0.5", "−0.2", "+0.0065", "0"]
+    bottom, top = ax.get_ylim()
+    assert bottom > top
+    assert ax.get_xlim()[1] > 0.5
+
+
+def test_tornado_of_all_measures_and_unknown_last():
+    axes = elasticities(_gait()).axes
+    titles = [ax.get_title(loc="left") for ax in axes[:5]]
+    assert titles == ["period", "step length", "speed", "peak normal force", "spectral radius"]
+    names = [label.get_text() for label in axes[3].get_yticklabels()]
+    assert names == ["l", "c", "hip_mass", "K"]
+    assert axes[3].texts[-1].get_text() == "unknown"
+
+
+@pytest.mark.parametrize("measure", ["hop", (), ("period", "hop")])
+def test_measures_have_names(measure):
+    with pytest.raises(jb.ArgumentError, match="measure"):
+        elasticities(_gait(), measure)
+
+
+@pytest.mark.parametrize("passes", [1, 2, 3])
+def test_both_legs_make_closed_curves(passes):
+    (ax,) = gait_orbit(_gait(passes=passes)).axes
+    first, second = (
+        np.transpose(line.get_data()) for line in ax.lines if line.get_label().startswith("leg")
+    )
+    assert len(first) == passes * 200
+    assert np.isfinite(first).all()
+    ends = (second, first) if passes % 2 else (first, second)
+    np.testing.assert_allclose(first[-1], ends[0][0], atol=1e-12)
+    np.testing.assert_allclose(second[-1], ends[1][0], atol=1e-12)
+    jumps = np.hypot(*np.diff(first, axis=0).T)
+    assert jumps.max() < 0.1
+
+
+def test_orbit_marks_the_section():
+    (ax,) = gait_orbit(_gait()).axes
+    dots = [tuple(line.get_xydata()[0]) for line in ax.lines if line.get_marker() == "o"]
+    assert dots == [(1.0, 0.0), (-1.0, 0.0)]
+    assert "(rad)" in ax.get_xlabel()
+    assert "(rad/s)" in ax.get_ylabel()
+
+
+@pytest.mark.parametrize("draw", FIGURES)
+def test_figures_are_written_and_what_is_no_gait_is_refused(draw, tmp_path):
+    figure = draw(_gait())
+    assert isinstance(figure, Figure)
+    figure.savefig(tmp_path / "figure.png")
+    assert (tmp_path / "figure.png").stat().st_size > 5000
+    with pytest.raises(jb.ArgumentError, match="not converged"):
+        draw(_gait(ending=np.asarray(2)))
+    with pytest.raises(jb.ArgumentError, match="batch"):
+        draw(_gait(ending=np.zeros(3, dtype=int)))
