@@ -1,4 +1,4 @@
-# `make walk` runs the main job, `make gait` finds the periodic gait, `make test` runs all checks.
+# `make gait` runs the main job, `make walk` simulates the walker, `make test` runs all checks.
 # Each sets up what it needs in .venv inside this checkout; repeated runs do not set up again.
 PYTHON ?= python3
 VENV := .venv

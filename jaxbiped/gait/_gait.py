@@ -13,12 +13,13 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._state import State, checked_state, seed_state
+from jaxbiped.dynamics._state import State, checked_state
 from jaxbiped.gait._orbit import Orbit, orbit_from
 from jaxbiped.gait._parameters import chosen_parameters
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._search import Method, Search
 from jaxbiped.gait._section import AbstractSection, MidStance
+from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.gait._system import Walking
 from jaxbiped.gait._turn import Turning
@@ -147,7 +148,8 @@ def find_gait(
 
     Args:
         scene: the walker.
-        guess: a start near the gait, on the section or not; the seed's start unless given.
+        guess: a start near the gait, on the section or not; unless given, the seed's start, its
+            stance foot set down as deep for the scene's own legs and rolling as fast.
         period: footsteps in a cycle.
         section: where the cycle begins, `MidStance()` unless given.
         parameters: names of the parameters to differentiate by (see `parameter_names`); all of
@@ -172,7 +174,7 @@ def find_gait(
     check_positive("period", period)
     if int(period) != period:
         raise ArgumentError(f"period = {period} is not allowed: it must be a whole number.")
-    start = checked_state(seed_state() if guess is None else guess)
+    start = checked_state(seed_start(scene) if guess is None else guess)
     if jnp.ndim(start.hip_z) != 0:
         raise ArgumentError(
             f"guess has leaves of shape {jnp.shape(start.hip_z)}: give one state, and use jax.vmap "

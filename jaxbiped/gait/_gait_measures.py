@@ -8,7 +8,7 @@ import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._state import State, seed_state
+from jaxbiped.dynamics._state import State
 from jaxbiped.gait._gait import Gait, Measures, find_gait
 from jaxbiped.gait._gradient import AbstractGradient, Implicit
 from jaxbiped.gait._parameters import chosen_parameters
@@ -54,7 +54,7 @@ def gait_measures(
     implicit = isinstance(gradient, Implicit)
     gait = find_gait(
         jax.lax.stop_gradient(scene),
-        seed_state() if guess is None else jax.lax.stop_gradient(guess),
+        None if guess is None else jax.lax.stop_gradient(guess),
         period=period,
         section=section,
         parameters=None if implicit else (),
@@ -70,8 +70,7 @@ def _by_theorem(scene: Scene, gait: Gait) -> Measures:
     _, active = chosen_parameters(scene, gait.parameters)
     leaves = jtu.tree_leaves(scene)
     parameters = jnp.stack([leaves[i] for i in active])
-    found = _where_found(gait, gait.measures)
-    return _attached(found, gait.sensitivities, parameters)
+    return _where_found(gait, _attached(gait.measures, gait.sensitivities, parameters))
 
 
 @eqx.filter_custom_jvp
@@ -116,4 +115,6 @@ def _by_correction(
 
 
 def _where_found(gait: Gait, measures: Measures) -> Measures:
-    return jtu.tree_map(lambda leaf: jnp.where(gait.ending == 0, leaf, jnp.nan), measures)
+    # A factor, not a choice: derivatives become NaN as well.
+    factor = jnp.where(gait.ending == 0, 1.0, jnp.nan)
+    return jtu.tree_map(lambda leaf: leaf * factor, measures)

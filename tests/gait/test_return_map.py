@@ -209,10 +209,10 @@ def test_bouncing_ball_in_a_cycle_of_two():
     once, twice = found
     assert float(twice.found.last.period) == pytest.approx(2 * float(once.found.last.period))
     one, two = (float(orbit.found.last.jacobian[1, 1]) for orbit in found)
-    assert two == pytest.approx(one**2, rel=1e-6)
+    assert two == pytest.approx(one**2, rel=1e-5)
     for leaf in ("recurring", "period"):
         a, b = (np.asarray(getattr(orbit.slopes, leaf)) for orbit in found)
-        assert b == pytest.approx(a * (2.0 if leaf == "period" else 1.0), rel=1e-6)
+        assert b == pytest.approx(a * (2.0 if leaf == "period" else 1.0), rel=1e-5, abs=1e-6)
     assert np.isfinite(float(once.radius_slopes[0]))
     assert np.isnan(float(twice.radius_slopes[0]))  # an impact is no symmetry of the motion
 

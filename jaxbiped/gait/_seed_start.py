@@ -1,0 +1,26 @@
+"""Where a search begins that was given no guess."""
+
+import jax.numpy as jnp
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._feet import standing_height
+from jaxbiped.dynamics._state import State, seed_state
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene._walker import Walker
+
+
+def seed_start(scene: Scene) -> State:
+    """The seed's start, fitted to the scene's legs."""
+    seed, own = seed_state(), seed_scene()
+    depth = standing_height(own, seed.theta_2) - seed.hip_z
+
+    def reach(walker: Walker) -> tuple[Scalar, Scalar]:
+        return walker.hip_to_foot * jnp.cos(seed.theta_2) + walker.r, walker.hip_to_foot
+
+    (forward, up), (own_forward, own_up) = reach(scene.walker), reach(own.walker)
+    return seed._replace(
+        hip_z=standing_height(scene, seed.theta_2, depth),
+        hip_vx=seed.hip_vx * forward / own_forward,
+        hip_vz=seed.hip_vz * up / own_up,
+    )

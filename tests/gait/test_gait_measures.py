@@ -1,0 +1,41 @@
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import jaxbiped as jb
+
+
+def measured(log_changes, gradient):
+    """Period and step length as functions of log K, log c and log l."""
+    k, c, length = jnp.exp(log_changes)
+    scene = jb.seed_scene(K=1e6 * k, c=1e7 * c, l=0.4 * length)
+    measures = jb.gait_measures(scene, gradient=gradient)
+    return jnp.stack([measures.period, measures.step_length])
+
+
+@jax.jit
+def implicitly(point):
+    return measured(point, jb.Implicit()), jax.jacrev(lambda p: measured(p, jb.Implicit()))(point)
+
+
+@jax.jit
+def forwards(point, direction):
+    return jax.jvp(lambda p: measured(p, jb.Forward()), (point,), (direction,))
+
+
+@settings(max_examples=3, deadline=None)
+@given(st.lists(st.floats(-0.03, 0.03), min_size=3, max_size=3))
+def test_forward_and_implicit_gradients_agree_on_random_scenes(changes):
+    point, direction = jnp.array(changes), jnp.array([1.0, -0.5, 0.2])
+    value, jacobian = implicitly(point)
+    again, slope = forwards(point, direction)
+    assert np.asarray(again) == pytest.approx(np.asarray(value), abs=1e-5)
+    assert np.asarray(slope) == pytest.approx(np.asarray(jacobian @ direction), rel=5e-4, abs=1e-6)
+
+
+def test_gradient_must_be_a_mode():
+    with pytest.raises(jb.ArgumentError, match="gradient"):
+        jb.gait_measures(jb.seed_scene(), gradient="forward")
