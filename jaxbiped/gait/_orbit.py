@@ -4,14 +4,13 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._search import Found, Method, search
 from jaxbiped.gait._second_turn import second_turn
 from jaxbiped.gait._stability import Stability, stability_of
-from jaxbiped.gait._turn import Turn, Turning, recurring_places, seeded, state_with
+from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with
 from jaxbiped.solve._passage import Precision
 
 CLOSENESS = 1e-3
@@ -75,9 +74,7 @@ def orbit_from(
     state = state_with(turning.system, guess, found.recurring)
     m = found.recurring.shape[0]
     rates = turning.system.vector_field(jnp.zeros(()), state, args)
-    velocity = jnp.stack(jtu.tree_leaves(rates))[
-        jnp.asarray(recurring_places(turning.system, state))
-    ]
+    velocity = recurring_of(turning.system, rates)
     last, coarse = found.last, found.coarse
     stability = stability_of(last.monodromy[:, :m], coarse.monodromy[:, :m], velocity, CLOSENESS)
     slopes, looser = (slopes_of(each) for each in (last, coarse))

@@ -24,7 +24,6 @@ _RADAU = np.array(
 )
 Rates = Callable[[Scalar], Scalar]
 """Components and parameters in one vector (c + p,) to the rates (c,)."""
-"""Components and parameters in one vector (c + p,) to the rates (c,)."""
 
 
 class Path(NamedTuple):

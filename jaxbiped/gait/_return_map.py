@@ -127,7 +127,7 @@ def _forward(
 def _forward_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
     turning, precision, args, state = primals
     _, _, args_dot, state_dot = tangents
-    args_leaves, structure = jtu.tree_flatten(args)
+    args_leaves = jtu.tree_leaves(args)
     column = jnp.stack(_dense(state_dot, state))[:, None]
     seeds = _dense(args_dot, args)
     relative = [d / jnp.where(v == 0.0, 1.0, v) for d, v in zip(seeds, args_leaves, strict=True)]

@@ -121,8 +121,7 @@ def search(
         latest = run(now.trial, now.stage)
         active_lane = now.stage < _Stage.FOUND
         after = _progressed(now, latest, method)
-        after = jax.tree.map(lambda a, b: jnp.where(active_lane, a, b), after, now)
-        return after
+        return jax.tree.map(lambda a, b: jnp.where(active_lane, a, b), after, now)
 
     def goes_on(now: _Progress) -> Scalar:
         return (now.stage < _Stage.FOUND) & (now.turns < method.most_turns)

@@ -157,7 +157,8 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
         if watch.section is not None:
             arrives = crossed[-1] & (at_end[-1].value > 0.0) & (landed.accepted > 0)
             crossed[-1] = arrives
-        switching = crossed[: len(watch.switches(scene, before))]
+        others = (watch.peak is not None) + (watch.section is not None)
+        switching = crossed[: len(crossed) - others]
         jumps = [c for c, s in zip(switching, at_end, strict=False) if s.force_jumps]
         any_crossed = functools.reduce(jnp.logical_or, crossed, jnp.asarray(False))
 

@@ -13,16 +13,13 @@ from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._landing import Landed, Landing, Watch
+from jaxbiped.solve._step_control import first_step, step_control
 from jaxbiped.solve._tangents import (
     TangentControl,
     TangentSolver,
     VariationalField,
     worst_norm,
 )
-
-_FIRST_STEP = 1e-5
-_SMALLEST_STEP = 1e-12
-_SAFETY = 0.8
 
 
 class Precision(NamedTuple):
@@ -79,14 +76,8 @@ def passage(
     `precision.tangent_rtol`.
     """
     carries = isinstance(y0, Tangents)
-    controller: Any = diffrax.PIDController(
-        rtol=precision.rtol,
-        atol=1e-2 * precision.rtol,
-        norm=worst_norm if carries else rms_norm,
-        dtmin=_SMALLEST_STEP,
-        safety=_SAFETY,
-        force_dtmin=True,
-    )
+    norm = worst_norm if carries else rms_norm
+    controller: Any = step_control(precision.rtol, 1e-2 * precision.rtol, norm)
     field: Any = watch.field
     if carries:
         controller = TangentControl.around(controller, precision.tangent_rtol)
@@ -101,7 +92,7 @@ def passage(
         solver,
         t0=jnp.zeros_like(limit),
         t1=limit,
-        dt0=jnp.minimum(jnp.full_like(limit, _FIRST_STEP), limit),
+        dt0=first_step(limit),
         y0=y0,
         args=args,
         saveat=diffrax.SaveAt(subs=subs, controller_state=True),

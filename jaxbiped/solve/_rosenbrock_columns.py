@@ -20,8 +20,6 @@ from jaxbiped.solve._rosenbrock import (
     stages_of,
 )
 
-_MOST_SCALARS = 24
-
 
 def rosenbrock_columns(
     tableau: RosenbrockTableau,
@@ -43,7 +41,8 @@ def rosenbrock_columns(
     """
     start, join = split(y0.state)
     parameters = active_leaves(args)
-    if len(start) > _MOST_SCALARS or any(jnp.ndim(leaf) for leaf in jax.tree.leaves(y0.state)):
+    # `split` glues many scalars into one array, too.
+    if any(jnp.ndim(leaf) for leaf in (*start, *jax.tree.leaves(y0.state))):
         return None
 
     def rates(t: Scalar, y: Components, q: Sequence[Scalar]) -> Components:

@@ -18,15 +18,9 @@ from jaxbiped.solve._accuracy import check_precision, rms_norm, tolerances
 from jaxbiped.solve._ending import WATCHES, Ending, ending_events
 from jaxbiped.solve._footstep_limit import FootstepLimit
 from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve._step_control import first_step, step_control
 from jaxbiped.solve._trajectory import Trajectory
 
-_FIRST_STEP = 1e-5
-"""First step tried [s]; a start that is not a number must not choose it."""
-_SMALLEST_STEP = 1e-12
-"""Step size [s] that is taken whatever its error: how a jump of the force is crossed."""
-_SAFETY = 0.8
-"""Of the step size that the error estimate allows. At diffrax's 0.9 the contact's switches reject
-so many steps that the same error takes more of them."""
 _PATIENCE = 100.0
 """Time allowed for each footstep asked for [s]."""
 
@@ -181,14 +175,7 @@ class CompiledSimulation:
 
 @eqx.filter_jit
 def _solve(run: Simulation) -> Trajectory:
-    controller: Any = diffrax.PIDController(
-        rtol=run.rtol,
-        atol=run.atol,
-        norm=rms_norm,
-        dtmin=_SMALLEST_STEP,
-        safety=_SAFETY,
-        force_dtmin=True,  # a state that is no longer a number ends the solve by event
-    )
+    controller: Any = step_control(run.rtol, run.atol, rms_norm)
     if run.steps is not None:
         controller = FootstepLimit.around(controller, run.steps)
     events = ending_events(run.watch)
@@ -198,7 +185,7 @@ def _solve(run: Simulation) -> Trajectory:
         run.solver,
         t0=zero,
         t1=run.duration,
-        dt0=jnp.minimum(jnp.full_like(zero, _FIRST_STEP), run.duration),
+        dt0=first_step(run.duration),
         y0=run.state,
         args=run.scene,
         saveat=_saveat(run),

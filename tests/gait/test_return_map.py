@@ -16,9 +16,8 @@ from jaxbiped.gait._search import Method
 from jaxbiped.gait._turn import Turning
 
 
-class VanDerPol(jb.AbstractSystem):
-    def vector_field(self, t, y, args):
-        return y[1], args * (1.0 - y[0] * y[0]) * y[1] - y[0]
+class Smooth(jb.AbstractSystem):
+    """Without switches, endings or load."""
 
     def switches(self, args, y):
         return ()
@@ -26,52 +25,40 @@ class VanDerPol(jb.AbstractSystem):
     def ending(self, args, y):
         return jnp.asarray(0)
 
-    def renew(self, args, y):
-        return y
-
     def load(self, args, y):
         return None
 
 
-class Oscillator(jb.AbstractSystem):
+class Flowing(Smooth):
+    """Nothing is done to the state at an arrival."""
+
+    def renew(self, args, y):
+        return y
+
+
+class VanDerPol(Flowing):
+    def vector_field(self, t, y, args):
+        return y[1], args * (1.0 - y[0] * y[0]) * y[1] - y[0]
+
+
+class Oscillator(Flowing):
     """x'' + 2 ζ ω x' + ω² x = 0, given as (x, v) and (ω, ζ)."""
 
     def vector_field(self, t, y, args):
         omega, zeta = args
         return y[1], -2.0 * zeta * omega * y[1] - omega * omega * y[0]
 
-    def switches(self, args, y):
-        return ()
 
-    def ending(self, args, y):
-        return jnp.asarray(0)
-
-    def renew(self, args, y):
-        return y
-
-    def load(self, args, y):
-        return None
-
-
-class Ball(jb.AbstractSystem):
+class Ball(Smooth):
     """A ball in air with linear drag on a paddle: v⁺ = −e v⁻ + u at the ground."""
 
     def vector_field(self, t, y, args):
         drag, _, _ = args
         return y[1], -9.8 - drag * y[1]
 
-    def switches(self, args, y):
-        return ()
-
-    def ending(self, args, y):
-        return jnp.asarray(0)
-
     def renew(self, args, y):
         _, restitution, paddle = args
         return y[0], -restitution * y[1] + paddle
-
-    def load(self, args, y):
-        return None
 
 
 DOWN = jb.Section(lambda args, y: -y[0])
