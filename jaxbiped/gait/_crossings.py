@@ -10,9 +10,8 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._radau import Rates, gradients, with_seeds
 
-_MARGIN, _SHARE = 1e-12, 1e-3
-"""Least time from a switch [s], and least share of a step's overshoot, at which its sides are
-looked at: far enough to be sure of the side, near enough that only the jump is seen."""
+MARGIN = 1e-12
+"""Least time from a switch [s] at which its sides are looked at: enough to be sure of the side."""
 
 
 class Crossings(NamedTuple):
@@ -23,14 +22,14 @@ class Crossings(NamedTuple):
     Attributes:
         crossed: whether there is one.
         past: time from the switch to the step's end [s]; 0 where there is none.
-        margin: time from the switch at which its sides are looked at [s].
+        landed: states on the switch, or the steps' ends where there is none, shape (steps, c).
         early: how much earlier a change of components and parameters makes the crossing,
             shape (steps, c + p).
     """
 
     crossed: Scalar
     past: Scalar
-    margin: Scalar
+    landed: Scalar
     early: Scalar
 
 
@@ -48,23 +47,34 @@ def crossings_of(
         return jnp.stack([jnp.asarray(False), *(jnp.asarray(s.live) for s in surfaces(z))])
 
     def one(before: Scalar, after: Scalar) -> Crossings:
-        old, z = (jnp.concatenate([y, parameters]) for y in (before, after))
-        rate = jnp.concatenate([rates(z), jnp.zeros_like(parameters)])
-        past, gradients = values(z), jax.jacrev(values)(z)
-        crossed = ((values(old) > 0.0) != (past > 0.0)) & (live(old) | live(z))
+        old, new = (jnp.concatenate([y, parameters]) for y in (before, after))
+        idle = jnp.zeros_like(parameters)
+
+        def rate(z: Scalar) -> Scalar:
+            return jnp.concatenate([rates(z), idle])
+
+        def back(past: Scalar) -> Scalar:
+            return new - past * rate(new - 0.5 * past * velocity)
+
+        velocity = rate(new)
+        beyond, slopes = jax.jvp(values, (new,), (velocity,))
+        crossed = ((values(old) > 0.0) != (beyond > 0.0)) & (live(old) | live(new))
         which = jnp.argmax(crossed)
-        gradient, found = gradients[which], crossed[which]
-        slope = jnp.where(found, gradient @ rate, 1.0)
-        time_past = jnp.where(found, past[which] / slope, 0.0)
-        margin = jnp.maximum(_MARGIN, _SHARE * time_past)
-        return Crossings(found, time_past, margin, jnp.where(found, gradient / slope, 0.0))
+        found = crossed[which]
+        slope = jnp.where(found, slopes[which], 1.0)
+        first = jnp.where(found, beyond[which] / slope, 0.0)
+        # The switch's rate changes fast: once more from there.
+        past = first + jnp.where(found, values(back(first))[which] / slope, 0.0)
+        z = back(past)
+        gradient = jax.jacrev(values)(z)[which]
+        early = jnp.where(found, gradient / jnp.where(found, gradient @ rate(z), 1.0), 0.0)
+        return Crossings(found, past, z[: after.shape[0]], early)
 
     return jax.vmap(one)(before, after)
 
 
 def jumps_of(
     rates: Rates,
-    after: Scalar,
     crossings: Crossings,
     parameters: Scalar,
     firsts: Scalar,
@@ -73,11 +83,17 @@ def jumps_of(
 ) -> Scalar:
     """Jumps of C at the end of each step, shape (steps, c, q, v); zero where none is crossed."""
     field = jax.vmap(lambda y: rates(jnp.concatenate([y, parameters])))
-    back = crossings.past[:, None] + crossings.margin[:, None] * jnp.array([-1.0, 1.0, -2.0, 2.0])
-    points = after[:, None] - back[..., None] * field(after)[:, None]
-    new, old, further, older = jnp.moveaxis(gradients(rates, points, parameters), 1, 0)
-    # Extrapolated to the switch itself: the Jacobian varies fast on either side.
-    jump = 2.0 * (new - old) - (further - older)
+    away = MARGIN * jnp.array([1.0, 4.0, 16.0, -1.0, -4.0, -16.0])
+    on = crossings.landed
+    points = on[:, None] + away[:, None] * field(on)[:, None]
+    near, further, far = (
+        jnp.moveaxis(gradients(rates, points, parameters), 1, 0)
+        .reshape(2, 3, *on.shape, -1)
+        .swapaxes(0, 1)
+    )
+    # Extrapolated to the switch itself, in the root of time: so Hertz's law leaves it.
+    at_switch = (8.0 * near - 6.0 * further + far) / 3.0
     moved = with_seeds(firsts, seeds)
     early = jnp.einsum("sz,szq->sq", crossings.early, moved[..., count:])
-    return jnp.einsum("scv,sq->scqv", jump @ moved[..., :count], early)
+    jump = (at_switch[0] - at_switch[1]) @ moved[..., :count]
+    return jnp.einsum("scv,sq->scqv", jump, early)

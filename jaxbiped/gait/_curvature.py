@@ -11,6 +11,7 @@ method runs in the root of that time, in which it is smooth.
 """
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,7 +19,7 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._bent import Bent
-from jaxbiped.gait._crossings import Crossings, crossings_of, jumps_of
+from jaxbiped.gait._crossings import MARGIN, Crossings, crossings_of, jumps_of
 from jaxbiped.gait._radau import (
     Path,
     Rates,
@@ -68,19 +69,43 @@ def along_path(
     times = jnp.where(known, times, last_time)
     states = jnp.where(known[:, None], states, last_state)
 
-    def chunk(carried: tuple[Scalar, Scalar, Bent]) -> tuple[Scalar, Scalar, Bent]:
-        start, switched, now = carried
+    def chunk(carried: tuple[Scalar, _Reached, Bent]) -> tuple[Scalar, _Reached, Bent]:
+        start, reached, now = carried
         t = jax.lax.dynamic_slice_in_dim(times, start, CHUNK + 1)
         y = jax.lax.dynamic_slice_in_dim(states, start, CHUNK + 1)
         found = crossings_of(rates, surfaces, y[:-1], y[1:], parameters)
-        latest = jnp.where(found.crossed, t[1:], -jnp.inf)
-        latest = jax.lax.cummax(jnp.concatenate([switched[None], latest]))
-        path = Path(y[:-1], y[1:], t[:-1], jnp.diff(t), latest[:-1])
+        path, reached = _path(reached, t[1:] - found.past, found)
         after = _chunk(rates, path, found, parameters, now, seeds, count)
-        return start + CHUNK, latest[-1], after
+        return start + CHUNK, reached, after
 
-    begin = (jnp.asarray(0), times[0] - _LONG_AGO, bent)
+    never = jnp.asarray(False)
+    reached = _Reached(times[0], states[0], never, times[0] - _LONG_AGO)
+    begin = (jnp.asarray(0), reached, bent)
     return jax.lax.while_loop(lambda c: c[0] < steps, chunk, begin)[2]
+
+
+class _Reached(NamedTuple):
+    """Where a chunk begins: time and state, whether on a switch, and the last switch's time."""
+
+    time: Scalar
+    state: Scalar
+    on_switch: Scalar
+    switched: Scalar
+
+
+def _path(reached: _Reached, times: Scalar, crossings: Crossings) -> tuple[Path, _Reached]:
+    """The steps of a chunk; those that ended past a switch end on it."""
+
+    def begun(first: Scalar, rest: Scalar) -> Scalar:
+        return jnp.concatenate([first[None], rest])
+
+    clock, states = begun(reached.time, times), begun(reached.state, crossings.landed)
+    fresh = begun(reached.on_switch, crossings.crossed)
+    latest = jnp.where(crossings.crossed, times, -jnp.inf)
+    latest = jax.lax.cummax(begun(reached.switched, latest))
+    span = jnp.maximum(jnp.diff(clock), 0.0)
+    path = Path(states[:-1], states[1:], clock[:-1], span, latest[:-1], fresh[:-1])
+    return path, _Reached(clock[-1], states[-1], fresh[-1], latest[-1])
 
 
 def _chunk(
@@ -95,10 +120,10 @@ def _chunk(
     c = path.before.shape[1]
     part, share = path.clock()
     points = collocation_points(rates, path, part, share, parameters)
-    # A step that ends past a switch belongs to the old side up to its end.
-    back = jnp.where(crossings.crossed, crossings.past + crossings.margin, 0.0)[:, None]
     field = jax.vmap(lambda y: rates(jnp.concatenate([y, parameters])))
-    points = points.at[:, 2].add(-back * field(points[:, 2]))
+    # A step that ends on a switch belongs to the old side; a corrected point may lie beyond.
+    short = path.after - MARGIN * field(path.after)
+    points = points.at[:, 2].set(jnp.where(crossings.crossed[:, None], short, points[:, 2]))
     jacobians = gradients(rates, points, parameters)
     inverse = jnp.linalg.inv(collocation_matrix(jacobians[..., :c], share))
     units = jnp.tile(jnp.eye(c), (3, 1))
@@ -107,10 +132,18 @@ def _chunk(
     stage_map = inverse @ jnp.concatenate([units, forcing], axis=-1)
     step_map = stage_map[:, 2 * c :]
 
-    def follow(first: Scalar, step: Scalar) -> tuple[Scalar, Scalar]:
-        return step @ jnp.concatenate([first, seeds]), first
+    at_start = gradients(rates, path.before[:, None], parameters)[:, 0]
+    velocities = field(path.before)
 
-    last, firsts = jax.lax.scan(follow, bent.first, step_map)
+    def follow(first: Scalar, known: tuple[Scalar, ...]) -> tuple[Scalar, tuple[Scalar, ...]]:
+        step, velocity, fresh = known
+        shift = jnp.where(fresh, 0.0, (velocity @ first) / (velocity @ velocity))
+        begun = first - velocity[:, None] * shift
+        end = step @ jnp.concatenate([begun, seeds])
+        return end, (first, shift, begun, end)
+
+    steps = (step_map, velocities, path.fresh)
+    last, (arrived, shifts, firsts, ends) = jax.lax.scan(follow, bent.first, steps)
     seeded = jnp.broadcast_to(seeds, (firsts.shape[0], *seeds.shape))
     at_stages = stage_map @ jnp.concatenate([firsts, seeded], axis=1)
     at_stages = at_stages.reshape(-1, 3, c, seeds.shape[1])
@@ -122,12 +155,17 @@ def _chunk(
 
     by_direction = jax.vmap(source, in_axes=(-1, -1), out_axes=-1)
     sources = by_direction(at_stages[..., :count], seeds[:, :count])
-    ends = jnp.concatenate([firsts[1:], last[None]])
-    jumps = jumps_of(rates, path.after, crossings, parameters, ends, seeds, count)
+    jumps = jumps_of(rates, crossings, parameters, ends, seeds, count)
+    turned = jnp.einsum("sab,sb->sa", at_start[..., :c], velocities)
+    swings = at_start @ with_seeds(arrived, seeds)
+    by_v, by_q = shifts[:, :count], shifts[:, count:]
+    shifted = jnp.einsum("sa,sq,sv->saqv", turned, by_q, by_v)
+    shifted = shifted - jnp.einsum("sav,sq->saqv", swings[..., :count], by_q)
+    shifted = shifted - jnp.einsum("saq,sv->saqv", swings[..., count:], by_v)
 
-    def gather(second: Scalar, step: tuple[Scalar, Scalar]) -> tuple[Scalar, None]:
-        matrix, source = step
-        return jnp.einsum("ab,bqv->aqv", matrix, second) + source, None
+    def gather(second: Scalar, step: tuple[Scalar, ...]) -> tuple[Scalar, None]:
+        matrix, shifted, source = step
+        return jnp.einsum("ab,bqv->aqv", matrix, second + shifted) + source, None
 
-    second, _ = jax.lax.scan(gather, bent.second, (step_map[..., :c], sources + jumps))
+    second, _ = jax.lax.scan(gather, bent.second, (step_map[..., :c], shifted, sources + jumps))
     return Bent(last, second)

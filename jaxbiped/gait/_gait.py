@@ -24,12 +24,11 @@ from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.gait._system import Walking
 from jaxbiped.gait._turn import Turning
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._passage import Precision
 from jaxbiped.solve._solvers import solver_named
 
-_RESIDUAL_SHARE = 0.1
+_RESIDUAL_SHARE = 0.3
 """Residual that counts as none, in units of the state's tolerance."""
 _NOTHING = 1e-9
 """A measure (SI units) that is zero but for the solve's error has no elasticity."""
@@ -184,7 +183,7 @@ def find_gait(
     check_positive("most_turns", most)
     scene = jtu.tree_map(as_float, scene)
     names, active = chosen_parameters(scene, parameters)
-    rtol = ACCURACIES[accuracy]
+    precision = precision_of(accuracy)
     turning = Turning(
         system=Walking(),
         section=MidStance() if section is None else section,
@@ -196,9 +195,8 @@ def find_gait(
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
         most_turns=int(most),
-        residual=_RESIDUAL_SHARE * rtol,
+        residual=_RESIDUAL_SHARE * precision.rtol,
     )
-    precision = precision_of(accuracy)
     return _find(turning, scene, start, precision, how, names, active, radius_sensitivities)
 
 

@@ -33,6 +33,7 @@ class Path(NamedTuple):
         before, after: states, shape (steps, c).
         start, span: times of their starts and their durations [s], shape (steps,).
         switched: time of the last switch before each [s].
+        fresh: whether a step starts on a switch.
     """
 
     before: Scalar
@@ -40,6 +41,7 @@ class Path(NamedTuple):
     start: Scalar
     span: Scalar
     switched: Scalar
+    fresh: Scalar
 
     def clock(self) -> tuple[Scalar, Scalar]:
         """Of the collocation points: the part of the step before each, and its share of time.

@@ -15,8 +15,10 @@ from jaxbiped.solve._passage import Precision
 
 LOOSER = 10.0
 """How much looser the search is solved before its last turns, and the witness of their error."""
-_COARSE = 1e-4
-"""Residual up to which the looser solves search."""
+_ROUGH = Precision(3e-6, 3e-4)
+"""How exactly the search is solved until it is near."""
+_NEAR, _NEARER = 1e-3, 1e-4
+"""Residuals at which rough solves give way to coarse ones, and these to fine ones."""
 _FIRST_DAMPING, _LARGEST_DAMPING = 1e-3, 1e8
 
 
@@ -77,11 +79,12 @@ class Found(NamedTuple):
 
 class _Stage(enum.IntEnum):
     APPROACH = 0
-    COARSE = 1
-    FINE = 2
-    FOUND = 3
-    NO_RETURN = 4
-    STUCK = 5
+    ROUGH = 1
+    COARSE = 2
+    FINE = 3
+    FOUND = 4
+    NO_RETURN = 5
+    STUCK = 6
 
 
 class _Progress(NamedTuple):
@@ -106,14 +109,18 @@ def search(
     precision: Precision,
     method: Method,
 ) -> Found:
-    """Searches from `guess`, on the section or not, with 10 times looser solves first."""
+    """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely."""
     first = recurring_of(turning.system, guess)
     seeds, _ = seeded(args, active, len(first))
     coarse = Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
 
     def run(trial: Scalar, stage: Scalar) -> Turn:
-        fine = stage == _Stage.FINE
-        chosen = Precision(*[jnp.where(fine, a, b) for a, b in zip(precision, coarse, strict=True)])
+        chosen = Precision(
+            *(
+                jnp.where(stage == _Stage.FINE, a, jnp.where(stage == _Stage.COARSE, b, c))
+                for a, b, c in zip(precision, coarse, _ROUGH, strict=True)
+            )
+        )
         start = state_with(turning.system, guess, trial)
         return turn(turning, seeds, start, chosen, idle=stage >= _Stage.FOUND)
 
@@ -149,7 +156,7 @@ def search(
 def _begin(first: Scalar, off: Scalar, method: Method, shape: Any) -> _Progress:
     nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
     on_section = off < 1e-9
-    stage = jnp.where(on_section, int(_Stage.COARSE), int(_Stage.APPROACH))
+    stage = jnp.where(on_section, int(_Stage.ROUGH), int(_Stage.APPROACH))
     return _Progress(
         stage=stage,
         trial=first,
@@ -187,15 +194,18 @@ def _progressed(now: _Progress, latest: Turn, method: Method) -> _Progress:
         jnp.where(now.damping <= _FIRST_DAMPING, 0.0, 0.1 * now.damping),
         jnp.maximum(10.0 * now.damping, _FIRST_DAMPING),
     )
-    coarse_done = (now.stage == _Stage.COARSE) & (base_residual <= _COARSE)
+    rough_done = (now.stage == _Stage.ROUGH) & (base_residual <= _NEAR)
+    coarse_done = (now.stage == _Stage.COARSE) & (base_residual <= _NEARER)
+    refined = rough_done | coarse_done
     fine_done = (now.stage == _Stage.FINE) & (base_residual <= method.residual)
-    nowhere = ~returned & ~jnp.isfinite(base_residual) & (now.stage < _Stage.FINE)
-    stage = jnp.where(approaching, int(_Stage.COARSE), now.stage)
+    nowhere = ~returned & ~jnp.isfinite(base_residual) & (now.stage < _Stage.COARSE)
+    stage = jnp.where(approaching, int(_Stage.ROUGH), now.stage)
+    stage = jnp.where(rough_done, int(_Stage.COARSE), stage)
     stage = jnp.where(coarse_done, int(_Stage.FINE), stage)
     stage = jnp.where(fine_done, int(_Stage.FOUND), stage)
     stage = jnp.where(nowhere, int(_Stage.NO_RETURN), stage)
     stage = jnp.where(damping > _LARGEST_DAMPING, int(_Stage.STUCK), stage)
-    damping = jnp.where(approaching | coarse_done, 0.0, damping)
+    damping = jnp.where(approaching | refined, 0.0, damping)
     step, optimiser = _step(base, base_turn, damping, now, method, better)
     trial = jnp.where(approaching, base, base + step)
     return _Progress(
@@ -203,7 +213,7 @@ def _progressed(now: _Progress, latest: Turn, method: Method) -> _Progress:
         trial=trial,
         base=base,
         # The finer solves begin afresh: their residuals are not the looser ones'.
-        base_residual=jnp.where(coarse_done, jnp.inf, base_residual),
+        base_residual=jnp.where(refined, jnp.inf, base_residual),
         base_turn=base_turn,
         damping=damping,
         coarse=jax.tree.map(lambda a, b: jnp.where(coarse_done, a, b), base_turn, now.coarse),

@@ -51,4 +51,5 @@ class BengisuAkay(AbstractFrictionLaw):
         return -normal_force * jnp.where(sticking, rise, jnp.sign(slip_speed) * decay)
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
-        return slip_speed - self.v0, slip_speed + self.v0
+        # At rest it is the second derivative that jumps.
+        return slip_speed - self.v0, slip_speed + self.v0, slip_speed
