@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._radau import Rates
+from jaxbiped.gait._radau import Rates, stacked
 
 
 class Bent(NamedTuple):
@@ -39,11 +39,12 @@ def on_surface(
     """
     c = bent.first.shape[0]
     moved = jnp.concatenate([bent.first, seeds])
-    rate = rates(z)
+    field = stacked(rates)
+    rate = field(z)
     flow = jnp.concatenate([rate, jnp.zeros(seeds.shape[0])])
 
     def turned(along: Scalar) -> Scalar:
-        return jax.jvp(rates, (z,), (along,))[1]
+        return jax.jvp(field, (z,), (along,))[1]
 
     gradient = jax.grad(surface)(z)
     slope = gradient @ flow

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.gait._radau import Rates, gradients, with_seeds
+from jaxbiped.gait._radau import Rates, stacked, with_seeds
 
 MARGIN = 1e-12
 """Least time from a switch [s] at which its sides are looked at: enough to be sure of the side."""
@@ -51,7 +51,7 @@ def crossings_of(
         idle = jnp.zeros_like(parameters)
 
         def rate(z: Scalar) -> Scalar:
-            return jnp.concatenate([rates(z), idle])
+            return jnp.concatenate([stacked(rates)(z), idle])
 
         def back(past: Scalar) -> Scalar:
             return new - past * rate(new - 0.5 * past * velocity)
@@ -73,27 +73,28 @@ def crossings_of(
     return jax.vmap(one)(before, after)
 
 
-def jumps_of(
-    rates: Rates,
-    crossings: Crossings,
-    parameters: Scalar,
-    firsts: Scalar,
-    seeds: Scalar,
-    count: int,
+def sides_of(rates: Rates, crossings: Crossings, parameters: Scalar) -> Scalar:
+    """Points on the new and then the old side of each crossing, shape (steps, 6, c)."""
+    field = jax.vmap(lambda y: stacked(rates)(jnp.concatenate([y, parameters])))
+    away = MARGIN * jnp.array([1.0, 4.0, 16.0, -1.0, -4.0, -16.0])
+    return crossings.landed[:, None] + away[:, None] * field(crossings.landed)[:, None]
+
+
+def jump_of(at_sides: Scalar) -> Scalar:
+    """J₊ − J₋ from its values at `sides_of`, shape (steps, c, c + p).
+
+    Extrapolated to the switch itself, in the root of time: that is how Hertz's law leaves it.
+    """
+    new, old = (
+        8.0 * at_sides[:, k] - 6.0 * at_sides[:, k + 1] + at_sides[:, k + 2] for k in (0, 3)
+    )
+    return (new - old) / 3.0
+
+
+def bent_by(
+    jump: Scalar, crossings: Crossings, firsts: Scalar, seeds: Scalar, count: int
 ) -> Scalar:
     """Jumps of C at the end of each step, shape (steps, c, q, v); zero where none is crossed."""
-    field = jax.vmap(lambda y: rates(jnp.concatenate([y, parameters])))
-    away = MARGIN * jnp.array([1.0, 4.0, 16.0, -1.0, -4.0, -16.0])
-    on = crossings.landed
-    points = on[:, None] + away[:, None] * field(on)[:, None]
-    near, further, far = (
-        jnp.moveaxis(gradients(rates, points, parameters), 1, 0)
-        .reshape(2, 3, *on.shape, -1)
-        .swapaxes(0, 1)
-    )
-    # Extrapolated to the switch itself, in the root of time: so Hertz's law leaves it.
-    at_switch = (8.0 * near - 6.0 * further + far) / 3.0
     moved = with_seeds(firsts, seeds)
     early = jnp.einsum("sz,szq->sq", crossings.early, moved[..., count:])
-    jump = (at_switch[0] - at_switch[1]) @ moved[..., :count]
-    return jnp.einsum("scv,sq->scqv", jump, early)
+    return jnp.einsum("scv,sq->scqv", jump @ moved[..., :count], early)

@@ -8,6 +8,11 @@ the Radau IIA method of order five (Hairer and Wanner, Solving Ordinary Differen
 section IV.5) on the steps that the first derivatives chose, many steps at once. After a switch f''
 may be as singular as the inverse root of the time since (Hertz's law after touchdown), so the
 method runs in the root of that time, in which it is smooth.
+
+A tangent may hold much of the flow itself: where a parameter makes the motion later, it does. Of
+that part C is known exactly, and yet it is the largest and changes fastest. So at every step's
+start what V and Q have of the flow is taken out, which is only to read their motions at other
+times, and C changes with it.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,14 +24,21 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._bent import Bent
-from jaxbiped.gait._crossings import MARGIN, Crossings, crossings_of, jumps_of
+from jaxbiped.gait._crossings import (
+    MARGIN,
+    Crossings,
+    bent_by,
+    crossings_of,
+    jump_of,
+    sides_of,
+)
 from jaxbiped.gait._radau import (
     Path,
     Rates,
-    collocation_matrix,
+    collocation,
     collocation_points,
     gradients,
-    spread_forcing,
+    stacked,
     with_seeds,
 )
 
@@ -108,6 +120,36 @@ def _path(reached: _Reached, times: Scalar, crossings: Crossings) -> tuple[Path,
     return path, _Reached(clock[-1], states[-1], fresh[-1], latest[-1])
 
 
+class _Linear(NamedTuple):
+    """The vector field about the steps of a chunk.
+
+    Attributes:
+        points: states at the collocation points, shape (steps, 3, c).
+        jacobians: derivatives of the rates there by components and parameters.
+        at_start: the same where each step starts, shape (steps, c, c + p).
+        velocities: rates there, shape (steps, c).
+        jump: by how much the derivatives jump where each step ends.
+    """
+
+    points: Scalar
+    jacobians: Scalar
+    at_start: Scalar
+    velocities: Scalar
+    jump: Scalar
+
+
+def _linear(rates: Rates, path: Path, crossings: Crossings, parameters: Scalar) -> _Linear:
+    field = jax.vmap(lambda y: stacked(rates)(jnp.concatenate([y, parameters])))
+    points = collocation_points(rates, path, parameters)
+    # A step that ends on a switch belongs to the old side; a corrected point may lie beyond.
+    short = path.after - MARGIN * field(path.after)
+    points = points.at[:, 2].set(jnp.where(crossings.crossed[:, None], short, points[:, 2]))
+    sides = sides_of(rates, crossings, parameters)
+    every = jnp.concatenate([points, path.before[:, None], sides], axis=1)
+    found = gradients(rates, every, parameters)
+    return _Linear(points, found[:, :3], found[:, 3], field(path.before), jump_of(found[:, 4:]))
+
+
 def _chunk(
     rates: Rates,
     path: Path,
@@ -118,22 +160,9 @@ def _chunk(
     count: int,
 ) -> Bent:
     c = path.before.shape[1]
-    part, share = path.clock()
-    points = collocation_points(rates, path, part, share, parameters)
-    field = jax.vmap(lambda y: rates(jnp.concatenate([y, parameters])))
-    # A step that ends on a switch belongs to the old side; a corrected point may lie beyond.
-    short = path.after - MARGIN * field(path.after)
-    points = points.at[:, 2].set(jnp.where(crossings.crossed[:, None], short, points[:, 2]))
-    jacobians = gradients(rates, points, parameters)
-    inverse = jnp.linalg.inv(collocation_matrix(jacobians[..., :c], share))
-    units = jnp.tile(jnp.eye(c), (3, 1))
-    forcing = spread_forcing(jacobians[..., c:], share)
-    units = jnp.broadcast_to(units, (*forcing.shape[:1], 3 * c, c))
-    stage_map = inverse @ jnp.concatenate([units, forcing], axis=-1)
-    step_map = stage_map[:, 2 * c :]
-
-    at_start = gradients(rates, path.before[:, None], parameters)[:, 0]
-    velocities = field(path.before)
+    linear = _linear(rates, path, crossings, parameters)
+    stages = collocation(path, linear.jacobians)
+    step_map = stages.steps()
 
     def follow(first: Scalar, known: tuple[Scalar, ...]) -> tuple[Scalar, tuple[Scalar, ...]]:
         step, velocity, fresh = known
@@ -142,30 +171,34 @@ def _chunk(
         end = step @ jnp.concatenate([begun, seeds])
         return end, (first, shift, begun, end)
 
-    steps = (step_map, velocities, path.fresh)
-    last, (arrived, shifts, firsts, ends) = jax.lax.scan(follow, bent.first, steps)
-    seeded = jnp.broadcast_to(seeds, (firsts.shape[0], *seeds.shape))
-    at_stages = stage_map @ jnp.concatenate([firsts, seeded], axis=1)
-    at_stages = at_stages.reshape(-1, 3, c, seeds.shape[1])
+    known = (step_map, linear.velocities, path.fresh)
+    last, (arrived, shifts, firsts, ends) = jax.lax.scan(follow, bent.first, known)
+    at_stages = stages.within(firsts, seeds)
     moved = with_seeds(at_stages[..., count:], seeds[:, count:])
 
     def source(turned: Scalar, turned_seeds: Scalar) -> Scalar:
-        bend = gradients(rates, points, parameters, turned, turned_seeds)
-        return (inverse @ spread_forcing(bend @ moved, share))[:, 2 * c :]
+        bend = gradients(rates, linear.points, parameters, turned, turned_seeds)
+        return stages.forced(bend @ moved)
 
     by_direction = jax.vmap(source, in_axes=(-1, -1), out_axes=-1)
     sources = by_direction(at_stages[..., :count], seeds[:, :count])
-    jumps = jumps_of(rates, crossings, parameters, ends, seeds, count)
-    turned = jnp.einsum("sab,sb->sa", at_start[..., :c], velocities)
-    swings = at_start @ with_seeds(arrived, seeds)
-    by_v, by_q = shifts[:, :count], shifts[:, count:]
-    shifted = jnp.einsum("sa,sq,sv->saqv", turned, by_q, by_v)
-    shifted = shifted - jnp.einsum("sav,sq->saqv", swings[..., :count], by_q)
-    shifted = shifted - jnp.einsum("saq,sv->saqv", swings[..., count:], by_v)
+    sources = sources + bent_by(linear.jump, crossings, ends, seeds, count)
+    shifted = _shifted(linear, arrived, shifts, seeds, count)
 
     def gather(second: Scalar, step: tuple[Scalar, ...]) -> tuple[Scalar, None]:
         matrix, shifted, source = step
         return jnp.einsum("ab,bqv->aqv", matrix, second + shifted) + source, None
 
-    second, _ = jax.lax.scan(gather, bent.second, (step_map[..., :c], shifted, sources + jumps))
+    second, _ = jax.lax.scan(gather, bent.second, (step_map[..., :c], shifted, sources))
     return Bent(last, second)
+
+
+def _shifted(linear: _Linear, arrived: Scalar, shifts: Scalar, seeds: Scalar, count: int) -> Scalar:
+    """What C gains where V loses σ f and Q loses τ f: −σ (Q)' − τ (V)' + σ τ f'."""
+    c = linear.velocities.shape[1]
+    flow = jnp.einsum("sab,sb->sa", linear.at_start[..., :c], linear.velocities)
+    rates_of = linear.at_start @ with_seeds(arrived, seeds)
+    by_v, by_q = shifts[:, :count], shifts[:, count:]
+    both = jnp.einsum("sa,sq,sv->saqv", flow, by_q, by_v)
+    both = both - jnp.einsum("sav,sq->saqv", rates_of[..., :count], by_q)
+    return both - jnp.einsum("saq,sv->saqv", rates_of[..., count:], by_v)

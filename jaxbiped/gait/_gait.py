@@ -1,6 +1,7 @@
 """The walker's periodic gait."""
 
 import functools
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal, NamedTuple
 
 import diffrax
@@ -14,10 +15,10 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._state import State, checked_state
-from jaxbiped.gait._orbit import Orbit, orbit_from
+from jaxbiped.gait._orbit import Orbit, orbit_of
 from jaxbiped.gait._parameters import chosen_parameters
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
-from jaxbiped.gait._search import Method, Search
+from jaxbiped.gait._search import Found, Method, Search, search
 from jaxbiped.gait._section import AbstractSection, MidStance
 from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.gait._stability import Bifurcation
@@ -205,7 +206,6 @@ def _adam() -> optax.GradientTransformation:
     return optax.adam(1e-2)
 
 
-@eqx.filter_jit
 def _find(
     turning: Turning,
     scene: Scene,
@@ -216,8 +216,50 @@ def _find(
     active: tuple[int, ...],
     radius: bool,
 ) -> Gait:
-    orbit = orbit_from(turning, scene, active, start, precision, method, radius=radius)
-    found, stability = orbit.found, orbit.stability
+    def described(found: Found) -> Gait:
+        return _described(turning, scene, start, found, names, active, radius)
+
+    searching = (turning, scene, active, start, precision, method)
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(searching)):
+        return described(_searched(*searching))
+    # Two programs, so that the second compiles while the first one does: run on nothing, it ends
+    # at once.
+    with ThreadPoolExecutor(max_workers=1) as meanwhile:
+        nothing = _nothing(eqx.filter_eval_shape(_searched, *searching))
+        ready = meanwhile.submit(described, nothing)
+        found = _searched(*searching)
+        ready.result()
+    return described(found)
+
+
+@eqx.filter_jit
+def _searched(*searching: Any) -> Found:
+    # Without weak types, which would make the next program another one than was compiled.
+    return jtu.tree_map(
+        lambda leaf: jax.lax.convert_element_type(leaf, leaf.dtype), search(*searching)
+    )
+
+
+def _nothing(shape: PyTree) -> PyTree:
+    """Arrays of these shapes that hold nothing."""
+    return jtu.tree_map(
+        lambda leaf: jnp.full(leaf.shape, jnp.nan if leaf.dtype.kind == "f" else 0, leaf.dtype),
+        shape,
+    )
+
+
+@eqx.filter_jit
+def _described(
+    turning: Turning,
+    scene: Scene,
+    start: State,
+    found: Found,
+    names: tuple[str, ...],
+    active: tuple[int, ...],
+    radius: bool,
+) -> Gait:
+    orbit = orbit_of(turning, scene, active, start, found, radius=radius)
+    stability = orbit.stability
     last, m = found.last, found.recurring.shape[0]
     lost = found.ending == int(Search.NO_RETURN)
 

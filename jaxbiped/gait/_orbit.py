@@ -71,6 +71,19 @@ def orbit_from(
     `radius` asks for the derivatives of the spectral radius as well.
     """
     found = search(turning, args, active, guess, precision, method)
+    return orbit_of(turning, args, active, guess, found, radius=radius)
+
+
+def orbit_of(
+    turning: Turning,
+    args: PyTree,
+    active: tuple[int, ...],
+    guess: PyTree,
+    found: Found,
+    *,
+    radius: bool,
+) -> Orbit:
+    """The orbit that a search from `guess` found, as `orbit_from` gives it."""
     state = state_with(turning.system, guess, found.recurring)
     m = found.recurring.shape[0]
     rates = turning.system.vector_field(jnp.zeros(()), state, args)

@@ -3,7 +3,7 @@
 Source: Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.5, order five.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -22,8 +22,14 @@ _RADAU = np.array(
         [(16 - _ROOT) / 36, (16 + _ROOT) / 36, 1 / 9],
     ]
 )
-Rates = Callable[[Scalar], Scalar]
-"""Components and parameters in one vector (c + p,) to the rates (c,)."""
+Rates = Callable[[Sequence[Scalar]], list[Scalar]]
+"""Components and parameters, one by one, to the rates: pulling back through arrays of them makes
+programs that compile for seconds."""
+
+
+def stacked(rates: Rates) -> Callable[[Scalar], Scalar]:
+    """The same of a vector (c + p,) to a vector (c,)."""
+    return lambda z: jnp.stack(rates(list(z)))
 
 
 class Path(NamedTuple):
@@ -58,11 +64,10 @@ class Path(NamedTuple):
         return part, 2.0 * root * width[:, None]
 
 
-def collocation_points(
-    rates: Rates, path: Path, part: Scalar, share: Scalar, parameters: Scalar
-) -> Scalar:
+def collocation_points(rates: Rates, path: Path, parameters: Scalar) -> Scalar:
     """States at the collocation points, shape (steps, 3, c): a cubic, once corrected."""
-    field = jax.vmap(lambda y: rates(jnp.concatenate([y, parameters])))
+    part, share = path.clock()
+    field = jax.vmap(lambda y: stacked(rates)(jnp.concatenate([y, parameters])))
     h = path.span[:, None]
     start, end = h * field(path.before), h * field(path.after)
     change = path.after - path.before
@@ -72,7 +77,7 @@ def collocation_points(
     c = path.before.shape[1]
     slopes = share[..., None] * jax.vmap(field)(points)
     residual = points - before - jnp.einsum("ij,njc->nic", _RADAU, slopes)
-    matrix = collocation_matrix(gradients(rates, points, parameters)[..., :c], share)
+    matrix = _matrix(gradients(rates, points, parameters)[..., :c], share)
     correction = jnp.linalg.solve(matrix, residual.reshape(-1, 3 * c, 1))
     return points - correction.reshape(points.shape)
 
@@ -90,12 +95,13 @@ def gradients(
     """
     size = points.shape[-1]
     unit = jnp.eye(size)
+    constants = list(parameters)
 
     def pulls(y: Scalar, tangent: Scalar) -> Any:
-        z = jnp.concatenate([y, parameters])
+        z = [*y, *constants]
         if along is None or along_parameters is None:
             return jax.vjp(rates, z)[1]
-        whole = jnp.concatenate([tangent, along_parameters])
+        whole = [*tangent, *along_parameters]
         return jax.vjp(lambda z: jax.jvp(rates, (z,), (whole,))[1], z)[1]
 
     flat = points.reshape(-1, size)
@@ -104,22 +110,62 @@ def gradients(
     every = fenced(moves, lambda: jax.vmap(pulls)(flat, tangents))
 
     def pulled() -> Scalar:
+        def one(pull: Any) -> Any:
+            return jax.vmap(lambda e: jnp.stack(pull(list(e))[0]))(unit)
+
         # A linear field leaves nothing to pull through: the size is said, not read off.
-        one = jax.vmap(lambda pull: jax.vmap(lambda e: pull(e)[0])(unit), axis_size=flat.shape[0])
-        return one(every)
+        return jax.vmap(one, axis_size=flat.shape[0])(every)
 
     rows = fenced(moves, pulled)
     return rows.reshape(*points.shape, size + parameters.shape[0])
 
 
-def collocation_matrix(jacobians: Scalar, share: Scalar) -> Scalar:
+class Collocation(NamedTuple):
+    """Steps of the linear equation y' = J y + b, solved for what is linear in their starts.
+
+    Attributes:
+        inverse: (I − A ⊗ (share_j J_j))⁻¹, shape (steps, 3 c, 3 c).
+        maps: stages by start and parameters, shape (steps, 3 c, c + p).
+        share: derivative of time by the steps' own variable, shape (steps, 3).
+    """
+
+    inverse: Scalar
+    maps: Scalar
+    share: Scalar
+
+    def steps(self) -> Scalar:
+        """Ends by start and parameters, shape (steps, c, c + p)."""
+        return self.maps[:, self.maps.shape[1] // 3 * 2 :]
+
+    def within(self, firsts: Scalar, seeds: Scalar) -> Scalar:
+        """Tangents at the collocation points, shape (steps, 3, c, n)."""
+        found = self.maps @ with_seeds(firsts, seeds)
+        return found.reshape(found.shape[0], 3, -1, found.shape[-1])
+
+    def forced(self, forcing: Scalar) -> Scalar:
+        """What a forcing (steps, 3, c, n) adds to the ends, shape (steps, c, n)."""
+        found = self.inverse @ _spread(forcing, self.share)
+        return found[:, found.shape[1] // 3 * 2 :]
+
+
+def collocation(path: Path, jacobians: Scalar) -> Collocation:
+    """Steps whose Jacobians at the collocation points, (steps, 3, c, c + p), are given."""
+    _, share = path.clock()
+    steps, _, c, _ = jacobians.shape
+    inverse = jnp.linalg.inv(_matrix(jacobians[..., :c], share))
+    starts = jnp.broadcast_to(jnp.tile(jnp.eye(c), (3, 1)), (steps, 3 * c, c))
+    forcing = _spread(jacobians[..., c:], share)
+    return Collocation(inverse, inverse @ jnp.concatenate([starts, forcing], axis=-1), share)
+
+
+def _matrix(jacobians: Scalar, share: Scalar) -> Scalar:
     """I − A ⊗ (share_j J_j), shape (steps, 3 c, 3 c)."""
     steps, _, c, _ = jacobians.shape
     blocks = jnp.einsum("ij,njab->niajb", _RADAU, share[..., None, None] * jacobians)
     return jnp.eye(3 * c) - blocks.reshape(steps, 3 * c, 3 * c)
 
 
-def spread_forcing(forcing: Scalar, share: Scalar) -> Scalar:
+def _spread(forcing: Scalar, share: Scalar) -> Scalar:
     """(A ⊗ I) (share_j b_j) of forcings (steps, 3, c, n), shape (steps, 3 c, n)."""
     steps, _, c, n = forcing.shape
     total = jnp.einsum("ij,njab->niab", _RADAU, share[..., None, None] * forcing)

@@ -1,5 +1,6 @@
 """Second derivatives of the return map at a periodic orbit."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import jax.numpy as jnp
@@ -47,15 +48,15 @@ def second_turn(
     parameters = jnp.stack([jnp.asarray(leaf) for leaf in active_leaves(args)])
     watch = turning.watch(args.args, like)
 
-    def parts(z: Scalar) -> tuple[PyTree, PyTree]:
+    def parts(z: Sequence[Scalar] | Scalar) -> tuple[PyTree, PyTree]:
         return jtu.tree_unflatten(structure, list(z[:c])), with_active(args, list(z[c:]))
 
     def vector(y: PyTree) -> Scalar:
         return jnp.stack(jtu.tree_leaves(y))
 
-    def rates(z: Scalar) -> Scalar:
+    def rates(z: Sequence[Scalar]) -> list[Scalar]:
         state, scene = parts(z)
-        return vector(turning.system.vector_field(jnp.zeros(()), state, scene))
+        return jtu.tree_leaves(turning.system.vector_field(jnp.zeros(()), state, scene))
 
     def surfaces(z: Scalar) -> Any:
         state, scene = parts(z)

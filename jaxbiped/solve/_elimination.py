@@ -1,14 +1,14 @@
-"""Small linear systems, solved by elimination unrolled over scalars.
+"""Small matrices, inverted by elimination unrolled over rows.
 
 A matrix is a list of rows of scalars, in which None stands for an entry that is zero whatever the
-state: what a scene does not couple is not computed. Scalars may carry any batch shape, so that
-under `vmap` every operation runs over the whole batch; batched LAPACK calls on tiny matrices are
-many times slower.
+state. Scalars may carry any batch shape, so that under `vmap` every operation runs over the whole
+batch; batched LAPACK calls on tiny matrices are many times slower. The inverse, and not factors,
+because XLA repeats operations in each of their consumers: a substitution, each of whose unknowns
+needs those before, became fifteen times its size, and a program that took twice as long to compile.
 """
 
 from typing import TypeAlias
 
-import equinox as eqx
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
@@ -17,110 +17,36 @@ Entry: TypeAlias = Scalar | None
 Matrix: TypeAlias = list[list[Entry]]
 
 
-class _Swap(eqx.Module):
-    row: int = eqx.field(static=True)
-    other: int = eqx.field(static=True)
-    happens: Scalar | None
-    """A boolean, or None where the swap is certain."""
+def inverse(matrix: Matrix) -> list[list[Scalar]]:
+    """The inverse of a square matrix, by Gauss and Jordan with partial pivoting.
 
-
-class _Subtract(eqx.Module):
-    row: int = eqx.field(static=True)
-    source: int = eqx.field(static=True)
-    factor: Scalar
-
-
-class Factors(eqx.Module):
-    """An LU factorisation with partial pivoting.
-
-    Attributes:
-        steps: row operations that reduce the matrix, in order.
-        upper: the upper triangle that is left.
-        pivots: inverses of its diagonal.
+    A singular one gives entries that are not finite.
     """
-
-    steps: list[_Swap | _Subtract]
-    upper: Matrix
-    pivots: list[Scalar]
-
-
-def factorise(matrix: Matrix) -> Factors:
-    """Factorises a square matrix. A singular one gives entries that are not finite."""
-    rows = [list(row) for row in matrix]
-    size = len(rows)
-    steps: list[_Swap | _Subtract] = []
-    pivots: list[Scalar] = []
+    size = len(matrix)
+    known = [entry for row in matrix for entry in row if entry is not None]
+    zero = jnp.zeros_like(sum(known[1:], known[0]))
+    rows = [
+        jnp.stack([*(zero if e is None else e + zero for e in row), *_unit(zero, size, i)], axis=-1)
+        for i, row in enumerate(matrix)
+    ]
     for k in range(size):
-        _bring_largest_up(rows, k, steps)
-        pivot = rows[k][k]
-        if pivot is None:
-            raise ValueError(f"The matrix is singular whatever its entries: column {k} is empty.")
-        inverse = 1.0 / pivot
-        pivots.append(inverse)
         for i in range(k + 1, size):
-            entry = rows[i][k]
-            if entry is None:
-                continue
-            factor = entry * inverse
-            steps.append(_Subtract(i, k, factor))
-            for j in range(k + 1, size):
-                rows[i][j] = _minus(rows[i][j], factor, rows[k][j])
-    return Factors(steps, rows, pivots)
+            larger = jnp.abs(rows[i][..., k]) > jnp.abs(rows[k][..., k])
+            above, below = rows[k], rows[i]
+            rows[k] = jnp.where(larger[..., None], below, above)
+            rows[i] = jnp.where(larger[..., None], above, below)
+        rows[k] = rows[k] / rows[k][..., k : k + 1]
+        for i in range(size):
+            if i != k:
+                rows[i] = rows[i] - rows[i][..., k : k + 1] * rows[k]
+    return [[row[..., size + j] for j in range(size)] for row in rows]
 
 
-def solve(factors: Factors, right: list[Scalar]) -> list[Scalar]:
-    """Solution of the factorised system for one right-hand side."""
-    x = list(right)
-    for step in factors.steps:
-        if isinstance(step, _Subtract):
-            x[step.row] = x[step.row] - step.factor * x[step.source]
-        else:
-            x[step.row], x[step.other] = _swapped(step.happens, x[step.row], x[step.other])
-    for k in reversed(range(len(x))):
-        total = x[k]
-        for j in range(k + 1, len(x)):
-            entry = factors.upper[k][j]
-            if entry is not None:
-                total = total - entry * x[j]
-        x[k] = total * factors.pivots[k]
-    return x
+def times(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
+    """A matrix times a vector, each a list of scalars."""
+    products = [[a * b for a, b in zip(row, right, strict=True)] for row in matrix]
+    return [sum(row[1:], row[0]) for row in products]
 
 
-def _bring_largest_up(rows: Matrix, k: int, steps: list[_Swap | _Subtract]) -> None:
-    for i in range(k + 1, len(rows)):
-        candidate, current = rows[i][k], rows[k][k]
-        if candidate is None:
-            continue
-        happens = None if current is None else jnp.abs(candidate) > jnp.abs(current)
-        steps.append(_Swap(k, i, happens))
-        for j in range(k, len(rows)):
-            rows[k][j], rows[i][j] = _swapped_entries(happens, rows[k][j], rows[i][j])
-
-
-def _swapped(happens: Scalar | None, a: Scalar, b: Scalar) -> tuple[Scalar, Scalar]:
-    if happens is None:
-        return b, a
-    return jnp.where(happens, b, a), jnp.where(happens, a, b)
-
-
-def _swapped_entries(happens: Scalar | None, a: Entry, b: Entry) -> tuple[Entry, Entry]:
-    if happens is None:
-        return b, a
-    if a is None and b is None:
-        return None, None
-    return _swapped(happens, _or_zero(a, b), _or_zero(b, a))
-
-
-def _or_zero(entry: Entry, other: Entry) -> Scalar:
-    """The entry; where it is a structural zero, a zero shaped as the other one, which is none."""
-    if entry is not None:
-        return entry
-    assert other is not None
-    return jnp.zeros_like(other)
-
-
-def _minus(entry: Entry, factor: Scalar, subtrahend: Entry) -> Entry:
-    if subtrahend is None:
-        return entry
-    product = factor * subtrahend
-    return -product if entry is None else entry - product
+def _unit(zero: Scalar, size: int, place: int) -> list[Scalar]:
+    return [zero + 1.0 if j == place else zero for j in range(size)]

@@ -14,7 +14,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.solve._elimination import Entry, Factors, Matrix, factorise, solve
+from jaxbiped.solve._elimination import Entry, Matrix, inverse, times
 from jaxbiped.solve._structure import Structure, structure_of
 
 Components: TypeAlias = list[Any]
@@ -41,7 +41,7 @@ class AbstractLinearisation(eqx.Module):
 
     @abc.abstractmethod
     def factorise(self, jacobian: Any, step: Scalar) -> Any:
-        """Factors of I − step J."""
+        """What `solve_kept` needs of I − step J."""
 
     @abc.abstractmethod
     def solve_kept(
@@ -165,12 +165,12 @@ class _ScalarLinearisation(AbstractLinearisation):
         columns = [self._column(1 + j) for j in range(len(self.y))]
         return [list(row) for row in zip(*columns, strict=True)]
 
-    def factorise(self, jacobian: Matrix, step: Scalar) -> Factors:
-        return factorise(_reduced(jacobian, self.direct(), self.kept(), step))
+    def factorise(self, jacobian: Matrix, step: Scalar) -> list[list[Scalar]]:
+        return inverse(_reduced(jacobian, self.direct(), self.kept(), step))
 
     def solve_kept(
         self,
-        factors: Factors,
+        factors: list[list[Scalar]],
         jacobian: Matrix,
         step: Scalar,
         right: Components,
@@ -181,7 +181,7 @@ class _ScalarLinearisation(AbstractLinearisation):
             entries = [(jacobian[i][p], value) for p, value in direct_right.items()]
             terms = [entry * value for entry, value in entries if entry is not None]
             reduced.append(own + step * sum(terms[1:], terms[0]) if terms else own)
-        return solve(factors, reduced)
+        return times(factors, reduced)
 
     def direct(self) -> dict[int, int]:
         direct: dict[int, int] = {}

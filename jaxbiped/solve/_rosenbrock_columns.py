@@ -173,16 +173,13 @@ def _rows(matrix: Scalar, order: Sequence[int]) -> Scalar:
 def _inverse(stages: Stages) -> tuple[Scalar, Scalar]:
     """(I − g J)⁻¹ for the kept components alone, and their J by the direct ones."""
     kept = _kept_in_order(stages)
-    places = [kept.index(i) for i in stages.kept]
-    unit = [jnp.asarray(row) for row in np.eye(len(kept))[places]]
-    nothing = {p: jnp.zeros_like(unit[0]) for p in stages.direct}
-    solved = stages.lin.solve_kept(stages.factors, stages.jacobian, stages.step, unit, nothing)
+    places = [stages.kept.index(i) for i in kept]
+    inverse = jnp.stack([jnp.stack([stages.factors[i][j] for j in places]) for i in places])
     zero = jnp.zeros_like(stages.step)
     rows = [
         [zero if stages.jacobian[i][p] is None else stages.jacobian[i][p] for p in stages.direct]
         for i in kept
     ]
-    inverse = jnp.stack([solved[stages.kept.index(i)] for i in kept])
     return inverse, jnp.stack([jnp.stack(row) for row in rows])
 
 

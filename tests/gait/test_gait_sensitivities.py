@@ -1,0 +1,133 @@
+"""The seed's multipliers and sensitivities against an independent solve and exact scaling laws."""
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from tests.orbit_reference import (
+    SEED,
+    gait,
+    jacobian,
+    parameters,
+    sensitivities,
+    turn_derivative,
+)
+
+MEASURES = ("period", "step_length", "speed", "peak_normal", "spectral_radius")
+IN_REFERENCE = {"mu_static": "mu_s", "mu_kinetic": "mu_k", "hip_mass": "hip"}
+ACCURACIES = [("found", 5e-4), ("tight", 1e-5)]
+
+# Steps of log p (of the hip's mass itself, in kg): wide where p matters little and the solve's
+# noise of 1e-12 is felt, narrow for n, an exponent, and l, which matters most.
+STEPS = {
+    "K": 5e-3,
+    "c": 1e-2,
+    "xi": 5e-2,
+    "m": 5e-3,
+    "J": 5e-3,
+    "l": 2.5e-3,
+    "d": 5e-3,
+    "r": 5e-3,
+    "hip_mass": 5e-3,
+    "slope": 5e-3,
+    "g": 5e-3,
+    "n": 2.5e-3,
+    "mu_static": 5e-2,
+    "mu_kinetic": 1e-2,
+    "v0": 5e-2,
+}
+
+# Powers of the parameters that scale one unit alone, and how the measures follow.
+SCALINGS = {
+    "time": (dict(g=-2, K=-2, c=-1, v0=-1, xi=1), (1, 0, -1, -2, 0)),
+    "mass": (dict(m=1, J=1, K=1, c=1), (0, 0, 0, 1, 0)),
+    "length": (dict(l=1, d=1, r=1, J=2, g=1, K=-0.5, c=-1, v0=1, xi=-1), (0, 1, 1, 1, 0)),
+}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return jb.find_gait(jb.seed_scene())
+
+
+@pytest.fixture(scope="module")
+def tight():
+    return jb.find_gait(jb.seed_scene(), accuracy="tight")
+
+
+@pytest.fixture(scope="module")
+def start(tight):
+    return tuple(float(value) for value in tight.measures.state[1:])
+
+
+@pytest.fixture(scope="module")
+def multipliers(start):
+    """Of the reference: eigenvalues of its return map, with 0 in the trivial one's place."""
+    x, measures = gait(start, parameters())
+    return sorted_eigenvalues(turn_derivative(x, parameters(), measures[0]))
+
+
+def sorted_eigenvalues(matrix):
+    values = np.linalg.eigvals(matrix)
+    # Of a conjugate pair the upper one first.
+    return values[np.argsort(-np.abs(values) - 1e-6 * values.imag)]
+
+
+def test_tight_gait(tight):
+    assert float(tight.unit_multiplier_error) < 1e-6
+    assert float(tight.residual) < 2e-10
+
+
+def test_gait_of_the_reference_is_ours(tight, start):
+    state, measures = gait(start, parameters())
+    assert state == pytest.approx(np.array(start), abs=2e-9)
+    ours = [float(getattr(tight.measures, name)) for name in MEASURES[:4]]
+    assert measures == pytest.approx(np.array(ours), rel=1e-8)
+
+
+def test_derivative_of_the_reference_is_that_of_its_differences(start, multipliers):
+    """The variational equation and plain differences of turns, which are good to some 2e-6."""
+    assert sorted_eigenvalues(jacobian(start))[:4] == pytest.approx(multipliers[:4], rel=1e-5)
+
+
+@pytest.mark.parametrize(("accuracy", "tolerance"), ACCURACIES)
+def test_multipliers_agree_with_an_independent_solve(accuracy, tolerance, multipliers, request):
+    ours = np.asarray(request.getfixturevalue(accuracy).multipliers)
+    ours = ours[np.argsort(-np.abs(ours) - 1e-6 * ours.imag)]
+    assert ours[:4] == pytest.approx(multipliers[:4], rel=tolerance)
+    assert np.max(np.abs(ours[4:])) < 1e-9
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_sensitivities_agree_with_an_independent_solve(name, found, tight, start):
+    reference_name = IN_REFERENCE.get(name, name)
+    expected = sensitivities(start, reference_name, STEPS[name])
+    # The state is one vector: its entries are measured against the largest.
+    sizes = np.abs(expected)
+    sizes[:7] = np.max(sizes[:7])
+    # By log ξ the gait moves 1e-7 at most: solves to 1e-12 leave its difference three digits.
+    floor = 5e-10 if name == "xi" else 0.0
+    noise = floor * np.array([1.0] * 10 + [1e2, 1.0])
+    for each, tolerance in ((found, 5e-4), (tight, 1e-5)):
+        k, slopes = each.parameters.index(name), each.sensitivities
+        leaves = (*slopes.state[1:], *(getattr(slopes, measure) for measure in MEASURES))
+        ours = np.array([float(leaf[k]) for leaf in leaves]) * (SEED[reference_name] or 1.0)
+        assert np.all(np.abs(ours - expected) <= tolerance * sizes + noise)
+
+
+def test_every_parameter_is_compared(found):
+    assert set(found.parameters) == set(STEPS)
+
+
+@pytest.mark.parametrize("unit", SCALINGS)
+@pytest.mark.parametrize(("accuracy", "tolerance"), [("found", 5e-5), ("tight", 1e-6)])
+def test_elasticities_obey_the_scaling_of_units(accuracy, tolerance, unit, request):
+    each = request.getfixturevalue(accuracy)
+    powers, follow = SCALINGS[unit]
+    for measure, expected in zip(MEASURES, follow, strict=True):
+        leaf = getattr(each.elasticities, measure)
+        terms = [powers[name] * float(leaf[each.parameters.index(name)]) for name in powers]
+        # The radius takes second derivatives of the motion: the acceptance for sensitivities.
+        allowed = tolerance * (10.0 if measure == "spectral_radius" else 1.0)
+        largest = max(abs(term) for term in terms)
+        assert abs(sum(terms) - expected) <= allowed * largest
