@@ -1,40 +1,24 @@
-"""The walker's periodic gait."""
+"""What is known of a periodic gait, found or not."""
 
-import functools
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
-import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-import optax
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
-from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._state import State, checked_state
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._state import State
 from jaxbiped.gait._orbit import Orbit, orbit_of
-from jaxbiped.gait._parameters import chosen_parameters
-from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
-from jaxbiped.gait._search import Found, Method, Search, search
-from jaxbiped.gait._section import AbstractSection, MidStance
-from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.gait._search import Found, Search
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.gait._system import Walking
 from jaxbiped.gait._turn import Turning
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._ending import Ending
-from jaxbiped.solve._passage import Precision
-from jaxbiped.solve._solvers import solver_named
 
-_RESIDUAL_SHARE = 0.3
-"""Residual that counts as none, in units of the state's tolerance."""
 _NOTHING = 1e-9
 """A measure (SI units) that is zero but for the solve's error has no elasticity."""
-_PATIENCE = 50.0
-"""Time allowed to the next arrival, in units of √(l/g)."""
 
 
 class Measures(NamedTuple):
@@ -126,130 +110,8 @@ class Gait(eqx.Module):
         return (self.ending == int(Search.FOUND)) & (self.measures.spectral_radius < 1.0)
 
 
-def find_gait(
-    scene: Scene,
-    guess: State | None = None,
-    *,
-    period: int = 1,
-    section: AbstractSection | None = None,
-    parameters: tuple[str, ...] | None = None,
-    accuracy: str = "balanced",
-    method: Literal["newton", "optax"] = "newton",
-    optimiser: optax.GradientTransformation | None = None,
-    most_turns: int | None = None,
-    radius_sensitivities: bool = True,
-    solver: str | diffrax.AbstractSolver = "rodas4",
-) -> Gait:
-    """Finds a periodic gait, its Floquet multipliers and its sensitivities to the parameters.
-
-    Newton's method on the return map, damped as Levenberg and Marquardt do where a step fails;
-    derivatives are carried along the motion under a tolerance of their own, and no step straddles
-    a switch. Works under `jit` and `vmap`, over scenes and over guesses.
-
-    Args:
-        scene: the walker.
-        guess: a start near the gait, on the section or not; unless given, the seed's start, its
-            stance foot set down as deep for the scene's own legs and rolling as fast.
-        period: footsteps in a cycle.
-        section: where the cycle begins, `MidStance()` unless given.
-        parameters: names of the parameters to differentiate by (see `parameter_names`); all of
-            them unless given, none for ().
-        accuracy: "balanced" or "tight".
-        method: "newton", or "optax" to minimise the squared residual by gradient.
-        optimiser: for "optax"; Adam with a rate of 1e-2 unless given.
-        most_turns: cycles allowed; 40 for "newton", 400 for "optax".
-        radius_sensitivities: whether to differentiate the spectral radius, which takes second
-            derivatives of the motion.
-        solver: a name (see `SOLVERS`) or any diffrax solver without memory.
-
-    Returns:
-        The gait, or the best that was found instead: look at its `ending`.
-
-    Raises:
-        ArgumentError: an argument that is not allowed, before anything is compiled.
-    """
-    check_type("scene", scene, Scene)
-    check_choice("accuracy", accuracy, GAIT_ACCURACIES)
-    check_choice("method", method, ("newton", "optax"))
-    check_positive("period", period)
-    if int(period) != period:
-        raise ArgumentError(f"period = {period} is not allowed: it must be a whole number.")
-    start = checked_state(seed_start(scene) if guess is None else guess)
-    if jnp.ndim(start.hip_z) != 0:
-        raise ArgumentError(
-            f"guess has leaves of shape {jnp.shape(start.hip_z)}: give one state, and use jax.vmap "
-            "for many."
-        )
-    most = (40 if method == "newton" else 400) if most_turns is None else most_turns
-    check_positive("most_turns", most)
-    scene = jtu.tree_map(as_float, scene)
-    names, active = chosen_parameters(scene, parameters)
-    precision = precision_of(accuracy)
-    turning = Turning(
-        system=Walking(),
-        section=MidStance() if section is None else section,
-        solver=solver_named(solver),
-        time_limit=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
-        steps=int(period),
-        max_solver_steps=MOST_SOLVER_STEPS[accuracy],
-    )
-    how = Method(
-        optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
-        most_turns=int(most),
-        residual=_RESIDUAL_SHARE * precision.rtol,
-    )
-    return _find(turning, scene, start, precision, how, names, active, radius_sensitivities)
-
-
-@functools.cache  # the same object each time, so that nothing is compiled again
-def _adam() -> optax.GradientTransformation:
-    return optax.adam(1e-2)
-
-
-def _find(
-    turning: Turning,
-    scene: Scene,
-    start: State,
-    precision: Precision,
-    method: Method,
-    names: tuple[str, ...],
-    active: tuple[int, ...],
-    radius: bool,
-) -> Gait:
-    def described(found: Found) -> Gait:
-        return _described(turning, scene, start, found, names, active, radius)
-
-    searching = (turning, scene, active, start, precision, method)
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(searching)):
-        return described(_searched(*searching))
-    # Two programs, so that the second compiles while the first one does: run on nothing, it ends
-    # at once.
-    with ThreadPoolExecutor(max_workers=1) as meanwhile:
-        nothing = _nothing(eqx.filter_eval_shape(_searched, *searching))
-        ready = meanwhile.submit(described, nothing)
-        found = _searched(*searching)
-        ready.result()
-    return described(found)
-
-
 @eqx.filter_jit
-def _searched(*searching: Any) -> Found:
-    # Without weak types, which would make the next program another one than was compiled.
-    return jtu.tree_map(
-        lambda leaf: jax.lax.convert_element_type(leaf, leaf.dtype), search(*searching)
-    )
-
-
-def _nothing(shape: PyTree) -> PyTree:
-    """Arrays of these shapes that hold nothing."""
-    return jtu.tree_map(
-        lambda leaf: jnp.full(leaf.shape, jnp.nan if leaf.dtype.kind == "f" else 0, leaf.dtype),
-        shape,
-    )
-
-
-@eqx.filter_jit
-def _described(
+def described(
     turning: Turning,
     scene: Scene,
     start: State,
@@ -258,6 +120,7 @@ def _described(
     active: tuple[int, ...],
     radius: bool,
 ) -> Gait:
+    """The gait that a search from `start` found, with its stability and its derivatives."""
     orbit = orbit_of(turning, scene, active, start, found, radius=radius)
     stability = orbit.stability
     last, m = found.last, found.recurring.shape[0]
@@ -295,7 +158,9 @@ def _described(
             jnp.concatenate([last.jacobian, last.period_row[None], last.advance_rows])[:, :m]
         ),
         unit_multiplier_error=known(stability.unit_error),
-        bifurcation=jnp.where(lost, int(Bifurcation.NONE), stability.bifurcation),
+        bifurcation=jnp.where(
+            found.ending == int(Search.FOUND), stability.bifurcation, int(Bifurcation.NONE)
+        ),
         sensitivities=known(jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes)),
         sensitivity_errors=known(jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), errors)),
         elasticities=known(_elasticities(scene, active, measures, slopes)),

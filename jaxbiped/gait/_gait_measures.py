@@ -9,7 +9,8 @@ import jax.tree_util as jtu
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._state import State
-from jaxbiped.gait._gait import Gait, Measures, find_gait
+from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gradient import AbstractGradient, Implicit
 from jaxbiped.gait._parameters import chosen_parameters
 from jaxbiped.gait._return_map import return_map

@@ -15,6 +15,7 @@ from tests.orbit_reference import (
 
 MEASURES = ("period", "step_length", "speed", "peak_normal", "spectral_radius")
 IN_REFERENCE = {"mu_static": "mu_s", "mu_kinetic": "mu_k", "hip_mass": "hip"}
+RADIUS_FLOOR = 2.5e-6
 ACCURACIES = [("found", 5e-4), ("tight", 1e-5)]
 
 # Steps of log p (of the hip's mass itself, in kg): wide where p matters little and the solve's
@@ -108,6 +109,9 @@ def test_sensitivities_agree_with_an_independent_solve(name, found, tight, start
     # By log ξ the gait moves 1e-7 at most: solves to 1e-12 leave its difference three digits.
     floor = 5e-10 if name == "xi" else 0.0
     noise = floor * np.array([1.0] * 10 + [1e2, 1.0])
+    # Second derivatives cancel at heel strike and keep this much error however tight the solve;
+    # it is felt by g alone, whose effect on the radius is small.
+    noise[-1] = max(noise[-1], RADIUS_FLOOR)
     for each, tolerance in ((found, 5e-4), (tight, 1e-5)):
         k, slopes = each.parameters.index(name), each.sensitivities
         leaves = (*slopes.state[1:], *(getattr(slopes, measure) for measure in MEASURES))
@@ -128,6 +132,18 @@ def test_elasticities_obey_the_scaling_of_units(accuracy, tolerance, unit, reque
         leaf = getattr(each.elasticities, measure)
         terms = [powers[name] * float(leaf[each.parameters.index(name)]) for name in powers]
         # The radius takes second derivatives of the motion: the acceptance for sensitivities.
-        allowed = tolerance * (10.0 if measure == "spectral_radius" else 1.0)
+        second = measure == "spectral_radius"
         largest = max(abs(term) for term in terms)
-        assert abs(sum(terms) - expected) <= allowed * largest
+        allowed = (10.0 if second else 1.0) * tolerance * largest
+        floor = 2.0 * RADIUS_FLOOR / float(each.measures.spectral_radius) if second else 0.0
+        assert abs(sum(terms) - expected) <= allowed + floor
+
+
+def test_the_section_does_not_matter(found):
+    """Multipliers and their derivatives belong to the orbit, though heel strike is a switch."""
+    other = jb.find_gait(jb.seed_scene(), section=jb.HeelStrike())
+    assert np.abs(other.multipliers)[:3] == pytest.approx(np.abs(found.multipliers)[:3], rel=1e-4)
+    for measure in MEASURES:
+        mine, theirs = (getattr(each.elasticities, measure) for each in (found, other))
+        # ξ hardly matters at all.
+        assert np.asarray(theirs) == pytest.approx(np.asarray(mine), rel=1e-3, abs=1e-7)

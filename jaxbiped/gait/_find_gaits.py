@@ -1,0 +1,131 @@
+"""Periodic gaits from many starts."""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_positive, check_type
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._feet import standing_height
+from jaxbiped.dynamics._state import State
+from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._search import Search
+from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.scene._scene import Scene
+
+_SAME = 1e-4
+"""Largest difference of a component (SI units) between two finds of one gait."""
+
+
+class Gaits(NamedTuple):
+    """The distinct gaits that n starts led to, the one reached most often first.
+
+    Attributes:
+        gaits: k gaits, every array with a first axis of k.
+        reached: from how many starts each was, shape (k,).
+        which: the gait that each start led to, −1 where none, shape (n,).
+        ending: code of a `Search` of each start, shape (n,).
+    """
+
+    gaits: Gait
+    reached: Scalar
+    which: Scalar
+    ending: Scalar
+
+
+def find_gaits(scene: Scene, starts: State, **options: Any) -> Gaits:
+    """Searches a periodic gait from each of many starts, all at once, and tells them apart.
+
+    For a look around: without derivatives by parameters. Give `find_gait` the state of the gait
+    that you want them of as its guess.
+
+    Args:
+        scene: the walker.
+        starts: leaves of shape (n,), see `rolling_starts`.
+        options: those of `find_gait`, but for parameters and radius_sensitivities.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled.
+    """
+    check_type("scene", scene, Scene)
+    shapes = {jnp.shape(leaf) for leaf in jtu.tree_leaves(starts)}
+    if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):
+        raise ArgumentError(
+            f"starts has leaves of shapes {sorted(shapes)}: they must all be (n,), n at least 1."
+        )
+
+    @eqx.filter_jit
+    def every(scene: Scene, starts: State) -> Gait:
+        def one(start: State) -> Gait:
+            return find_gait(scene, start, parameters=(), radius_sensitivities=False, **options)
+
+        return jax.vmap(one)(starts)
+
+    gaits = every(jtu.tree_map(as_float, scene), jtu.tree_map(as_float, starts))
+    first, which = _told_apart(gaits)
+    reached = np.bincount(which[which >= 0], minlength=len(first))
+    order = np.argsort(-reached, kind="stable")
+    place = np.argsort(order)
+    chosen = np.asarray(first, dtype=int)[order]
+    return Gaits(
+        gaits=jtu.tree_map(lambda leaf: leaf[chosen], gaits),
+        reached=jnp.asarray(reached[order]),
+        which=jnp.asarray([place[k] if k >= 0 else -1 for k in which], dtype=int),
+        ending=gaits.ending,
+    )
+
+
+def _told_apart(gaits: Gait) -> tuple[list[int], np.ndarray]:
+    """The first start that found each gait, and which of these gaits each start found."""
+    states = np.stack([np.asarray(leaf) for leaf in gaits.measures.state[1:]], axis=1)
+    first: list[int] = []
+    which = np.full(len(states), -1)
+    for i in np.flatnonzero(np.asarray(gaits.ending) == int(Search.FOUND)):
+        near = [k for k, j in enumerate(first) if np.max(np.abs(states[i] - states[j])) <= _SAME]
+        if not near:
+            first.append(int(i))
+        which[i] = near[0] if near else len(first) - 1
+    return first, which
+
+
+def rolling_starts(scene: Scene, count: int, *, spread: float = 0.3, seed: int = 0) -> State:
+    """Starts about the seed's: its angles and leg rates scattered, the stance foot rolling.
+
+    Args:
+        scene: the walker.
+        count: n, how many; the first is the seed's own, fitted to the scene.
+        spread: largest relative change of an angle or rate.
+        seed: of the random numbers.
+
+    Returns:
+        Leaves of shape (n,): leg 2 stands as deep as in the seed's start, and does not slip.
+
+    Raises:
+        ArgumentError: count below 1, or spread not above 0.
+    """
+    check_type("scene", scene, Scene)
+    check_positive("count", count)
+    check_positive("spread", spread)
+    scene = jtu.tree_map(as_float, scene)
+    middle = seed_start(scene)
+    scatter = jax.random.uniform(jax.random.key(seed), (4, int(count)), minval=-1.0, maxval=1.0)
+    factors = 1.0 + spread * scatter.at[:, 0].set(0.0)
+    theta_1, theta_2 = middle.theta_1 * factors[0], middle.theta_2 * factors[1]
+    omega_1, omega_2 = middle.omega_1 * factors[2], middle.omega_2 * factors[3]
+    depth = standing_height(scene, middle.theta_2) - middle.hip_z
+    reach = scene.walker.hip_to_foot
+    return State(
+        hip_x=jnp.zeros_like(theta_1),
+        hip_z=standing_height(scene, theta_2, depth),
+        theta_1=theta_1,
+        theta_2=theta_2,
+        hip_vx=-(reach * jnp.cos(theta_2) + scene.walker.r) * omega_2,
+        hip_vz=-reach * jnp.sin(theta_2) * omega_2,
+        omega_1=omega_1,
+        omega_2=omega_2,
+    )
