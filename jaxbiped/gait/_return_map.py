@@ -150,7 +150,7 @@ def _forward_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
         max_solver_steps=turning.max_solver_steps,
     )
     structure = jtu.tree_structure(state)
-    arrived = jtu.tree_unflatten(structure, list(found.on_section[:, 0]))
+    arrived = jtu.tree_unflatten(structure, list(found.y.columns[:, 0]))
 
     def renew(args: PyTree, y: PyTree) -> PyTree:
         return _renewed(turning, args, y, found.time, found.code)[0]

@@ -146,8 +146,7 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
             save_nodes=True,
         )
 
-        arrived = Tangents(found.y.state, found.on_section)
-        state, moved = along_columns(lambda s, a: turning.system.renew(a, s), arrived, args)
+        state, moved = along_columns(lambda s, a: turning.system.renew(a, s), found.y, args)
         on_section = as_columns(moved)
         # At a fixed time the renewal comes earlier or later, and the motion after it with it.
         rates = turning.system.vector_field(jnp.zeros(()), state, args.args)

@@ -38,9 +38,9 @@ class Passage(NamedTuple):
     """An arrival at a section, or what came instead.
 
     Attributes:
-        y: state on the section; with its columns at a fixed time, where the solve carried any.
+        y: state on the section; with its columns there, where the solve carried any: the motion
+            of the arrival is taken off.
         time: duration of the passage [s].
-        on_section: its columns on the section, where the motion of the arrival is taken off.
         time_columns: derivatives of the time of arrival, shape (n,).
         code: 0 for an arrival, else that of an `Ending`.
         landed: what the step-size control knows at the end.
@@ -50,7 +50,6 @@ class Passage(NamedTuple):
 
     y: Any
     time: Scalar
-    on_section: Any
     time_columns: Any
     code: Scalar
     landed: Landed
@@ -104,11 +103,10 @@ def passage(
     states: Any = solution.ys
     landed: Any = solution.controller_state
     last = jtu.tree_map(lambda leaf: leaf[-1], states[0])
-    y, time, on_section, time_columns = _onto_section(watch, last, times[0][-1], args)
+    y, time, time_columns = _onto_section(watch, last, times[0][-1], args)
     return Passage(
         y=y,
         time=time,
-        on_section=on_section,
         time_columns=time_columns,
         code=_code(solution, landed),
         landed=landed,
@@ -138,18 +136,13 @@ def arrival_at(watch: Watch, state: PyTree, args: PyTree) -> tuple[PyTree, Scala
     rate = watch.field(jnp.zeros(()), state, args)
     value, slope = jax.jvp(lambda s: section(args, s)[0], (state,), (rate,))
     past = value / slope
-    return taken_back(watch, state, args, past), past
-
-
-def taken_back(watch: Watch, state: PyTree, args: PyTree, past: Scalar) -> PyTree:
-    """The state a very short time `past` [s] before, in second order."""
-    zero = jnp.zeros(())
-    rate = watch.field(zero, state, args)
+    # In second order: the overshoot is a small part of a step.
     half = jtu.tree_map(lambda s, r: s - 0.5 * past * r, state, rate)
-    return jtu.tree_map(lambda s, r: s - past * r, state, watch.field(zero, half, args))
+    middle = watch.field(jnp.zeros(()), half, args)
+    return jtu.tree_map(lambda s, r: s - past * r, state, middle), past
 
 
-def _onto_section(watch: Watch, y: Any, t: Any, args: Any) -> tuple[Any, Scalar, Any, Any]:
+def _onto_section(watch: Watch, y: Any, t: Any, args: Any) -> tuple[Any, Scalar, Any]:
     """Takes the small overshoot back; its derivatives follow the arrival."""
     time = jax.lax.stop_gradient(t)
 
@@ -158,9 +151,7 @@ def _onto_section(watch: Watch, y: Any, t: Any, args: Any) -> tuple[Any, Scalar,
         return reached, time - past
 
     if not isinstance(y, Tangents):
-        return *arrival(y, args), None, None
+        return *arrival(y, args), None
     assert isinstance(args, Seeded)
-    (state, at), (on_section, time_columns) = along_columns(arrival, y, args)
-    past = time - at
-    _, columns = along_columns(lambda s, a: taken_back(watch, s, a, past), y, args)
-    return Tangents(state, as_columns(columns)), at, as_columns(on_section), time_columns
+    (state, at), (columns, time_columns) = along_columns(arrival, y, args)
+    return Tangents(state, as_columns(columns)), at, time_columns
