@@ -77,10 +77,8 @@ def test_a_jacobian_has_its_entries_where_they_belong():
 def test_a_second_order_system_is_eliminated_at_the_size_of_its_velocities():
     lin, _ = _crane()
     assert lin.direct() == {0: 3, 1: 4, 2: 5}
-    factors = lin.factorise(lin.jacobian(), jnp.asarray(0.01))
-    assert len(factors) == 3
-    assert all(factors.upper[i][2] is None for i in (0, 1))
-    assert factors.upper[2][0] is None
+    inverse = lin.factorise(lin.jacobian(), jnp.asarray(0.01))
+    assert [len(row) for row in inverse] == [3, 3, 3]
 
 
 def test_time_derivative():
