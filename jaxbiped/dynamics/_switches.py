@@ -1,4 +1,4 @@
-"""Where the vector field or its Jacobian jumps."""
+"""Where the vector field or a derivative of it jumps."""
 
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ class Switch(NamedTuple):
 
 
 def switches(scene: Scene, state: State) -> tuple[Switch, ...]:
-    """Every switch of a scene: touchdown, reaction leaving zero, slip at ±v0, clearance rule.
+    """Every switch of a scene: touchdown, reaction leaving zero, slip at ±v0 and 0, clearance rule.
 
     Source: the seed paper, section 2.2, whose laws have these corners.
     """

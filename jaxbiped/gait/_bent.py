@@ -63,10 +63,9 @@ def on_surface(
 
 def bend(
     function: Callable[[Scalar], Scalar], z: Scalar, bent: Bent, seeds: Scalar, count: int
-) -> tuple[Scalar, Bent]:
-    """A function of components and parameters (c + p,), and its tangents in place of theirs."""
+) -> Bent:
+    """Tangents of a function of components and parameters (c + p,), in place of theirs."""
     moved = jnp.concatenate([bent.first, seeds])
-    value = function(z)
 
     def slope(z: Scalar, along: Scalar) -> Scalar:
         return jax.jvp(function, (z,), (along,))[1]
@@ -80,4 +79,4 @@ def bend(
 
     by_tangent = jax.vmap(mixed, in_axes=(None, -1, -1), out_axes=-1)
     by_both = jax.vmap(by_tangent, in_axes=(-1, None, -1), out_axes=-1)
-    return value, Bent(first, by_both(moved[:, :count], moved[:, count:], bent.second))
+    return Bent(first, by_both(moved[:, :count], moved[:, count:], bent.second))

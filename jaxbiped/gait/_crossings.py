@@ -8,10 +8,8 @@ import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.gait._radau import Rates, stacked, with_seeds
-
-MARGIN = 1e-12
-"""Least time from a switch [s] at which its sides are looked at: enough to be sure of the side."""
+from jaxbiped.gait._radau import Rates, stacked, velocities, with_seeds
+from jaxbiped.solve._landing import MARGIN
 
 
 class Crossings(NamedTuple):
@@ -75,9 +73,9 @@ def crossings_of(
 
 def sides_of(rates: Rates, crossings: Crossings, parameters: Scalar) -> Scalar:
     """Points on the new and then the old side of each crossing, shape (steps, 6, c)."""
-    field = jax.vmap(lambda y: stacked(rates)(jnp.concatenate([y, parameters])))
+    speed = velocities(rates, crossings.landed, parameters)
     away = MARGIN * jnp.array([1.0, 4.0, 16.0, -1.0, -4.0, -16.0])
-    return crossings.landed[:, None] + away[:, None] * field(crossings.landed)[:, None]
+    return crossings.landed[:, None] + away[:, None] * speed[:, None]
 
 
 def jump_of(at_sides: Scalar) -> Scalar:

@@ -25,7 +25,6 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._bent import Bent
 from jaxbiped.gait._crossings import (
-    MARGIN,
     Crossings,
     bent_by,
     crossings_of,
@@ -38,9 +37,10 @@ from jaxbiped.gait._radau import (
     collocation,
     collocation_points,
     gradients,
-    stacked,
+    velocities,
     with_seeds,
 )
+from jaxbiped.solve._landing import MARGIN
 
 _LONG_AGO = 1.0
 """Time [s] since the last switch, where none is known."""
@@ -139,15 +139,20 @@ class _Linear(NamedTuple):
 
 
 def _linear(rates: Rates, path: Path, crossings: Crossings, parameters: Scalar) -> _Linear:
-    field = jax.vmap(lambda y: stacked(rates)(jnp.concatenate([y, parameters])))
     points = collocation_points(rates, path, parameters)
     # A step that ends on a switch belongs to the old side; a corrected point may lie beyond.
-    short = path.after - MARGIN * field(path.after)
+    short = path.after - MARGIN * velocities(rates, path.after, parameters)
     points = points.at[:, 2].set(jnp.where(crossings.crossed[:, None], short, points[:, 2]))
     sides = sides_of(rates, crossings, parameters)
     every = jnp.concatenate([points, path.before[:, None], sides], axis=1)
     found = gradients(rates, every, parameters)
-    return _Linear(points, found[:, :3], found[:, 3], field(path.before), jump_of(found[:, 4:]))
+    return _Linear(
+        points,
+        found[:, :3],
+        found[:, 3],
+        velocities(rates, path.before, parameters),
+        jump_of(found[:, 4:]),
+    )
 
 
 def _chunk(

@@ -59,14 +59,7 @@ def find_gaits(scene: Scene, starts: State, **options: Any) -> Gaits:
             f"starts has leaves of shapes {sorted(shapes)}: they must all be (n,), n at least 1."
         )
 
-    @eqx.filter_jit
-    def every(scene: Scene, starts: State) -> Gait:
-        def one(start: State) -> Gait:
-            return find_gait(scene, start, parameters=(), radius_sensitivities=False, **options)
-
-        return jax.vmap(one)(starts)
-
-    gaits = every(jtu.tree_map(as_float, scene), jtu.tree_map(as_float, starts))
+    gaits = _every(jtu.tree_map(as_float, scene), jtu.tree_map(as_float, starts), options)
     first, which = _told_apart(gaits)
     reached = np.bincount(which[which >= 0], minlength=len(first))
     order = np.argsort(-reached, kind="stable")
@@ -78,6 +71,14 @@ def find_gaits(scene: Scene, starts: State, **options: Any) -> Gaits:
         which=jnp.asarray([place[k] if k >= 0 else -1 for k in which], dtype=int),
         ending=gaits.ending,
     )
+
+
+@eqx.filter_jit
+def _every(scene: Scene, starts: State, options: dict[str, Any]) -> Gait:
+    def one(start: State) -> Gait:
+        return find_gait(scene, start, parameters=(), radius_sensitivities=False, **options)
+
+    return jax.vmap(one)(starts)
 
 
 def _told_apart(gaits: Gait) -> tuple[list[int], np.ndarray]:

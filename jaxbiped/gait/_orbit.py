@@ -7,11 +7,10 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._search import Found, Method, search
+from jaxbiped.gait._search import Found
 from jaxbiped.gait._second_turn import second_turn
 from jaxbiped.gait._stability import Stability, stability_of
 from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with
-from jaxbiped.solve._passage import Precision
 
 CLOSENESS = 1e-3
 """Distance of a multiplier from the unit circle that is flagged as a bifurcation."""
@@ -56,24 +55,6 @@ class Orbit(NamedTuple):
     sizes: Scalar
 
 
-def orbit_from(
-    turning: Turning,
-    args: PyTree,
-    active: tuple[int, ...],
-    guess: PyTree,
-    precision: Precision,
-    method: Method,
-    *,
-    radius: bool,
-) -> Orbit:
-    """Searches a periodic orbit from `guess`; differentiates it by the implicit function theorem.
-
-    `radius` asks for the derivatives of the spectral radius as well.
-    """
-    found = search(turning, args, active, guess, precision, method)
-    return orbit_of(turning, args, active, guess, found, radius=radius)
-
-
 def orbit_of(
     turning: Turning,
     args: PyTree,
@@ -83,7 +64,10 @@ def orbit_of(
     *,
     radius: bool,
 ) -> Orbit:
-    """The orbit that a search from `guess` found, as `orbit_from` gives it."""
+    """The orbit that a search from `guess` found, differentiated by the implicit function theorem.
+
+    `radius` asks for the derivatives of the spectral radius as well.
+    """
     state = state_with(turning.system, guess, found.recurring)
     m = found.recurring.shape[0]
     rates = turning.system.vector_field(jnp.zeros(()), state, args)

@@ -32,6 +32,11 @@ def stacked(rates: Rates) -> Callable[[Scalar], Scalar]:
     return lambda z: jnp.stack(rates(list(z)))
 
 
+def velocities(rates: Rates, states: Scalar, parameters: Scalar) -> Scalar:
+    """The rates of many states (n, c), shape (n, c)."""
+    return jax.vmap(lambda y: stacked(rates)(jnp.concatenate([y, parameters])))(states)
+
+
 class Path(NamedTuple):
     """Consecutive steps of a solved motion, at most `CHUNK`; idle ones have no span.
 
@@ -67,15 +72,14 @@ class Path(NamedTuple):
 def collocation_points(rates: Rates, path: Path, parameters: Scalar) -> Scalar:
     """States at the collocation points, shape (steps, 3, c): a cubic, once corrected."""
     part, share = path.clock()
-    field = jax.vmap(lambda y: stacked(rates)(jnp.concatenate([y, parameters])))
     h = path.span[:, None]
-    start, end = h * field(path.before), h * field(path.after)
+    start, end = (h * velocities(rates, y, parameters) for y in (path.before, path.after))
     change = path.after - path.before
     second, third = 3.0 * change - 2.0 * start - end, start + end - 2.0 * change
     s, before = part[..., None], path.before[:, None]
     points = before + s * (start[:, None] + s * (second[:, None] + s * third[:, None]))
     c = path.before.shape[1]
-    slopes = share[..., None] * jax.vmap(field)(points)
+    slopes = share[..., None] * jax.vmap(lambda y: velocities(rates, y, parameters))(points)
     residual = points - before - jnp.einsum("ij,njc->nic", _RADAU, slopes)
     matrix = _matrix(gradients(rates, points, parameters)[..., :c], share)
     correction = jnp.linalg.solve(matrix, residual.reshape(-1, 3 * c, 1))

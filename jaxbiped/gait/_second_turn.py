@@ -1,20 +1,19 @@
 """Second derivatives of the return map at a periodic orbit."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._bent import Bent, bend, on_surface
-from jaxbiped.gait._crossings import MARGIN
 from jaxbiped.gait._curvature import along_path
-from jaxbiped.gait._radau import stacked
+from jaxbiped.gait._radau import Rates, velocities
 from jaxbiped.gait._turn import Turn, Turning, recurring_places
 from jaxbiped.solve._columns import Seeded, active_leaves, with_active
+from jaxbiped.solve._landing import MARGIN
 from jaxbiped.solve._passage import arrival_at
 
 
@@ -87,25 +86,24 @@ def second_turn(
         clock = times[k].at[end].add(-past)
         nodes = nodes.at[end].set(vector(arrived))
         # A section may be a switch, as touchdown is: the motion begins and ends before it.
-        clock, nodes = _earlier(stacked(rates), clock, nodes, jnp.stack([0, end]), parameters)
+        clock, nodes = _earlier(rates, clock, nodes, jnp.stack([0, end]), parameters)
         bent = along_path(rates, surfaces, clock, nodes, parameters, bent, seeds, count)
         z = jnp.concatenate([nodes[end], parameters])
         if k + 1 < turning.steps:
-            _, bent = bend(renewed, z, bent, seeds, count)
+            bent = bend(renewed, z, bent, seeds, count)
     on_section, period = on_surface(rates, section, z, bent, seeds, count)
-    _, final = bend(renewed, z, on_section, seeds, count)
+    final = bend(renewed, z, on_section, seeds, count)
     parted = [final.second[places], period.second[None], final.second[drifting]]
     return jnp.concatenate(parted)
 
 
 def _earlier(
-    field: Callable[[Scalar], Scalar],
+    rates: Rates,
     clock: Scalar,
     nodes: Scalar,
     places: Scalar,
     parameters: Scalar,
 ) -> tuple[Scalar, Scalar]:
     """Times and states, some of them as little earlier as tells a switch's sides apart."""
-    chosen = nodes[places]
-    rates = jax.vmap(lambda y: field(jnp.concatenate([y, parameters])))(chosen)
-    return clock.at[places].add(-MARGIN), nodes.at[places].add(-MARGIN * rates)
+    back = -MARGIN * velocities(rates, nodes[places], parameters)
+    return clock.at[places].add(-MARGIN), nodes.at[places].add(back)

@@ -2,9 +2,9 @@
 
 A matrix is a list of rows of scalars, in which None stands for an entry that is zero whatever the
 state. Scalars may carry any batch shape, so that under `vmap` every operation runs over the whole
-batch; batched LAPACK calls on tiny matrices are many times slower. The inverse, and not factors,
-because XLA repeats operations in each of their consumers: a substitution, each of whose unknowns
-needs those before, became fifteen times its size, and a program that took twice as long to compile.
+batch; batched LAPACK calls on tiny matrices are many times slower. The inverse, and not factors:
+XLA repeats operations in each of their consumers, and with a substitution, each of whose unknowns
+needs those before, `simulate` took 4.1 s to compile instead of 2.6.
 """
 
 from typing import TypeAlias

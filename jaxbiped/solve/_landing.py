@@ -18,7 +18,7 @@ from jaxbiped.solve._fence import fenced
 
 _OVERSHOOT = 1e-4
 """Largest part of a step that may lie past a switch."""
-_MARGIN = 1e-12
+MARGIN = 1e-12
 """Time past a switch [s] that a step may always end, and aims at: the side must be beyond doubt."""
 _BISECTIONS = 40
 
@@ -121,9 +121,9 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
         scene, before, after = jax.lax.stop_gradient(parts)
         crossed, part = self._crossings(t1 - t0, scene, before, after, controller_state)
         before_switch, span = (t1 - t0) * part, t1 - t0
-        far = span - before_switch > jnp.maximum(_OVERSHOOT * before_switch, 4.0 * _MARGIN)
+        far = span - before_switch > jnp.maximum(_OVERSHOOT * before_switch, 4.0 * MARGIN)
         again = crossed.any & far
-        target = t0 + before_switch * (1.0 + 0.5 * _OVERSHOOT) + _MARGIN
+        target = t0 + before_switch * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
         target = jax.lax.stop_gradient(target)
         next_t1 = jnp.where(again, jnp.where(keep, target, jnp.minimum(next_t1, target)), next_t1)
         next_t0 = jnp.where(again, t0, next_t0)

@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import jaxbiped as jb
-from jaxbiped.gait._orbit import orbit_from
+from jaxbiped.gait._orbit import orbit_of
 from jaxbiped.gait._precision import precision_of
-from jaxbiped.gait._search import Method
+from jaxbiped.gait._search import Method, search
 from jaxbiped.gait._turn import Turning
 
 
@@ -140,6 +140,11 @@ def test_damped_oscillator_over_a_turn(mode):
     )
 
 
+def _orbit(turning, args, guess):
+    found = search(turning, args, (0,), guess, precision_of("tight"), Method(None, 40, 1e-10))
+    return orbit_of(turning, args, (0,), guess, found, radius=True)
+
+
 def test_van_der_pol_multiplier_and_its_sensitivities():
     """λ = exp(∮ μ (1 − x²) dt); period, amplitude and λ against SciPy, and their derivatives."""
 
@@ -160,17 +165,9 @@ def test_van_der_pol_multiplier_and_its_sensitivities():
         return np.array([y[0], period, math.exp(total)])
 
     turning = Turning(VanDerPol(), TURNING_POINT, jb.Rodas4(), 20.0, 1, 32768)
-    orbit = jax.jit(
-        lambda mu: orbit_from(
-            turning,
-            mu,
-            (0,),
-            (jnp.asarray(-2.1), jnp.asarray(0.1)),
-            precision_of("tight"),
-            Method(None, 40, 1e-10),
-            radius=True,
-        )
-    )(jnp.asarray(1.0))
+    orbit = jax.jit(lambda mu: _orbit(turning, mu, (jnp.asarray(-2.1), jnp.asarray(0.1))))(
+        jnp.asarray(1.0)
+    )
     expected = reference(1.0)
     slopes = (reference(1.001) - reference(0.999)) / 0.002
     assert int(orbit.found.ending) == 0
@@ -190,9 +187,7 @@ def test_bouncing_ball_in_a_cycle_of_two():
     for steps in (1, 2):
         turning = Turning(Ball(), DOWN, jb.Rodas4(), 20.0, steps, 32768)
         guess = (jnp.asarray(0.0), jnp.asarray(4.0))
-        how = Method(None, 40, 1e-10)
-        orbit = orbit_from(turning, args, (0,), guess, precision_of("tight"), how, radius=True)
-        found.append(orbit)
+        found.append(_orbit(turning, args, guess))
     once, twice = found
     assert float(twice.found.last.period) == pytest.approx(2 * float(once.found.last.period))
     one, two = (float(orbit.found.last.jacobian[1, 1]) for orbit in found)
