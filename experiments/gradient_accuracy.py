@@ -120,6 +120,7 @@ def footstep(scene: jb.Scene, start: jb.State, lands: bool, precision: Precision
         time_limit=jnp.asarray(10.0),
         steps=1,
         max_solver_steps=MOST_STEPS,
+        engine="xla",
     )
     _, active = chosen_parameters(scene, ("K",))
     seeds, _ = seeded(scene, active, len(start) - 1)

@@ -237,7 +237,9 @@ def at_equal_error(points: dict[str, list[Point]]) -> dict[str, Any]:
 def main() -> None:
     options = parse(__doc__ or "")
     began = time.perf_counter()
-    request = jb.Simulation.prepare(jb.seed_scene(), jb.seed_state(), duration=DURATION, save="end")
+    request = jb.Simulation.prepare(
+        jb.seed_scene(), jb.seed_state(), duration=DURATION, save="end", engine="xla"
+    )
     request.compile()
     first = time.perf_counter() - began
     options.say(f"Compiling a first simulation (tracing and XLA): {first:.2f} s\n")

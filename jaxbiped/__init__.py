@@ -81,6 +81,7 @@ from jaxbiped.scene._walker import Walker as Walker
 from jaxbiped.solve._accuracy import ACCURACIES as ACCURACIES
 from jaxbiped.solve._accuracy import rms_norm as rms_norm
 from jaxbiped.solve._ending import Ending as Ending
+from jaxbiped.solve._engine import ENGINES as ENGINES
 from jaxbiped.solve._rodas3p import Rodas3P as Rodas3P
 from jaxbiped.solve._rodas4 import Rodas4 as Rodas4
 from jaxbiped.solve._rodas4p import Rodas4P as Rodas4P
@@ -88,8 +89,8 @@ from jaxbiped.solve._rodas5p import Rodas5P as Rodas5P
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock as AbstractRosenbrock
 from jaxbiped.solve._rosenbrock import RosenbrockInterpolation as RosenbrockInterpolation
 from jaxbiped.solve._rosenbrock import RosenbrockTableau as RosenbrockTableau
-from jaxbiped.solve._simulate import CompiledSimulation as CompiledSimulation
-from jaxbiped.solve._simulate import Simulation as Simulation
-from jaxbiped.solve._simulate import simulate as simulate
+from jaxbiped.simulate._simulate import CompiledSimulation as CompiledSimulation
+from jaxbiped.simulate._simulate import Simulation as Simulation
+from jaxbiped.simulate._simulate import simulate as simulate
 from jaxbiped.solve._solvers import SOLVERS as SOLVERS
 from jaxbiped.solve._trajectory import Trajectory as Trajectory

@@ -21,7 +21,15 @@ _SINE = (
     8.33333333332248946124e-03,
     -1.66666666666666324348e-01,
 )
-"""Minimax coefficients on [−π/4, π/4], highest power first (FreeBSD's msun, k_sin.c)."""
+_COSINE = (
+    -1.13596475577881948265e-11,
+    2.08757232129817482790e-09,
+    -2.75573143513906633035e-07,
+    2.48015872894767294178e-05,
+    -1.38888888888741095749e-03,
+    4.16666666666666019037e-02,
+)
+"""Minimax coefficients on [−π/4, π/4], highest power first (FreeBSD's msun, k_sin.c, k_cos.c)."""
 
 
 @jax.custom_jvp
@@ -36,7 +44,10 @@ def sine_cosine(angle: Scalar) -> tuple[Scalar, Scalar]:
     for coefficient in _SINE[1:]:
         series = series * square + coefficient
     sine = rest + rest * square * series
-    cosine = jnp.sqrt(1.0 - sine * sine)
+    bend = jnp.full_like(rest, _COSINE[0])
+    for coefficient in _COSINE[1:]:
+        bend = bend * square + coefficient
+    cosine = 1.0 - (0.5 * square - square * square * bend)
     number = quadrant.astype(jnp.int32)
     odd = (number & 1) != 0
     back = (number & 2) != 0

@@ -40,6 +40,10 @@ EXPERIMENTS = {
         "numbers": {"parameters", "points", "without_a_gait", "disagreement_with_neighbours"},
         "pictures": {"sensitivity_K_c_xi.png"},
     },
+    "lanes_speed": {
+        "numbers": {"batches", "singles", "derivatives", "gaits_s", "share_of_peak", "scenes"},
+        "pictures": {"lanes_speed.png"},
+    },
     "gradient_accuracy": {
         "numbers": {"reference_tolerance", "reference", "points"},
         "pictures": {"gradient_accuracy.png"},

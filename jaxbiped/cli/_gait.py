@@ -52,6 +52,8 @@ class FindGait:
     """Footsteps in a cycle."""
     section: str = "mid-stance"
     """Where a cycle begins: mid-stance or heel-strike."""
+    engine: str = "auto"
+    """What computes: xla, lanes, or auto for the faster one that can."""
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
@@ -60,7 +62,14 @@ class FindGait:
         check_choice("section", self.section, _SECTIONS)
         self.output.check()
         section = _SECTIONS[self.section]()
-        gait = find_gait(scene, state, period=self.period, section=section, accuracy=self.accuracy)
+        gait = find_gait(
+            scene,
+            state,
+            period=self.period,
+            section=section,
+            accuracy=self.accuracy,
+            engine=self.engine,
+        )
         found = gait.outcome is Search.FOUND  # waits for the result
         wall = {
             "import": imported - _clock.IMPORT_BEGAN,
@@ -116,6 +125,7 @@ def gait_numbers(gait: Gait) -> dict[str, Any]:
         "elasticities": _by_parameter(gait.parameters, gait.elasticities),
         "walk_ending": str(gait.walk_outcome),
         "solver_steps": int(gait.solver_steps),
+        "engine": gait.engine,
     }
     return _finite(numbers)
 
@@ -186,6 +196,7 @@ def _gait_table(numbers: dict[str, Any], turns: int) -> str:
         ("residual", _shown(numbers["residual"], ".1e")),
         ("cycles of search", str(turns)),
         ("solver steps", str(numbers["solver_steps"])),
+        ("engine", numbers["engine"]),
     ]
     return table(("gait", "value"), rows, most=_MOST_ROWS)
 

@@ -15,8 +15,8 @@ from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, SolveOptions
 from jaxbiped.gait._footsteps import Footsteps, footsteps
 from jaxbiped.gait._ledger import energy_ledger
 from jaxbiped.scene._scene import Scene
+from jaxbiped.simulate._simulate import Simulation
 from jaxbiped.solve._ending import Ending
-from jaxbiped.solve._simulate import Simulation
 from jaxbiped.solve._trajectory import Trajectory
 
 _SOLVER_STEPS = 65536
@@ -52,6 +52,7 @@ class Walk:
             solver=self.solve.solver,
             rtol=self.solve.rtol,
             atol=self.solve.atol,
+            engine=self.solve.engine,
             max_solver_steps=int(_SOLVER_STEPS * max(1.0, self.solve.duration / 10.0)),
         )
         self.output.check()
@@ -81,6 +82,7 @@ class Walk:
             "solver": {
                 "name": self.solve.solver,
                 "rtol": self.solve.rtol,
+                "engine": trajectory.engine,
                 "accepted": int(trajectory.accepted),
                 "rejected": int(trajectory.rejected),
             },
@@ -164,6 +166,7 @@ def _print(report: Report, numbers: dict[str, Any]) -> None:
         f"of {numbers['gravity_work_J']:.4g} J of gravity's work"
     )
     report.say(
-        f"{solver['name']}: {solver['accepted']} steps accepted, {solver['rejected']} rejected; "
+        f"{solver['name']} ({solver['engine']}): {solver['accepted']} steps accepted, "
+        f"{solver['rejected']} rejected; "
         f"import {wall['import']:.1f} s, compile {wall['compile']:.1f} s, run {wall['run']:.3f} s"
     )

@@ -15,6 +15,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._types import as_float
 from jaxbiped.dynamics._state import State, checked_state
+from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gait import Gait, described
 from jaxbiped.gait._parameters import chosen_parameters
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
@@ -46,6 +47,7 @@ def find_gait(
     most_turns: int | None = None,
     radius_sensitivities: bool = True,
     solver: str | diffrax.AbstractSolver = "rodas4",
+    engine: str = "auto",
 ) -> Gait:
     """Finds a periodic gait, its Floquet multipliers and its sensitivities to the parameters.
 
@@ -68,6 +70,7 @@ def find_gait(
         radius_sensitivities: whether to differentiate the spectral radius, which takes second
             derivatives of the motion.
         solver: a name (see `SOLVERS`) or any diffrax solver without memory.
+        engine: "xla", "lanes" or "auto" (see `ENGINES`).
 
     Returns:
         The gait, or the best that was found instead: look at its `ending`.
@@ -92,13 +95,18 @@ def find_gait(
     scene = jtu.tree_map(as_float, scene)
     names, active = chosen_parameters(scene, parameters)
     precision = precision_of(accuracy)
+    method_of_steps = solver_named(solver)
+    section = MidStance() if section is None else section
+    chosen = orbit_engine(engine, solver=method_of_steps, section=section, leaves=(scene, start))
     turning = Turning(
         system=Walking(),
-        section=MidStance() if section is None else section,
-        solver=solver_named(solver),
+        section=section,
+        solver=method_of_steps,
         time_limit=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
         steps=int(period),
         max_solver_steps=MOST_SOLVER_STEPS[accuracy],
+        engine=chosen,
+        second_engine="xla" if _is_traced((scene, start)) else chosen,
     )
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
@@ -127,7 +135,7 @@ def _find(
         return described(turning, scene, start, found, names, active, radius)
 
     searching = (turning, scene, active, start, precision, method)
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(searching)):
+    if _is_traced(searching):
         return describe(_searched(*searching))
     # Two programs, so that the second compiles while the first one does: run on nothing, it ends
     # at once.
@@ -137,6 +145,10 @@ def _find(
         found = _searched(*searching)
         ready.result()
     return describe(found)
+
+
+def _is_traced(tree: PyTree) -> bool:
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(tree))
 
 
 @eqx.filter_jit

@@ -67,6 +67,7 @@ class Gait(eqx.Module):
         solver_steps: solver steps attempted in the last cycle.
         orbit: times [s] and states at the ends of the last cycle's solver steps, NaN beyond.
         parameters: names of the p parameters.
+        engine: what computed it, "xla" or "lanes".
     """
 
     ending: Scalar
@@ -88,6 +89,7 @@ class Gait(eqx.Module):
     solver_steps: Scalar
     orbit: tuple[Scalar, State]
     parameters: tuple[str, ...] = eqx.field(static=True)
+    engine: str = eqx.field(static=True)
 
     @property
     def outcome(self) -> Search:
@@ -169,6 +171,7 @@ def described(
         solver_steps=last.attempted,
         orbit=jtu.tree_map(lambda leaf: jnp.where(valid, leaf, jnp.nan), (times, states)),
         parameters=names,
+        engine=turning.engine,
     )
 
 

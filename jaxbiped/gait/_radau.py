@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._types import Scalar
+from jaxbiped.gait._field_rates import FieldRates
 from jaxbiped.solve._fence import fenced
 
 _ROOT = 6.0**0.5
@@ -97,6 +98,8 @@ def gradients(
 
     By reverse mode: the rates are few.
     """
+    if isinstance(rates, FieldRates) and rates.engine == "lanes":
+        return _gradients_by_lanes(rates, points, parameters, along, along_parameters)
     size = points.shape[-1]
     unit = jnp.eye(size)
     constants = list(parameters)
@@ -121,6 +124,23 @@ def gradients(
         return jax.vmap(one, axis_size=flat.shape[0])(every)
 
     rows = fenced(moves, pulled)
+    return rows.reshape(*points.shape, size + parameters.shape[0])
+
+
+def _gradients_by_lanes(
+    rates: FieldRates,
+    points: Scalar,
+    parameters: Scalar,
+    along: Scalar | None,
+    along_parameters: Scalar | None,
+) -> Scalar:
+    def one(y: Scalar, tangent: Scalar) -> Scalar:
+        whole = None if along_parameters is None else jnp.concatenate([tangent, along_parameters])
+        return rates.gradients_by_lanes(jnp.concatenate([y, parameters]), whole)
+
+    size = points.shape[-1]
+    flat = points.reshape(-1, size)
+    rows = jax.vmap(one)(flat, flat if along is None else along.reshape(-1, size))
     return rows.reshape(*points.shape, size + parameters.shape[0])
 
 

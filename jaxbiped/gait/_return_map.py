@@ -85,6 +85,7 @@ def return_map(
         time_limit=time_limit,
         steps=1,
         max_solver_steps=MOST_SOLVER_STEPS[accuracy],
+        engine="xla",
     )
     follow = _forward if isinstance(gradient, Forward) else _reverse
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))

@@ -10,6 +10,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.gait._bent import Bent, bend, on_surface
 from jaxbiped.gait._curvature import along_path
+from jaxbiped.gait._field_rates import FieldRates
 from jaxbiped.gait._radau import Rates, velocities
 from jaxbiped.gait._turn import Turn, Turning, recurring_places
 from jaxbiped.solve._columns import Seeded, active_leaves, with_active
@@ -56,9 +57,7 @@ def second_turn(
     def vector(y: PyTree) -> Scalar:
         return jnp.stack(jtu.tree_leaves(y))
 
-    def rates(z: Sequence[Scalar]) -> list[Scalar]:
-        state, scene = parts(z)
-        return jtu.tree_leaves(turning.system.vector_field(jnp.zeros(()), state, scene))
+    rates = FieldRates(turning.system, args, structure, turning.second_engine)
 
     def surfaces(z: Scalar) -> Any:
         state, scene = parts(z)

@@ -11,6 +11,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.gait._section import AbstractSection
 from jaxbiped.gait._system import AbstractSystem
+from jaxbiped.lanes._passage import passage_by_lanes
 from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns
 from jaxbiped.solve._landing import Watch
 from jaxbiped.solve._passage import Passage, Precision, passage
@@ -30,6 +31,8 @@ class Turning(eqx.Module):
         steps: arrivals that make one turn.
         time_limit: longest time to the next arrival [s].
         max_solver_steps: cap on the attempted steps to the next arrival.
+        engine: "xla" or "lanes"; `second_engine` the same for second derivatives, of which the
+            lanes compile sooner, but a batch is the faster in XLA.
     """
 
     system: AbstractSystem
@@ -38,23 +41,31 @@ class Turning(eqx.Module):
     time_limit: Any
     steps: int = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
+    engine: str = eqx.field(static=True)
+    second_engine: str = eqx.field(static=True, default="xla")
 
     def watch(self, args: PyTree, y: PyTree, *, peak: bool = True) -> Watch:
         """What the solves land on: a section is looked at after the arrival's renewal."""
-        system, section = self.system, self.section
-
-        def arrives(args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
-            renewed = system.renew(args, y)
-            return section.value(args, renewed), section.counts(args, renewed)
-
+        system = self.system
         loaded = eqx.filter_eval_shape(system.load, args, y) is not None
         return Watch(
             field=system.vector_field,
             switches=system.switches,
-            section=arrives,
+            section=_Arrival(system, self.section),
             ending=system.ending,
             peak=system.load if peak and loaded else None,
         )
+
+
+class _Arrival(eqx.Module):
+    """The section's value and whether a crossing counts, looked at after the renewal."""
+
+    system: AbstractSystem
+    section: AbstractSection
+
+    def __call__(self, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
+        renewed = self.system.renew(args, y)
+        return self.section.value(args, renewed), self.section.counts(args, renewed)
 
 
 class Turn(NamedTuple):
@@ -133,19 +144,9 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
 
     def one(
         before: tuple[Tangents, Scalar], _: None
-    ) -> tuple[tuple[Tangents, Scalar], tuple[Passage, Scalar, Scalar, Scalar]]:
+    ) -> tuple[tuple[Tangents, Scalar], tuple[Passage, Scalar]]:
         y0, failed = before
-        found = passage(
-            watch,
-            turning.solver,
-            y0,
-            args,
-            precision=precision,
-            time_limit=jnp.where(failed != 0, 0.0, limit),
-            max_solver_steps=turning.max_solver_steps,
-            save_nodes=True,
-        )
-
+        found = _passed(turning, watch, y0, args, precision, jnp.where(failed != 0, 0.0, limit))
         state, moved = along_columns(lambda s, a: turning.system.renew(a, s), found.y, args)
         on_section = as_columns(moved)
         # At a fixed time the renewal comes earlier or later, and the motion after it with it.
@@ -153,7 +154,7 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
         velocity = jnp.stack(jtu.tree_leaves(rates))
         columns = on_section - velocity[:, None] * found.time_columns
         code = jnp.where(failed != 0, failed, found.code)
-        return (Tangents(state, columns), code), (found, on_section, *_peak(watch, found, args))
+        return (Tangents(state, columns), code), (found, on_section)
 
     begin = (Tangents(y, start), jnp.asarray(0))
     if turning.steps == 1:
@@ -161,8 +162,37 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
         every = jax.tree.map(lambda leaf: leaf[None], last)
     else:
         (end, code), every = jax.lax.scan(one, begin, length=turning.steps)
-    passages, on_section, *peaks = every
-    return _turn(turning, y, end, code, passages, on_section[-1], *peaks)
+    passages, on_section = every
+    return _turn(turning, y, end, code, passages, on_section[-1])
+
+
+def _passed(
+    turning: Turning, watch: Watch, y0: Tangents, args: Seeded, precision: Precision, limit: Scalar
+) -> Passage:
+    """The next passage, by the engine that is asked for."""
+    most = turning.max_solver_steps
+    if turning.engine == "xla":
+        return passage(
+            watch,
+            turning.solver,
+            y0,
+            args,
+            precision=precision,
+            time_limit=limit,
+            max_solver_steps=most,
+            save_nodes=True,
+        )
+    sizes = jnp.diagonal(args.seeds[:, args.seeds.shape[1] - len(args.active) :])
+    return passage_by_lanes(
+        watch,
+        turning.solver,
+        y0,
+        args,
+        sizes,
+        precision=precision,
+        time_limit=limit,
+        max_solver_steps=most,
+    )
 
 
 def _turn(
@@ -172,14 +202,11 @@ def _turn(
     code: Scalar,
     passages: Passage,
     on_section: Scalar,
-    peaks: Scalar,
-    peak_rows: Scalar,
 ) -> Turn:
     places = jnp.asarray(recurring_places(turning.system, y))
     drifting = jnp.asarray(turning.system.drifting, dtype=int)
     before, after = jnp.stack(jtu.tree_leaves(y)), jnp.stack(jtu.tree_leaves(end.state))
-    landed = passages.landed
-    highest = jnp.argmax(peaks)
+    highest = jnp.argmax(passages.peak)
     return Turn(
         recurring=after[places],
         jacobian=on_section[places],
@@ -188,38 +215,10 @@ def _turn(
         period_row=passages.time_columns[-1],
         advance=(after - before)[drifting],
         advance_rows=on_section[drifting],
-        peak=peaks[highest],
-        peak_row=peak_rows[highest],
+        peak=passages.peak[highest],
+        peak_row=passages.peak_columns[highest],
         code=code,
         attempted=jnp.sum(passages.attempted),
-        jumps=jnp.sum(landed.jumps),
+        jumps=jnp.sum(passages.jumps),
         nodes=passages.nodes,
     )
-
-
-def _peak(watch: Watch, found: Passage, args: Seeded) -> tuple[Scalar, Scalar]:
-    """The largest load and its derivatives.
-
-    The solve landed just past the moment at which the load's rate is zero; that little time is
-    taken back, for the load's rate changes fast during an impact.
-    """
-    if watch.peak is None:
-        return jnp.zeros(()), jnp.zeros(args.seeds.shape[1])
-    load = watch.peak
-
-    def value(y: PyTree, a: PyTree) -> Scalar:
-        return load(a, y)
-
-    def rate(y: PyTree, a: PyTree) -> Scalar:
-        velocity = watch.field(jnp.zeros(()), y, a)
-        return jax.jvp(lambda y: load(a, y), (y,), (velocity,))[1]
-
-    at_peak = found.landed.at_peak
-    highest, row = along_columns(value, at_peak, args)
-    slope, slope_row = along_columns(rate, at_peak, args)
-    state = at_peak.state
-    velocity = watch.field(jnp.zeros(()), state, args.args)
-    bend = jax.jvp(lambda y: rate(y, args.args), (state,), (velocity,))[1]
-    turned = bend < 0.0
-    past = jnp.where(turned, slope / jnp.where(turned, bend, 1.0), 0.0)
-    return highest - 0.5 * past * slope, row - past * slope_row

@@ -167,3 +167,19 @@ def ending_events(watch: tuple[str, ...]) -> dict[Ending, Callable[..., Any]]:
     if "stumble" in watch:
         events[Ending.STUMBLED] = stumbled
     return events
+
+
+def ending_code(events: dict[Ending, Any], *, done: Scalar, out_of_steps: Scalar) -> Scalar:
+    """The code of how a solve ended.
+
+    Args:
+        events: for each misfortune, whether it happened (boolean).
+        done: whether the solve came to the end that was asked for.
+        out_of_steps: whether it came to its cap on steps, or waited too long for a footstep.
+    """
+    code = jnp.asarray(int(Ending.SOLVER_FAILED))
+    code = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), code)
+    code = jnp.where(done, int(Ending.WALKING), code)
+    for name, happened in events.items():
+        code = jnp.where(happened, int(name), code)
+    return code

@@ -1,6 +1,8 @@
 """Keeps XLA's CPU backend from computing the same thing many times over."""
 
-from collections.abc import Callable
+import contextlib
+import contextvars
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import equinox.internal as eqxi
@@ -10,6 +12,18 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._types import Scalar
+
+_UP = contextvars.ContextVar("fences are up", default=True)
+
+
+@contextlib.contextmanager
+def fences_down() -> Iterator[None]:
+    """Within, `fenced` does nothing: for other compilers than XLA's."""
+    token = _UP.set(False)
+    try:
+        yield
+    finally:
+        _UP.reset(token)
 
 
 def fenced(happens: Scalar, compute: Callable[[], Any]) -> Any:
@@ -21,7 +35,7 @@ def fenced(happens: Scalar, compute: Callable[[], Any]) -> Any:
     compiler cannot know. `happens` (boolean) says where the result is wanted; where no lane wants
     it, the result may be zeros. Elsewhere than on a CPU there is nothing to keep apart.
     """
-    if jax.default_backend() != "cpu":
+    if not _UP.get() or jax.default_backend() != "cpu":
         return compute()
     program, shapes = jax.make_jaxpr(compute, return_shape=True)()
     leaves, structure = jtu.tree_flatten(shapes)

@@ -4,12 +4,14 @@ from collections.abc import Callable
 from typing import Any
 
 import diffrax
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped.dynamics._feet import feet, landings, standing_foot
 from jaxbiped.dynamics._state import State
+
+PATIENCE = 100.0
+"""Time allowed for each footstep asked for [s]."""
 
 
 class FootstepLimit(diffrax.AbstractAdaptiveStepSizeController):
@@ -28,10 +30,10 @@ class FootstepLimit(diffrax.AbstractAdaptiveStepSizeController):
     atol: Any
     norm: Callable[[PyTree], Any]
     controller: diffrax.PIDController
-    limit: int = eqx.field(static=True)
+    limit: Any
 
     @staticmethod
-    def around(controller: diffrax.PIDController, limit: int) -> "FootstepLimit":
+    def around(controller: diffrax.PIDController, limit: Any) -> "FootstepLimit":
         """Wraps a controller."""
         return FootstepLimit(
             rtol=controller.rtol,

@@ -21,6 +21,7 @@ _OVERSHOOT = 1e-4
 MARGIN = 1e-12
 """Time past a switch [s] that a step may always end, and aims at: the side must be beyond doubt."""
 _BISECTIONS = 40
+_ROUNDING = 1e-12
 
 
 class Watch(eqx.Module):
@@ -240,7 +241,8 @@ def _surfaces(watch: Watch, peak: Any, scene: PyTree, state: PyTree) -> list[Swi
         rate = watch.field(jnp.zeros_like(peak), state, scene)
         quantity = functools.partial(watch.peak, scene)
         value, slope = jax.jvp(quantity, (state,), (rate,))
-        found.append(Switch(slope, value >= peak))
+        # The same value computed twice may differ by its rounding.
+        found.append(Switch(slope, value >= peak - _ROUNDING * jnp.abs(peak)))
     if watch.section is not None:
         found.append(Switch(*watch.section(scene, state)))
     return found

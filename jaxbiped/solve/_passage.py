@@ -1,6 +1,7 @@
 """One passage: from a state to the next arrival at a section."""
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
 
 import diffrax
 import jax
@@ -20,6 +21,9 @@ from jaxbiped.solve._tangents import (
     VariationalField,
     worst_norm,
 )
+
+Along: TypeAlias = Callable[[Callable[[PyTree, PyTree], Any], Tangents, Seeded], tuple[Any, Any]]
+"""Values of a function of state and arguments, and their derivatives along columns."""
 
 
 class Precision(NamedTuple):
@@ -43,7 +47,9 @@ class Passage(NamedTuple):
         time: duration of the passage [s].
         time_columns: derivatives of the time of arrival, shape (n,).
         code: 0 for an arrival, else that of an `Ending`.
-        landed: what the step-size control knows at the end.
+        peak: largest value of the watched quantity, 0 where there is none; `peak_columns` its
+            derivatives, shape (n,), where the solve carried columns.
+        jumps: steps that ended past a switch where the vector field itself jumps.
         attempted: number of steps attempted.
         nodes: times and states at the ends of the accepted steps, where saved.
     """
@@ -52,7 +58,9 @@ class Passage(NamedTuple):
     time: Scalar
     time_columns: Any
     code: Scalar
-    landed: Landed
+    peak: Scalar
+    peak_columns: Any
+    jumps: Scalar
     attempted: Scalar
     nodes: Any
 
@@ -103,13 +111,16 @@ def passage(
     states: Any = solution.ys
     landed: Any = solution.controller_state
     last = jtu.tree_map(lambda leaf: leaf[-1], states[0])
-    y, time, time_columns = _onto_section(watch, last, times[0][-1], args)
+    y, time, time_columns = onto_section(watch, last, times[0][-1], args)
+    peak, peak_columns = peak_of(watch, landed.at_peak, args) if carries else (jnp.zeros(()), None)
     return Passage(
         y=y,
         time=time,
         time_columns=time_columns,
         code=_code(solution, landed),
-        landed=landed,
+        peak=peak,
+        peak_columns=peak_columns,
+        jumps=landed.jumps,
         attempted=solution.stats["num_steps"],
         nodes=(times[1], states[1]) if save_nodes else None,
     )
@@ -142,8 +153,14 @@ def arrival_at(watch: Watch, state: PyTree, args: PyTree) -> tuple[PyTree, Scala
     return jtu.tree_map(lambda s, r: s - past * r, state, middle), past
 
 
-def _onto_section(watch: Watch, y: Any, t: Any, args: Any) -> tuple[Any, Scalar, Any]:
-    """Takes the small overshoot back; its derivatives follow the arrival."""
+def onto_section(
+    watch: Watch, y: Any, t: Any, args: Any, along: Along = along_columns
+) -> tuple[Any, Scalar, Any]:
+    """Takes the small overshoot back; its derivatives follow the arrival.
+
+    Gives what is on the section, the time, and the time's derivatives. `along` differentiates
+    along the columns.
+    """
     time = jax.lax.stop_gradient(t)
 
     def arrival(state: PyTree, scene: PyTree) -> tuple[PyTree, Scalar]:
@@ -153,5 +170,34 @@ def _onto_section(watch: Watch, y: Any, t: Any, args: Any) -> tuple[Any, Scalar,
     if not isinstance(y, Tangents):
         return *arrival(y, args), None
     assert isinstance(args, Seeded)
-    (state, at), (columns, time_columns) = along_columns(arrival, y, args)
+    (state, at), (columns, time_columns) = along(arrival, y, args)
     return Tangents(state, as_columns(columns)), at, time_columns
+
+
+def peak_of(
+    watch: Watch, at_peak: Any, args: Seeded, along: Along = along_columns
+) -> tuple[Scalar, Scalar]:
+    """The largest load and its derivatives.
+
+    The solve landed just past the moment at which the load's rate is zero; that little time is
+    taken back, for the load's rate changes fast during an impact.
+    """
+    if watch.peak is None:
+        return jnp.zeros(()), jnp.zeros(args.seeds.shape[1])
+    load = watch.peak
+
+    def value(y: PyTree, a: PyTree) -> Scalar:
+        return load(a, y)
+
+    def rate(y: PyTree, a: PyTree) -> Scalar:
+        velocity = watch.field(jnp.zeros(()), y, a)
+        return jax.jvp(lambda y: load(a, y), (y,), (velocity,))[1]
+
+    highest, row = along(value, at_peak, args)
+    slope, slope_row = along(rate, at_peak, args)
+    state = at_peak.state
+    velocity = watch.field(jnp.zeros(()), state, args.args)
+    bend = jax.jvp(lambda y: rate(y, args.args), (state,), (velocity,))[1]
+    turned = bend < 0.0
+    past = jnp.where(turned, slope / jnp.where(turned, bend, 1.0), 0.0)
+    return highest - 0.5 * past * slope, row - past * slope_row

@@ -114,20 +114,15 @@ class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):
     ) -> tuple[PyTree, PyTree, dict[str, Any], None, Any]:
         """One step, as `diffrax.AbstractSolver.step` describes it."""
         del solver_state, made_jump
-        y1, error, coefficients = _step(self.tableau, terms, t0, t1, y0, args)
+        y1, error, coefficients = _cached_step(self.tableau, terms, t0, t1, y0, args)
         dense_info = dict(y0=y0, y1=y1, coefficients=coefficients)
         return y1, error, dense_info, None, diffrax.RESULTS.successful
 
 
-@eqx.filter_jit
-def _step(
+def step_of(
     tableau: RosenbrockTableau, terms: Any, t0: Any, t1: Any, y0: PyTree, args: PyTree
 ) -> tuple[PyTree, PyTree, tuple[PyTree, ...]]:
-    """The new value, its error estimate and the coefficients of the dense output.
-
-    Jitted for its cache alone: diffrax traces a step many times over, and this makes every time
-    but the first free.
-    """
+    """The new value, its error estimate and the coefficients of the dense output."""
     start, join = split(y0)
     dtype = jnp.result_type(*start)
 
@@ -141,6 +136,11 @@ def _step(
     error = stages.weighted(error_weights(tableau))
     dense = tuple(join(stages.weighted(row)) for row in tableau.dense)
     return join(end), join(error), dense
+
+
+_cached_step = eqx.filter_jit(step_of)
+"""Jitted for its cache alone: diffrax traces a step many times over, and this makes every time
+but the first free."""
 
 
 def end_weights(tableau: RosenbrockTableau) -> Row:

@@ -54,7 +54,7 @@ def rosenbrock_columns(
     if any(drift is not None for drift in stages.lin.time_derivative()):
         return None
 
-    followers, kept = list(stages.direct), _kept_in_order(stages)
+    followers, kept = list(stages.direct), kept_in_order(stages)
 
     def kept_rates(y: Components, q: Sequence[Scalar]) -> Components:
         all_rates = rates(t, y, q)
@@ -157,7 +157,7 @@ def _column_stages(
     return increments
 
 
-def _kept_in_order(stages: Stages) -> list[int]:
+def kept_in_order(stages: Stages) -> list[int]:
     """The kept components: first those that the direct ones follow, in the same order."""
     sources = list(stages.direct.values())
     return [*sources, *(i for i in stages.kept if i not in sources)]
@@ -172,7 +172,7 @@ def _rows(matrix: Scalar, order: Sequence[int]) -> Scalar:
 
 def _inverse(stages: Stages) -> tuple[Scalar, Scalar]:
     """(I − g J)⁻¹ for the kept components alone, and their J by the direct ones."""
-    kept = _kept_in_order(stages)
+    kept = kept_in_order(stages)
     places = [stages.kept.index(i) for i in kept]
     inverse = jnp.stack([jnp.stack([stages.factors[i][j] for j in places]) for i in places])
     zero = jnp.zeros_like(stages.step)

@@ -16,7 +16,7 @@ from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.solve._rosenbrock_columns import rosenbrock_columns
 
-_SHARE = 0.1
+SHARE = 0.1
 """Of a column's largest entry: what its smaller entries' errors are measured against."""
 
 
@@ -153,7 +153,7 @@ class TangentControl(diffrax.AbstractAdaptiveStepSizeController):
     ) -> Any:
         """Accepts or rejects a step, as diffrax asks."""
         size = jnp.maximum(jnp.abs(y0.columns), jnp.abs(y1_candidate.columns))
-        floor = _SHARE * jnp.max(size, axis=0) + args.floors
+        floor = SHARE * jnp.max(size, axis=0) + args.floors
         # The wrapped controller divides by its absolute tolerance; nothing else is left to it.
         scaled = y_error.columns * (self.atol / (self.tangent_rtol * (size + floor)))
         nothing = jnp.zeros_like(scaled)

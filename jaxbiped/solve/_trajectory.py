@@ -22,6 +22,7 @@ class Trajectory(eqx.Module):
         ending: code of an `Ending`; `Ending(int(code))` names it.
         accepted, rejected: numbers of the solver's steps.
         dense: the continuous solution, where all steps were saved.
+        engine: what computed it, "xla" or "lanes".
     """
 
     t: Float[Array, "..."]
@@ -30,6 +31,7 @@ class Trajectory(eqx.Module):
     accepted: Int[Array, "..."]
     rejected: Int[Array, "..."]
     dense: diffrax.DenseInterpolation | None
+    engine: str = eqx.field(static=True, default="xla")
 
     @property
     def final(self) -> State:

@@ -58,7 +58,7 @@ def test_json_keys(numbers):
         "ending", "period_s", "step_length_m", "speed_m_s", "peak_normal_N", "state", "residual",
         "multipliers", "multiplier_errors", "unit_multiplier_error", "spectral_radius", "stable",
         "bifurcation", "sensitivities", "sensitivity_errors", "elasticities", "walk_ending",
-        "solver_steps", "wall_s",
+        "solver_steps", "engine", "wall_s",
     }  # fmt: skip
     states = {f"state.{name}" for name in numbers["state"]}
     assert len(states) == 8

@@ -23,7 +23,8 @@ class Classic:
         a, c = np.zeros((size, size)), np.zeros((size, size))
         for i in range(1, size):
             a[i, :i], c[i, :i] = tableau.a[i - 1], tableau.c[i - 1]
-        self.gamma = np.linalg.inv(np.eye(size) / tableau.gamma - c)
+        # Longer numbers: rounding of the transformation is not the tableau's error.
+        self.gamma = _inverse(np.eye(size) / np.longdouble(tableau.gamma) - c).astype(float)
         self.alpha = a @ self.gamma
         self.beta = self.alpha + self.gamma
         self.end = np.append(a[-1, :-1], 1.0)
@@ -51,6 +52,14 @@ class Classic:
         for branch in tree:
             product = product * (self.alpha @ self.elementary(branch))
         return product
+
+
+def _inverse(lower):
+    """Of a lower triangular matrix, in its own precision."""
+    inverse = np.zeros_like(lower)
+    for i, row in enumerate(np.eye(len(lower), dtype=lower.dtype)):
+        inverse[i] = (row - lower[i, :i] @ inverse[:i]) / lower[i, i]
+    return inverse
 
 
 def _forests(nodes, largest):

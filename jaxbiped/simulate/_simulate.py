@@ -7,6 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import Array
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
@@ -14,15 +15,14 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._motion import vector_field
 from jaxbiped.dynamics._state import State, checked_state
 from jaxbiped.scene._scene import Scene
+from jaxbiped.simulate._by_lanes import by_lanes, prepared_lanes
+from jaxbiped.simulate._engine import chosen_engine
 from jaxbiped.solve._accuracy import check_precision, rms_norm, tolerances
-from jaxbiped.solve._ending import WATCHES, Ending, ending_events
-from jaxbiped.solve._footstep_limit import FootstepLimit
+from jaxbiped.solve._ending import WATCHES, Ending, ending_code, ending_events
+from jaxbiped.solve._footstep_limit import PATIENCE, FootstepLimit
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._step_control import first_step, step_control
 from jaxbiped.solve._trajectory import Trajectory
-
-_PATIENCE = 100.0
-"""Time allowed for each footstep asked for [s]."""
 
 
 def simulate(
@@ -39,6 +39,7 @@ def simulate(
     watch: tuple[str, ...] = WATCHES,
     max_solver_steps: int = 65536,
     adjoint: diffrax.AbstractAdjoint | None = None,
+    engine: str = "auto",
 ) -> Trajectory:
     """Simulates a scene from a state, for a time, a number of footsteps, or whichever ends first.
 
@@ -62,6 +63,8 @@ def simulate(
         max_solver_steps: cap on the solver's attempted steps.
         adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
             needs `diffrax.ForwardMode()`.
+        engine: "xla", "lanes" or "auto" (see `ENGINES`). The results of the two agree to within
+            the tolerance, not bit by bit.
 
     Returns:
         The motion, and how it ended.
@@ -82,8 +85,9 @@ def simulate(
         watch=watch,
         max_solver_steps=max_solver_steps,
         adjoint=adjoint,
+        engine=engine,
     )
-    return _trimmed(_solve(run))
+    return run()
 
 
 class Simulation(eqx.Module):
@@ -101,6 +105,7 @@ class Simulation(eqx.Module):
     save_steps: bool = eqx.field(static=True)
     watch: tuple[str, ...] = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
+    engine: str = eqx.field(static=True)
 
     @staticmethod
     def prepare(
@@ -117,6 +122,7 @@ class Simulation(eqx.Module):
         watch: tuple[str, ...] = WATCHES,
         max_solver_steps: int = 65536,
         adjoint: diffrax.AbstractAdjoint | None = None,
+        engine: str = "auto",
     ) -> "Simulation":
         """Checks the arguments, which are those of `simulate`."""
         check_type("scene", scene, Scene)
@@ -125,7 +131,7 @@ class Simulation(eqx.Module):
             raise ArgumentError("duration = None and steps = None: say how long to simulate.")
         if steps is not None:
             check_positive("steps", steps)
-        allowed_time = _PATIENCE * steps if steps is not None else 0.0
+        allowed_time = PATIENCE * steps if steps is not None else 0.0
         time = allowed_time if duration is None else duration
         check_positive("duration", time, "s")
         check_positive("max_solver_steps", max_solver_steps)
@@ -133,6 +139,8 @@ class Simulation(eqx.Module):
             check_choice("watch", name, WATCHES)
         if isinstance(save, str):
             check_choice("save", save, ("steps", "end"))
+        if not isinstance(save, str):
+            _check_times(save, time)
         relative, absolute = tolerances(accuracy, rtol, atol)
         dtype = jnp.result_type(state.hip_z)
         check_precision(scene, dtype)
@@ -140,6 +148,16 @@ class Simulation(eqx.Module):
         def cast(leaf: Any) -> Array:
             return jnp.asarray(leaf, dtype=dtype)
 
+        method = solver_named(solver)
+        save_steps = isinstance(save, str) and save == "steps"
+        chosen = chosen_engine(
+            engine,
+            solver=method,
+            save_steps=save_steps,
+            adjoint=adjoint,
+            leaves=(scene, state, time),
+            times=save,
+        )
         return Simulation(
             scene=jtu.tree_map(cast, scene),
             state=state,
@@ -147,18 +165,36 @@ class Simulation(eqx.Module):
             times=None if isinstance(save, str) else cast(save),
             rtol=cast(relative),
             atol=cast(absolute),
-            solver=solver_named(solver),
+            solver=method,
             adjoint=diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint,
             steps=None if steps is None else int(steps),
-            save_steps=isinstance(save, str) and save == "steps",
+            save_steps=save_steps,
             watch=tuple(watch),
             max_solver_steps=int(max_solver_steps),
+            engine=chosen,
         )
+
+    def __call__(self) -> Trajectory:
+        """Compiles what is not compiled yet, and runs."""
+        return by_lanes(self) if self.engine == "lanes" else _trimmed(_solve(self))
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
+        if self.engine == "lanes":
+            return CompiledSimulation(prepared_lanes(self), self)
         program = _solve.lower(self).compile()  # type: ignore[attr-defined]
         return CompiledSimulation(program, self)
+
+
+def _check_times(times: Any, duration: Any) -> None:
+    if isinstance(times, jax.core.Tracer) or isinstance(duration, jax.core.Tracer):
+        return
+    values = np.asarray(times, dtype=float)
+    allowed = values.ndim == 1 and np.all(np.diff(values) >= 0.0)
+    if not allowed or not np.all((values >= 0.0) & (values <= float(duration))):
+        raise ArgumentError(
+            f"save = {values} is not allowed: it must be increasing times from 0 to {duration} s."
+        )
 
 
 class CompiledSimulation:
@@ -216,21 +252,18 @@ def _saveat(run: Simulation) -> diffrax.SaveAt:
 
 def _ending(solution: diffrax.Solution, names: list[Ending], run: Simulation) -> Array:
     results = diffrax.RESULTS
-    code = jnp.asarray(int(Ending.SOLVER_FAILED))
-    code = jnp.where(solution.result == results.max_steps_reached, int(Ending.OUT_OF_STEPS), code)
-    done = solution.result == results.successful
+    out_of_steps: Any = solution.result == results.max_steps_reached
+    done: Any = solution.result == results.successful
     if run.steps is not None:
         counting: Any = solution.controller_state
         _, _, count = counting
         # Time ran out before the footsteps came, where only footsteps were asked for.
-        patience_ended = done & (count < run.steps) & (run.duration >= _PATIENCE * run.steps)
-        code = jnp.where(patience_ended, int(Ending.OUT_OF_STEPS), code)
+        patience_ended = done & (count < run.steps) & (run.duration >= PATIENCE * run.steps)
+        out_of_steps = out_of_steps | patience_ended
         done = (done & ~patience_ended) | (solution.result == results.event_occurred)
-    code = jnp.where(done, int(Ending.WALKING), code)
     masks: Any = solution.event_mask
-    for name, happened in zip(names, masks or [], strict=True):
-        code = jnp.where(happened, int(name), code)
-    return code
+    events = dict(zip(names, masks or [], strict=True))
+    return ending_code(events, done=done, out_of_steps=out_of_steps)
 
 
 def _trimmed(trajectory: Trajectory) -> Trajectory:

@@ -1,0 +1,119 @@
+"""What the lanes do in a step, what the machine could do, and scenes of more and less work."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+
+import jaxbiped as jb
+from jaxbiped.lanes._engine import CompiledProgram
+from jaxbiped.lanes._program import Program
+from jaxbiped.lanes._solve import Setting, compiled_solve
+
+_WATCH = ("fall", "stop", "stumble")
+_CHAINS, _LENGTH = 24, 2000
+_FLOPS = {"fadd": 1, "fsub": 1, "fmul": 1, "fdiv": 1, "sqrt": 1, "fma": 2}
+
+
+def final_slopes(duration: float, rtol: float) -> Callable[[], tuple[np.ndarray, np.ndarray]]:
+    """Final state (8,) and its derivatives by log K, log c and log ξ (8, 3), by lanes."""
+    scene, state = jb.seed_scene(), jb.seed_state()
+
+    def final(logs: Any) -> Any:
+        leaves = (scene.normal.K, scene.normal.c, scene.friction.xi)
+        moved = [leaf * jnp.exp(logs[i]) for i, leaf in enumerate(leaves)]
+        new = eqx.tree_at(lambda s: (s.normal.K, s.normal.c, s.friction.xi), scene, moved)
+        options: dict[str, Any] = dict(save="end", rtol=rtol, atol=1e-2 * rtol, engine="lanes")
+        end = jnp.stack(jb.simulate(new, state, duration=duration, **options).final)
+        return end, end
+
+    both = jax.jit(jax.jacfwd(final, has_aux=True))
+
+    def run() -> tuple[np.ndarray, np.ndarray]:
+        slopes, end = both([jnp.asarray(0.0)] * 3)
+        return np.asarray(end), np.stack(slopes, axis=1)
+
+    return run
+
+
+def peak_flops() -> float:
+    """Floating-point operations a second of independent multiply-adds, on all threads."""
+
+    def attempt(x: Any, carried: Any) -> Any:
+        chains, count = carried
+
+        def once(_: int, now: tuple[Any, ...]) -> tuple[Any, ...]:
+            return tuple(each * x + 0.5 for each in now)
+
+        return (jax.lax.fori_loop(0, _LENGTH, once, chains), count + 1.0), count >= 20.0
+
+    program = CompiledProgram(
+        Program(
+            start=lambda x: (tuple(x + 0.1 * k for k in range(_CHAINS)), jnp.zeros(())),
+            attempt=attempt,
+            finish=lambda x, carried: sum(carried[0]),
+        ),
+        jax.ShapeDtypeStruct((), jnp.float64),
+    )
+    inputs = np.full(512, 0.999)
+    program.run(inputs)
+    seconds = []
+    for _ in range(5):
+        began = time.perf_counter()
+        program.run(inputs)
+        seconds.append(time.perf_counter() - began)
+    return 2.0 * _CHAINS * _LENGTH * 21 * len(inputs) / min(seconds)
+
+
+def _compiled(scene: jb.Scene) -> CompiledProgram:
+    setting = Setting(jb.Rodas4(), _WATCH, counting=False, quick=False)
+    return compiled_solve(setting, jtu.tree_structure(scene), dense=False)
+
+
+def flops_per_step() -> int:
+    """Floating-point operations of an attempted step of the seed's scene."""
+    graph = _compiled(jb.seed_scene()).graph
+    return sum(_FLOPS.get(value.op, 0) for value in graph.body.values)
+
+
+def scenes(count: int, duration: float) -> list[dict[str, Any]]:
+    """Machine instructions and attempted steps a second of scenes that model more and less."""
+    seed = jb.seed_scene()
+    friction, normal = seed.friction, seed.normal
+    mu = friction.mu_static
+    choices = {
+        "the seed's": (normal, friction),
+        "smooth laws": (
+            jb.SmoothRistowSchafer(K=1e6, c=1e7),
+            jb.SmoothBengisuAkay(
+                mu_static=mu, mu_kinetic=friction.mu_kinetic, v0=friction.v0, xi=friction.xi
+            ),
+        ),
+        "regularised Coulomb": (normal, jb.RegularisedCoulomb(mu=mu, v_d=1e-2)),
+        "frictionless": (normal, jb.Frictionless()),
+        "frictionless Hertz": (jb.Hertz(K=1e6), jb.Frictionless()),
+    }
+    rows = []
+    noise = np.random.default_rng(0).standard_normal((count, 8))
+    start = np.array([float(leaf) for leaf in jb.seed_state()])
+    starts = [jnp.asarray(column) for column in (start * (1.0 + 1e-3 * noise)).T]
+    for name, (force, slip) in choices.items():
+        scene = jb.Scene(walker=seed.walker, ground=seed.ground, normal=force, friction=slip)
+
+        def one(*state: Any, scene: jb.Scene = scene) -> Any:
+            options: dict[str, Any] = dict(save="end", engine="lanes", watch=_WATCH)
+            end = jb.simulate(scene, jb.State(*state), duration=0.2 * duration, **options)
+            return end.accepted + end.rejected
+
+        jax.vmap(one)(*starts)
+        began = time.perf_counter()
+        steps = int(np.sum(jax.vmap(one)(*starts)))
+        rate = steps / (time.perf_counter() - began)
+        rows.append(dict(scene=name, instructions=_compiled(scene).instructions(),
+                         steps_per_s=rate))  # fmt: skip
+    return rows

@@ -1,0 +1,256 @@
+"""The two engines and their peers on the seed's walk: batches, single walks, gaits, derivatives.
+
+Writes lanes_speed.png. Everything is run in turns in one process, on two cores.
+"""
+
+# ruff: noqa: E402 (the cores are settled before JAX is imported)
+import os
+
+CORES = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+if CORES:
+    os.sched_setaffinity(0, CORES[-2:])
+os.environ.setdefault("NUMBA_NUM_THREADS", str(min(2, len(CORES) or 2)))
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import _casadi
+import _independent
+import _lane_work
+import jax
+import jax.numpy as jnp
+import matplotlib.pyplot as plt
+import numpy as np
+from _options import Options, parse
+
+import jaxbiped as jb
+
+DURATION = 2.0
+PERTURBATION = 1e-3
+CHECKED = 8
+"""Lanes whose error is measured."""
+TOLERANCES = {"lanes": 2e-6, "xla": 2e-6, "numbalsoda": 1e-7}
+"""Of batches: those that give errors of about 2e-5."""
+
+
+def perturbed(count: int) -> np.ndarray:
+    """Starts about the seed's (n, 8), every number off by about a thousandth of itself."""
+    noise = np.random.default_rng(0).standard_normal((count, 8))
+    return _independent.START * (1.0 + PERTURBATION * noise)
+
+
+def ours(engine: str, rtol: float) -> Callable[[np.ndarray], tuple[np.ndarray, int]]:
+    """Runs starts (n, 8): their final states, and attempted steps."""
+    scene = jb.seed_scene()
+
+    def one(*start: Any) -> Any:
+        options: dict[str, Any] = dict(rtol=rtol, atol=1e-2 * rtol, save="end", engine=engine)
+        end = jb.simulate(scene, jb.State(*start), duration=DURATION, **options)
+        return end.final, end.accepted + end.rejected
+
+    many = jax.vmap(one) if engine == "lanes" else jax.jit(jax.vmap(one))
+
+    def run(starts: np.ndarray) -> tuple[np.ndarray, int]:
+        finals, steps = jax.block_until_ready(many(*map(jnp.asarray, starts.T)))
+        return np.stack(finals, axis=1), int(np.sum(steps))
+
+    return run
+
+
+def numbalsoda(rtol: float) -> Callable[[np.ndarray], tuple[np.ndarray, int]]:
+    times, batch = np.array([0.0, DURATION]), _independent.lsoda_batch()
+    return lambda starts: (batch(starts, times, rtol, 1e-2 * rtol), 0)
+
+
+def timed(work: dict[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
+    """Median seconds of runs that take turns, after one run each that does not count."""
+    for run in work.values():
+        run()
+    seconds = {name: np.empty(rounds) for name in work}
+    for turn in range(rounds):
+        for name, run in work.items():
+            began = time.perf_counter()
+            run()
+            seconds[name][turn] = time.perf_counter() - began
+    return {name: float(np.median(times)) for name, times in seconds.items()}
+
+
+def batches(sizes: list[int], rounds: int, exact: np.ndarray) -> list[dict[str, Any]]:
+    runners = {engine: ours(engine, TOLERANCES[engine]) for engine in ("lanes", "xla")}
+    if _independent.lsoda_address() is not None:
+        runners["numbalsoda"] = numbalsoda(TOLERANCES["numbalsoda"])
+    rows = []
+    for size in sizes:
+        starts = perturbed(size)
+        work = {n: lambda run=run, starts=starts: run(starts) for n, run in runners.items()}
+        seconds = timed(work, rounds)
+        for name, run in runners.items():
+            finals, steps = run(starts)
+            off = np.max(np.abs(finals[:CHECKED] - exact[: len(finals)]), axis=1)
+            rows.append(
+                dict(
+                    way=name,
+                    simulations=size,
+                    rtol=TOLERANCES[name],
+                    error_median=float(np.median(off)),
+                    seconds=seconds[name],
+                    simulations_per_s=size / seconds[name],
+                    steps_per_s=steps / seconds[name] or None,
+                )
+            )
+    return rows
+
+
+def one_walk(engine: str, rtol: float) -> Callable[[], np.ndarray]:
+    """One walk from the seed's start: its final state."""
+
+    def solve(state: jb.State) -> Any:
+        options: dict[str, Any] = dict(rtol=rtol, atol=1e-2 * rtol, save="end", engine=engine)
+        end = jb.simulate(jb.seed_scene(), state, duration=DURATION, **options)
+        return jnp.stack(end.final)
+
+    program, state = jax.jit(solve), jb.seed_state()
+    return lambda: np.asarray(program(state))
+
+
+def singles(rounds: int, exact: np.ndarray) -> list[dict[str, Any]]:
+    """One walk at several tolerances; error against time."""
+    work: dict[tuple[str, float], Callable[[], np.ndarray]] = {}
+    for rtol in (1e-4, 1e-5, 1e-6, 1e-7, 1e-8):
+        for engine in ("lanes", "xla"):
+            work[engine, rtol] = one_walk(engine, rtol)
+        if _independent.lsoda_address() is not None:
+            atol = 1e-2 * rtol
+            work["numbalsoda", rtol] = lambda r=rtol, a=atol: _independent.lsoda(DURATION, r, a)
+        work["SciPy LSODA", rtol] = lambda r=rtol: _independent.solved(
+            "LSODA", DURATION, r, 1e-2 * r
+        )
+    seconds = timed(work, rounds)  # type: ignore[arg-type]
+    return [
+        dict(way=way, rtol=rtol, error=float(np.max(np.abs(run() - exact))),
+             seconds=seconds[way, rtol])  # type: ignore[index]
+        for (way, rtol), run in work.items()
+    ]  # fmt: skip
+
+
+def first_result() -> float:
+    """Seconds from a scene whose laws were not met before to its first result."""
+    seed = jb.seed_scene()
+    new = jb.Scene(
+        walker=seed.walker,
+        ground=seed.ground,
+        normal=jb.SmoothRistowSchafer(K=1e6, c=1e7),
+        friction=seed.friction,
+    )
+    began = time.perf_counter()
+    jb.simulate(new, jb.seed_state(), duration=0.1, save="end", engine="lanes").outcome  # noqa: B018
+    return time.perf_counter() - began
+
+
+def gaits(rounds: int, engines: tuple[str, ...]) -> dict[str, float]:
+    """Warm seconds of a whole gait with all sensitivities, with and without the radius's."""
+    work = {
+        f"{engine}, {'with' if radius else 'without'} the radius's": (
+            lambda e=engine, r=radius: jax.block_until_ready(
+                jb.find_gait(jb.seed_scene(), engine=e, radius_sensitivities=r).elasticities
+            )
+        )
+        for engine in engines
+        for radius in (False, True)
+    }
+    return timed(work, rounds)
+
+
+def derivatives(rounds: int) -> list[dict[str, Any]]:
+    """The final state and its derivatives by log K, log c and log ξ."""
+    exact = _lane_work.final_slopes(DURATION, 1e-9)()[1]
+    work = {("lanes", rtol): _lane_work.final_slopes(DURATION, rtol) for rtol in (1e-6, 1e-7, 1e-8)}
+    if _casadi.is_installed():
+        work |= {
+            ("CasADi CVODES", rtol): _casadi.sensitivities(DURATION, rtol)
+            for rtol in (1e-6, 1e-7, 1e-8)
+        }
+    seconds = timed(work, rounds)  # type: ignore[arg-type]
+    return [
+        dict(way=way, rtol=rtol, error=float(np.max(np.abs(run()[1] - exact))),
+             seconds=seconds[way, rtol])  # type: ignore[index]
+        for (way, rtol), run in work.items()
+    ]  # fmt: skip
+
+
+def picture(options: Options, rows: list[dict[str, Any]], alone: list[dict[str, Any]]) -> None:
+    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.5), layout="constrained")
+    for way in dict.fromkeys(row["way"] for row in rows):
+        picked = [row for row in rows if row["way"] == way]
+        sizes = [row["simulations"] for row in picked]
+        left.loglog(sizes, [row["simulations_per_s"] for row in picked], "o-", base=10, label=way)
+    left.set_xlabel("simulations in the batch")
+    left.set_ylabel(f"simulations of {DURATION:g} s a second")
+    left.set_title("batches on two cores, errors of about 2e-5")
+    for way in dict.fromkeys(row["way"] for row in alone):
+        picked = [row for row in alone if row["way"] == way]
+        times = [1e3 * row["seconds"] for row in picked]
+        right.loglog([row["error"] for row in picked], times, "o-", label=way)
+    right.set_xlabel("largest error of the final state (SI units)")
+    right.set_ylabel("time of one simulation [ms]")
+    right.set_title("one walk")
+    for axes in (left, right):
+        axes.grid(alpha=0.3)
+        axes.legend()
+    figure.savefig(options.path("lanes_speed.png"), dpi=150)
+    plt.close(figure)
+
+
+def report(options: Options, numbers: dict[str, Any]) -> None:
+    options.say("batches                 sims    rtol   error   sims/s  Msteps/s")
+    for row in numbers["batches"]:
+        steps = "–" if row["steps_per_s"] is None else f"{row['steps_per_s'] / 1e6:.2f}"
+        line = f"{row['way']:20}{row['simulations']:8}{row['rtol']:8.0e}{row['error_median']:8.0e}"
+        options.say(line + f"{row['simulations_per_s']:9.0f}{steps:>10}")
+    for title in ("singles", "derivatives"):
+        options.say(f"\n{title:20}    rtol   error       ms")
+        for row in numbers[title]:
+            line = f"{row['way']:20}{row['rtol']:8.0e}{row['error']:8.0e}"
+            options.say(line + f"{1e3 * row['seconds']:9.2f}")
+    options.say()
+    for name, seconds in numbers["gaits_s"].items():
+        options.say(f"gait by {name:30}{1e3 * seconds:9.1f} ms")
+    options.say(f"first result of a new scene: {numbers['first_result_s']:.2f} s")
+    peak, used = numbers["peak_flops"], numbers["flops_per_step"]
+    options.say(f"peak {peak / 1e9:.0f} GFLOP/s; a step has {used} floating-point operations")
+    options.say(f"share of the peak reached: {numbers['share_of_peak']:.2f}")
+    options.say("\nscene                        instructions  Msteps/s")
+    for row in numbers["scenes"]:
+        options.say(f"{row['scene']:28}{row['instructions']:13}{row['steps_per_s'] / 1e6:10.2f}")
+
+
+def main() -> None:
+    options = parse(__doc__ or "")
+    rounds = 2 if options.quick else 5
+    starts = perturbed(CHECKED)
+    exact = np.stack([_independent.reference(DURATION, start) for start in starts])
+    sizes = [64] if options.quick else [8, 64, 512, 8192]
+    rows = batches(sizes, rounds, exact)
+    alone = singles(rounds, _independent.reference(DURATION))
+    peak, used = _lane_work.peak_flops(), _lane_work.flops_per_step()
+    best = max(row["steps_per_s"] for row in rows if row["way"] == "lanes")
+    numbers = {
+        "duration_s": DURATION,
+        "batches": rows,
+        "singles": alone,
+        "derivatives": [] if options.quick else derivatives(rounds),
+        "gaits_s": {} if options.quick else gaits(rounds, ("lanes", "xla")),
+        "first_result_s": first_result(),
+        "peak_flops": peak,
+        "flops_per_step": used,
+        "share_of_peak": best * used / peak,
+        "scenes": _lane_work.scenes(64 if options.quick else 4096, DURATION),
+    }
+    report(options, numbers)
+    picture(options, rows, alone)
+    options.finish(numbers)
+
+
+if __name__ == "__main__":
+    main()

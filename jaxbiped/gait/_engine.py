@@ -1,0 +1,28 @@
+"""Which engine follows the orbits of a search."""
+
+from typing import Any
+
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxbiped.solve._engine import engine_for
+from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+
+
+def orbit_engine(engine: str, *, solver: Any, section: Any, leaves: Any) -> str:
+    """The engine that "auto" stands for, or the one that is asked for.
+
+    Raises:
+        ArgumentError: an unknown name, or lanes for what they cannot do.
+    """
+    return engine_for(engine, obstacle=_obstacle(solver, section, leaves))
+
+
+def _obstacle(solver: Any, section: Any, leaves: Any) -> str | None:
+    if not isinstance(solver, AbstractRosenbrock):
+        return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
+    if jtu.tree_leaves(section):
+        return f"the section {type(section).__name__} holds numbers of its own"
+    if any(jnp.result_type(leaf) != jnp.float64 for leaf in jtu.tree_leaves(leaves)):
+        return "it computes in 64 bits"
+    return None

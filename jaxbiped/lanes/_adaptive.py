@@ -1,0 +1,204 @@
+"""The adaptive solve of a scene as a program for lanes: the same steps as through diffrax."""
+
+from typing import Any, NamedTuple
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._motion import vector_field
+from jaxbiped.dynamics._state import State
+from jaxbiped.lanes._end_of_solve import clipped
+from jaxbiped.lanes._program import Program
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve._ending import ending_code, ending_events
+from jaxbiped.solve._fence import fences_down
+from jaxbiped.solve._footstep_limit import FootstepLimit
+from jaxbiped.solve._rosenbrock import AbstractRosenbrock, step_of
+from jaxbiped.solve._step_control import first_step, step_control
+
+_TERM: Any = diffrax.ODETerm(vector_field)
+
+
+class Solve(NamedTuple):
+    """One simulation's inputs; every leaf a 64-bit floating-point number.
+
+    Attributes:
+        scene, state: what to simulate and from where.
+        duration: simulated time [s]; from `almost` on, a step that would end there ends it.
+        rtol, atol: tolerances.
+        footsteps: after which to end, 0 for no limit.
+        patience: time [s] that counts as waiting for footsteps in vain.
+        most_attempts: cap on the solver's steps.
+    """
+
+    scene: Scene
+    state: State
+    duration: Any
+    almost: Any
+    rtol: Any
+    atol: Any
+    footsteps: Any
+    patience: Any
+    most_attempts: Any
+
+
+class Solved(NamedTuple):
+    """One simulation's outputs: the last state and time, how it ended, and its steps."""
+
+    t: Any
+    state: State
+    ending: Any
+    accepted: Any
+    rejected: Any
+
+
+class _Now(NamedTuple):
+    """What is carried from attempt to attempt; as diffrax's loop has it."""
+
+    t: Scalar
+    next_t: Scalar
+    state: State
+    control: Any
+    accepted: Scalar
+    rejected: Scalar
+    events: tuple[Scalar, ...]
+    counted: Scalar
+    last: "_Last | None"
+
+
+class _Last(NamedTuple):
+    """The last attempt: whether it was accepted, when it began, and its dense output."""
+
+    accepted: Scalar
+    t: Scalar
+    state: State
+    coefficients: tuple[State, ...]
+
+
+class AdaptiveSolve:
+    """The functions of a `Program` that solves a `Solve`.
+
+    Attributes:
+        solver: its steps.
+        watch: misfortunes that end it.
+        counting: whether footsteps are counted.
+        dense: whether the last step's dense output is carried, for records.
+    """
+
+    def __init__(
+        self, solver: AbstractRosenbrock, watch: tuple[str, ...], *, counting: bool, dense: bool
+    ) -> None:
+        self.solver, self.counting, self.dense = solver, counting, dense
+        self.events = ending_events(watch)
+
+    def program(self) -> Program:
+        """The program; where `dense`, it records the state at the times of a schedule."""
+        return Program(
+            self.start,
+            self.attempt,
+            self.finish,
+            record=self.record if self.dense else None,
+            scheduled=self.dense,
+        )
+
+    def start(self, solve: Solve) -> _Now:
+        zero, none = jnp.zeros_like(solve.duration), jnp.asarray(False)
+        next_t, control = self._controller(solve).init(
+            _TERM,
+            zero,
+            solve.duration,
+            solve.state,
+            first_step(solve.duration),
+            solve.scene,
+            None,
+            self._error_order(),
+        )
+        count = jnp.zeros((), dtype=jnp.int64)
+        last = None
+        if self.dense:
+            nothing = jtu.tree_map(jnp.zeros_like, solve.state)
+            rows = len(self.solver.tableau.dense)
+            last = _Last(none, zero, nothing, tuple([nothing] * rows))
+        events = tuple([none] * len(self.events))
+        return _Now(zero, next_t, solve.state, control, count, count, events, none, last)
+
+    def attempt(self, solve: Solve, now: _Now) -> tuple[_Now, Scalar]:
+        with fences_down():
+            y1, error, dense = step_of(
+                self.solver.tableau, _TERM, now.t, now.next_t, now.state, solve.scene
+            )
+        error = jtu.tree_map(lambda e: jnp.where(jnp.isnan(e), jnp.inf, e), error)
+        keep, t, next_t, _, control, result = self._controller(solve).adapt_step_size(
+            now.t, now.next_t, now.state, y1, solve.scene, error, self._error_order(), now.control
+        )
+        t, next_t = clipped(keep, t, next_t, solve.duration, solve.almost)
+        state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), y1, now.state)
+        one = jnp.where(keep, 1, 0)
+        events, none = [], jnp.asarray(True)
+        for happens in self.events.values():
+            happened = jnp.asarray(happens(t, state, solve.scene))
+            events.append(happened & none)
+            none = none & ~happened
+        counted = jnp.asarray(result != diffrax.RESULTS.successful)
+        after = _Now(
+            t=t,
+            next_t=next_t,
+            state=state,
+            control=control,
+            accepted=now.accepted + one,
+            rejected=now.rejected + (1 - one),
+            events=tuple(events),
+            counted=counted,
+            last=_Last(keep, now.t, now.state, dense) if self.dense else None,
+        )
+        attempts = (after.accepted + after.rejected).astype(solve.most_attempts.dtype)
+        over = (t >= solve.duration) | (attempts >= solve.most_attempts) | ~none | counted
+        return after, over
+
+    def finish(self, solve: Solve, now: _Now) -> Solved:
+        done = (now.t >= solve.duration) | now.counted
+        if self.counting:
+            _, _, count = now.control
+            few = count.astype(solve.footsteps.dtype) < solve.footsteps
+            done = done & ~(few & (solve.duration >= solve.patience))
+        code = ending_code(
+            dict(zip(self.events, now.events, strict=True)),
+            done=done,
+            out_of_steps=jnp.asarray(True),
+        )
+        return Solved(now.t, now.state, code, now.accepted, now.rejected)
+
+    def record(self, solve: Solve, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
+        """The state at a time within the last step."""
+        assert now.last is not None
+        inside = now.last.accepted & (time <= now.t)
+        dense = self.solver.interpolation_cls(
+            t0=now.last.t,
+            t1=now.t,
+            y0=now.last.state,
+            y1=now.state,
+            coefficients=now.last.coefficients,
+        )
+        return inside, [time, *dense.evaluate(time)]
+
+    def _controller(self, solve: Solve) -> Any:
+        control: Any = step_control(solve.rtol, solve.atol, rms_norm)
+        if not self.counting:
+            return control
+        limit: Any = solve.footsteps
+        return FootstepLimit.around(control, limit)
+
+    def _error_order(self) -> Any:
+        return self.solver.error_order(_TERM)
+
+
+def shapes_of(scene: PyTree) -> Solve:
+    """The shapes of one simulation's inputs, for a scene of these laws."""
+    number: Any = jax.ShapeDtypeStruct((), jnp.float64)
+    scene = jtu.tree_map(lambda _: number, scene)
+    return Solve(scene, State(*[number] * 8), *[number] * 7)

@@ -1,0 +1,275 @@
+"""The adaptive solve of a state with its derivatives, from a start to a section, for lanes."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.lanes._column_step import Differentiated, column_step, differentiated_step
+from jaxbiped.lanes._end_of_solve import clipped
+from jaxbiped.lanes._program import Program
+from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve._columns import Seeded, Tangents, active_leaves, with_active
+from jaxbiped.solve._ending import Ending
+from jaxbiped.solve._landing import Landed, Landing, Watch
+from jaxbiped.solve._passage import onto_section, peak_of
+from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+from jaxbiped.solve._step_control import first_step, step_control
+from jaxbiped.solve._tangents import SHARE
+
+
+class Crossing(NamedTuple):
+    """One solve's inputs. Of n directions, m are of the state and p of parameters.
+
+    Attributes:
+        args, state: parameters and start, pytrees of scalars.
+        by_state: columns of the first m directions, shape (m, c).
+        by_parameter: of the others, shape (p, c).
+        sizes: by how much these move their parameter, shape (p,).
+        state_floors, parameter_floors: below which errors of columns are absolute, (m,) and (p,).
+        rtol, tangent_rtol: tolerances of state and columns.
+        time_limit: longest time to the section [s]; from `almost` on, a step there ends there.
+        most_attempts: cap on attempted steps.
+    """
+
+    args: PyTree
+    state: PyTree
+    by_state: Any
+    by_parameter: Any
+    sizes: Any
+    state_floors: Any
+    parameter_floors: Any
+    rtol: Any
+    tangent_rtol: Any
+    time_limit: Any
+    almost: Any
+    most_attempts: Any
+
+
+class Crossed(NamedTuple):
+    """What a solve found: as in `Passage`, all columns as rows of shape (m + p, …).
+
+    Attributes:
+        t, state, columns, time_columns: on the section.
+        code, attempted, jumps, peak, peak_columns: see there.
+    """
+
+    t: Any
+    state: PyTree
+    columns: Any
+    time_columns: Any
+    code: Any
+    attempted: Any
+    jumps: Any
+    peak: Any
+    peak_columns: Any
+
+
+class _Now(NamedTuple):
+    t: Scalar
+    next_t: Scalar
+    state: PyTree
+    columns: tuple[Any, Any]
+    landed: Landed
+    peak_columns: tuple[Any, Any]
+    attempted: Scalar
+    kept: Scalar
+    lost: Scalar
+
+
+class AdaptiveColumns:
+    """The functions of a `Program` that solves a `Crossing`.
+
+    Attributes:
+        solver: its steps.
+        watch: what it lands on, and what ends it.
+        active: positions of the p parameters among the leaves of the arguments.
+        save_nodes: whether the accepted steps are recorded.
+    """
+
+    def __init__(
+        self,
+        solver: AbstractRosenbrock,
+        watch: Watch,
+        active: tuple[int, ...],
+        *,
+        save_nodes: bool,
+    ) -> None:
+        self.solver, self.watch, self.active = solver, watch, active
+        self.save_nodes = save_nodes
+        self.term: Any = diffrax.ODETerm(watch.field)
+
+    def program(self) -> Program:
+        """The program."""
+        record = self.record if self.save_nodes else None
+        return Program(self.start, self.attempt, self.finish, record=record)
+
+    def start(self, given: Crossing) -> _Now:
+        zero, none = jnp.zeros_like(given.time_limit), jnp.asarray(False)
+        next_t, landed = self._controller(given, zero).init(
+            self.term,
+            zero,
+            given.time_limit,
+            given.state,
+            first_step(given.time_limit),
+            given.args,
+            None,
+            self.solver.error_order(self.term),
+        )
+        columns = (given.by_state, given.by_parameter)
+        count = jnp.zeros((), dtype=jnp.int64)
+        landed = jtu.tree_map(jnp.asarray, landed)
+        return _Now(zero, next_t, given.state, columns, landed, columns, count, none, none)
+
+    def attempt(self, given: Crossing, now: _Now) -> tuple[_Now, Scalar]:
+        step = differentiated_step(
+            self.solver.tableau, self.watch.field, now.t, now.next_t, now.state, given.args
+        )
+        moved, worst = self._columns(given, now, step)
+        error = jtu.tree_map(lambda e: jnp.where(jnp.isnan(e), jnp.inf, e), step.error)
+        keep, t, next_t, _, landed, result = self._controller(given, worst).adapt_step_size(
+            now.t,
+            now.next_t,
+            now.state,
+            step.end,
+            given.args,
+            error,
+            self.solver.error_order(self.term),
+            now.landed,
+        )
+        limit = given.time_limit
+        t, next_t = clipped(keep, t, next_t, limit, given.almost)
+        state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), step.end, now.state)
+        columns, peaks = now.columns, now.peak_columns
+        if self.watch.peak is None:
+            columns = tuple(_chosen(keep, a, b) for a, b in zip(moved, columns, strict=True))
+            peaks = columns
+        else:
+            highest = keep & (landed.peak > now.landed.peak)
+            both = [
+                jax.lax.map(lambda each: _row(keep, highest, *each), (new, old, peak))
+                for new, old, peak in zip(moved, columns, peaks, strict=True)
+            ]
+            columns, peaks = (tuple(part) for part in zip(*both, strict=True))
+        attempted = now.attempted + 1
+        lost = jnp.asarray(result == diffrax.RESULTS.dt_min_reached)
+        over = (t >= limit) | jnp.asarray(result != diffrax.RESULTS.successful)
+        over = over | (attempted.astype(limit.dtype) >= given.most_attempts)
+        after = _Now(t, next_t, state, columns, landed, peaks, attempted, keep, lost)
+        return after, over
+
+    def finish(self, given: Crossing, now: _Now) -> Crossed:
+        ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), int(Ending.OUT_OF_STEPS))
+        ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
+        seeded, columns = self._seeded(given), jnp.concatenate(now.columns).T
+        y, t = Tangents(now.state, columns), now.t
+        time_columns, peak = jnp.zeros(columns.shape[1]), jnp.zeros(())
+        peak_columns = time_columns
+        if self.watch.section is not None:
+            y, t, time_columns = onto_section(self.watch, y, t, seeded, _along_rows)
+        if self.watch.peak is not None:
+            highest = Tangents(now.landed.at_peak, jnp.concatenate(now.peak_columns).T)
+            peak, peak_columns = peak_of(self.watch, highest, seeded, _along_rows)
+        return Crossed(
+            t=t,
+            state=y.state,
+            columns=y.columns.T,
+            time_columns=time_columns,
+            code=jnp.where(now.landed.arrived, 0, ended),
+            attempted=now.attempted,
+            jumps=now.landed.jumps,
+            peak=peak,
+            peak_columns=peak_columns,
+        )
+
+    def _seeded(self, given: Crossing) -> Seeded:
+        m, p = given.by_state.shape[0], given.by_parameter.shape[0]
+        seeds = jnp.concatenate([jnp.zeros((p, m)), jnp.eye(p) * given.sizes], axis=1)
+        floors = jnp.concatenate([given.state_floors, given.parameter_floors])
+        return Seeded(given.args, seeds, floors, self.active)
+
+    def record(self, given: Crossing, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
+        """The time and the state at the end of an accepted step."""
+        return now.kept, [now.t, *jtu.tree_leaves(now.state)]
+
+    def _columns(
+        self, given: Crossing, now: _Now, step: Differentiated
+    ) -> tuple[list[Any], Scalar]:
+        """The columns after the step, and the largest norm of their errors."""
+
+        def moved(column: Any, floor: Scalar, forcing: Any | None) -> tuple[Any, Scalar]:
+            before = [column[i] for i in range(column.shape[0])]
+            end, error = column_step(step, before, forcing)
+            sizes = [jnp.maximum(jnp.abs(a), jnp.abs(b)) for a, b in zip(before, end, strict=True)]
+            least = SHARE * _largest(sizes) + floor
+            scaled = [
+                e / (given.tangent_rtol * (s + least)) for e, s in zip(error, sizes, strict=True)
+            ]
+            square = sum(e * e for e in scaled) / len(scaled)
+            return jnp.stack(end), jnp.where(jnp.isnan(square), jnp.inf, square)
+
+        found, norms = [], []
+        by_state, by_parameter = now.columns
+        if by_state.shape[0]:
+            columns, squares = jax.lax.map(
+                lambda each: moved(each[0], each[1], None), (by_state, given.state_floors)
+            )
+            found.append(columns)
+            norms.append(jnp.max(squares))
+        else:
+            found.append(by_state)
+        if by_parameter.shape[0]:
+            rows = jnp.stack([step.by_parameter[..., i] for i in self.active])
+            columns, squares = jax.lax.map(
+                lambda each: moved(each[0], each[1], each[2] * each[3]),
+                (by_parameter, given.parameter_floors, rows, given.sizes),
+            )
+            found.append(columns)
+            norms.append(jnp.max(squares))
+        else:
+            found.append(by_parameter)
+        worst = norms[0] if len(norms) == 1 else jnp.maximum(*norms)
+        return found, jnp.sqrt(worst)
+
+    def _controller(self, given: Crossing, columns_norm: Scalar) -> Landing:
+        def norm(error: PyTree) -> Scalar:
+            return jnp.maximum(rms_norm(error), columns_norm)
+
+        return Landing.around(step_control(given.rtol, 1e-2 * given.rtol, norm), self.watch)
+
+
+def _chosen(keep: Scalar, new: Any, old: Any) -> Any:
+    return jax.lax.map(lambda each: jnp.where(keep, *each), (new, old))
+
+
+def _row(keep: Scalar, highest: Scalar, new: Any, old: Any, peak: Any) -> tuple[Any, Any]:
+    return jnp.where(keep, new, old), jnp.where(highest, new, peak)
+
+
+def _largest(values: list[Scalar]) -> Scalar:
+    found = values[0]
+    for value in values[1:]:
+        found = jnp.maximum(found, value)
+    return found
+
+
+def _along_rows(
+    function: Callable[[PyTree, PyTree], Any], y: Tangents, args: Seeded
+) -> tuple[Any, Any]:
+    """`along_columns`, one column after the other."""
+    state, structure = jtu.tree_flatten(y.state)
+
+    def of_leaves(state: list[Scalar], moved: list[Scalar]) -> Any:
+        return function(jtu.tree_unflatten(structure, state), with_active(args, moved))
+
+    def along(each: tuple[Any, Any]) -> Any:
+        tangents = tuple([part[i] for i in range(part.shape[0])] for part in each)
+        return jax.jvp(of_leaves, (state, active_leaves(args)), tangents)[1]
+
+    found = jax.lax.map(along, (y.columns.T, args.seeds.T))
+    return of_leaves(state, active_leaves(args)), found

@@ -1,0 +1,193 @@
+"""The derivative of a Rosenbrock step, one direction at a time."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.solve._fence import fences_down
+from jaxbiped.solve._linearisation import Components, split
+from jaxbiped.solve._rosenbrock import (
+    RosenbrockTableau,
+    Stages,
+    end_weights,
+    error_weights,
+    stages_of,
+)
+from jaxbiped.solve._rosenbrock_columns import kept_in_order
+
+
+class Differentiated(NamedTuple):
+    """A step and what the derivative of it needs (see `rosenbrock_columns` for the equations).
+
+    Components are in the order `order`: first those whose rate is a component, then the kept ones.
+
+    Attributes:
+        tableau, stages: of the step.
+        end, error: the state's new value and its error estimate.
+        order: the components' order.
+        by_state: derivatives A_i of the kept rates at the stages, shape (stages, kept, c).
+        by_curvature: derivatives B_i, likewise.
+        by_parameter: A_i + B_i for the parameters, shape (stages, kept, p).
+    """
+
+    tableau: RosenbrockTableau
+    stages: Stages
+    end: PyTree
+    error: PyTree
+    order: list[int]
+    by_state: Any
+    by_curvature: Any
+    by_parameter: Any
+
+
+def differentiated_step(
+    tableau: RosenbrockTableau,
+    field: Callable[[Any, PyTree, PyTree], PyTree],
+    t0: Any,
+    t1: Any,
+    y0: PyTree,
+    args: PyTree,
+) -> Differentiated:
+    """A step of an autonomous system of scalars, with all that its derivatives share."""
+    start, join = split(y0)
+    parameters, structure = jtu.tree_flatten(args)
+
+    def rates(t: Scalar, y: Components, q: Sequence[Scalar]) -> Components:
+        return split(field(t, join(y), jtu.tree_unflatten(structure, q)))[0]
+
+    span = jnp.asarray(t1 - t0)
+    with fences_down():
+        stages = stages_of(tableau, lambda t, y: rates(t, y, parameters), t0, start, span, span)
+        order = [*stages.direct, *kept_in_order(stages)]
+
+        def kept_rates(y: Components, q: Sequence[Scalar]) -> Components:
+            every = rates(t0, y, q)
+            return [every[i] for i in kept_in_order(stages)]
+
+        at_point, at_start = _derivatives(tableau, stages, kept_rates, parameters)
+    count = len(start)
+    return Differentiated(
+        tableau=tableau,
+        stages=stages,
+        end=join(
+            [y + u for y, u in zip(start, stages.weighted(end_weights(tableau)), strict=True)]
+        ),
+        error=join(stages.weighted(error_weights(tableau))),
+        order=order,
+        by_state=_picked(at_point, order),
+        by_curvature=_picked(at_start, order),
+        by_parameter=at_point[..., count:] + at_start[..., count:],
+    )
+
+
+def _picked(array: Any, places: Sequence[int]) -> Any:
+    return jnp.stack([array[..., i] for i in places], axis=-1)
+
+
+def _derivatives(
+    tableau: RosenbrockTableau,
+    stages: Stages,
+    kept_rates: Callable[[Components, Sequence[Scalar]], Components],
+    parameters: Sequence[Scalar],
+) -> tuple[Any, Any]:
+    """A_i and B_i of all stages by components and parameters, (stages, kept, c + p).
+
+    By reverse mode: the kept rates are few.
+    """
+    start, size = stages.start, len(tableau.alpha)
+    points = [start] + [
+        [y + u for y, u in zip(start, stages.weighted(row), strict=True)] for row in tableau.a
+    ]
+    unit = [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)]
+    directions = [stages.weighted(row) for row in unit]
+    kept = len(stages.kept)
+
+    def rows(pull: Callable[..., Any]) -> Any:
+        found = []
+        for i in range(kept):
+            one = [jnp.asarray(1.0 if i == j else 0.0) for j in range(kept)]
+            state, parameter = pull(one)
+            found.append(jnp.stack([*state, *parameter]))
+        return jnp.stack(found)
+
+    def at_stage(both: tuple[Any, Any]) -> tuple[Any, Any]:
+        point, along = (list(each) for each in both)
+
+        def turned(y: Components, q: Sequence[Scalar]) -> Components:
+            return jax.jvp(lambda y: kept_rates(y, q), (y,), (along,))[1]
+
+        at_point = jax.vjp(kept_rates, point, list(parameters))[1]
+        at_start = jax.vjp(turned, list(start), list(parameters))[1]
+        return rows(at_point), rows(at_start)
+
+    stacked = [jnp.stack([jnp.stack(each) for each in array]) for array in (points, directions)]
+    return jax.lax.map(at_stage, tuple(stacked))
+
+
+def column_step(
+    step: Differentiated, column: Sequence[Any], forcing: Any | None
+) -> tuple[list[Any], list[Any]]:
+    """The derivative of a step along one direction: of the new state, and of its error estimate.
+
+    `column` are the components' derivatives, in their own order; `forcing` that of the kept rates
+    at every stage by a parameter, shape (stages, kept), None for a direction of state alone.
+    """
+    tableau, stages, order = step.tableau, step.stages, step.order
+    g, led = stages.step, len(stages.direct)
+    start = [column[i] for i in order]
+    inverse, entries = _inverse(stages)
+    increments: list[list[Any]] = []
+    for i in range(len(tableau.alpha)):
+        argument = _plus(start, _weighted(tableau.a[i - 1] if i else (), increments))
+        memory = _weighted([tableau.gamma * c for c in tableau.c[i - 1]] if i else (), increments)
+        right = _times(step.by_curvature[i], start)
+        if forcing is not None:
+            right = [a + b for a, b in zip(right, forcing[i], strict=True)]
+        right = [a + b for a, b in zip(right, _times(step.by_state[i], argument), strict=True)]
+        right = _plus([g * r for r in right], memory and memory[led:])
+        through = _plus([g * a for a in argument[led : 2 * led]], memory and memory[:led])
+        pushed = [g * e for e in _times(entries, through)]
+        solved = _times(inverse, _plus(right, pushed))
+        followers = [a + g * b for a, b in zip(through, solved, strict=False)]
+        increments.append([*followers, *solved])
+    back = [order.index(i) for i in range(len(column))]
+    end = _plus(start, _weighted(end_weights(tableau), increments))
+    error = _weighted(error_weights(tableau), increments)
+    return [end[i] for i in back], [error[i] for i in back]
+
+
+def _inverse(stages: Stages) -> tuple[list[list[Any]], list[list[Any]]]:
+    """(I − g J)⁻¹ of the kept components, and their J by the direct ones (None for zero)."""
+    kept = kept_in_order(stages)
+    places = [stages.kept.index(i) for i in kept]
+    inverse = [[stages.factors[i][j] for j in places] for i in places]
+    return inverse, [[stages.jacobian[i][p] for p in stages.direct] for i in kept]
+
+
+def _times(matrix: Any, vector: Sequence[Any]) -> list[Any]:
+    found = []
+    for row in matrix:
+        terms = [a * b for a, b in zip(row, vector, strict=True) if a is not None]
+        found.append(sum(terms[1:], terms[0]) if terms else jnp.zeros_like(vector[0]))
+    return found
+
+
+def _weighted(weights: Sequence[float], increments: Sequence[Sequence[Any]]) -> list[Any]:
+    """Σ weights_j increments_j; nothing where there are none."""
+    pairs = [(w, u) for w, u in zip(weights, increments, strict=False) if w != 0.0]
+    if not pairs:
+        return []
+    return [
+        sum(w * u[k] for w, u in pairs[1:]) + pairs[0][0] * pairs[0][1][k]
+        for k in range(len(increments[0]))
+    ]
+
+
+def _plus(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
+    """a + b, where `b` may be nothing."""
+    return [x + y for x, y in zip(a, b, strict=True)] if b else list(a)

@@ -1,0 +1,200 @@
+"""Programs run over many simulations at once: queues, threads and arrays."""
+
+import ctypes
+import os
+import threading
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped.lanes._host import host
+from jaxbiped.lanes._kernel import ENTRY, kernel_text
+from jaxbiped.lanes._lane_by_lane import FIELDS
+from jaxbiped.lanes._machine_code import MachineCode, assembly, machine_code
+from jaxbiped.lanes._program import Graph, Program, graph_of, leaves_of
+
+THREADS_VARIABLE = "JAXBIPED_THREADS"
+"""Environment variable: threads to use, else as many as the process has cores."""
+_POLL = 0.1
+"""How long to wait before looking whether the user interrupts [s]."""
+
+
+class Recorded(NamedTuple):
+    """What was recorded of n simulations.
+
+    Attributes:
+        values: shape (n, room, numbers in a record); NaN where nothing was recorded.
+        counts: how many records there were, shape (n,); more than `room` are lost.
+    """
+
+    values: np.ndarray
+    counts: np.ndarray
+
+
+class Ran(NamedTuple):
+    """Outputs of n simulations, leaves (n, …), and what they recorded."""
+
+    outputs: PyTree
+    recorded: Recorded | None
+
+
+class CompiledProgram:
+    """A program compiled for inputs of one structure."""
+
+    def __init__(self, program: Program, inputs: PyTree) -> None:
+        """Traces a program; `inputs` are those of one simulation, or their shapes and dtypes.
+
+        Raises:
+            UnknownPrimitiveError: it holds an operation that lanes do not have.
+        """
+        self.graph: Graph = graph_of(program, inputs)
+        self._shapes = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jtu.tree_leaves(inputs)]
+        self._code: dict[int, MachineCode] = {}
+        self._lock = threading.Lock()
+
+    def text(self, width: int) -> str:
+        """The program as LLVM's text."""
+        return kernel_text(self.graph, width, host())
+
+    def instructions(self) -> int:
+        """How many machine instructions the program has, for vectors of the host's width."""
+        lines = assembly(self.text(host().width), host()).splitlines()
+        return sum(line.startswith("\t") and not line.startswith("\t.") for line in lines)
+
+    def code(self, width: int) -> MachineCode:
+        """The machine code, for vectors of this width."""
+        with self._lock:
+            if width not in self._code:
+                self._code[width] = machine_code(self.text(width), ENTRY, host())
+            return self._code[width]
+
+    def run(
+        self,
+        inputs: PyTree,
+        *,
+        schedule: np.ndarray | None = None,
+        room: int = 0,
+        threads: int | None = None,
+        width: int | None = None,
+        quick: bool = False,
+    ) -> Ran:
+        """Runs n simulations; leaves of `inputs` have a leading axis of n.
+
+        Args:
+            inputs: of all simulations; 64-bit floating-point numbers, whatever they stand for.
+            schedule: increasing times of the records, shape (m,), where the program has such.
+            room: records that each simulation has room for.
+            threads: how many to use; the environment's or the machine's choice unless given.
+            width: simulations in one vector; the results do not depend on it.
+            quick: whether one thread's work is so short that nobody could interrupt it.
+
+        Raises:
+            KeyboardInterrupt: the user interrupts; the simulations end within a tenth of a second.
+        """
+        leaves = [np.asarray(leaf) for leaf in jtu.tree_leaves(inputs)]
+        count = leaves[0].shape[0]
+        rows = [
+            np.moveaxis(leaf, 0, -1).reshape(int(np.prod(shape.shape)), count)
+            for leaf, shape in zip(leaves, self._shapes, strict=True)
+        ]
+        table = np.concatenate(rows).astype(np.float64)
+        found, recorded = self.run_table(
+            table, schedule=schedule, room=room, threads=threads, width=width, quick=quick
+        )
+        return Ran(self._outputs(found), recorded)
+
+    def run_table(
+        self,
+        table: np.ndarray,
+        *,
+        schedule: np.ndarray | None = None,
+        room: int = 0,
+        threads: int | None = None,
+        width: int | None = None,
+        quick: bool = False,
+    ) -> tuple[np.ndarray, Recorded | None]:
+        """`run` of inputs and outputs as tables (numbers, n), their leaves' entries in order."""
+        table = np.ascontiguousarray(table, dtype=np.float64)
+        count = table.shape[1]
+        outputs = np.full((len(self.graph.outputs), count), np.nan)
+        times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
+        records = np.full((count, room, len(self.graph.recorded)), np.nan)
+        record_counts = np.zeros(count, dtype=np.int64)
+        queue, stop = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+        chosen = (1 if count == 1 else host().width) if width is None else width
+        arrays = dict(
+            queue=queue,
+            stop=stop,
+            inputs=table,
+            outputs=outputs,
+            records=records,
+            record_counts=record_counts,
+            schedule=times,
+        )
+        numbers = dict(count=count, record_room=room, schedule_length=len(times))
+        fields = np.array(
+            [arrays[n].ctypes.data if n in arrays else numbers[n] for n in FIELDS], dtype=np.int64
+        )
+        if count:
+            entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(self.code(chosen).address)
+            workers = min(threads or default_threads(), -(-count // chosen))
+            _run_all(lambda: entry(fields.ctypes.data), workers, stop, quick=quick)
+        recorded = Recorded(records, record_counts) if self.graph.recording is not None else None
+        return self._whole(outputs), recorded
+
+    def _whole(self, varying: np.ndarray) -> np.ndarray:
+        """The outputs with those among them that are always the same."""
+        constants = self.graph.constants
+        if not constants:
+            return varying
+        whole = np.empty((len(varying) + len(constants), varying.shape[1]))
+        whole[list(constants)] = np.array(list(constants.values()))[:, None]
+        whole[[i for i in range(len(whole)) if i not in constants]] = varying
+        return whole
+
+    def _outputs(self, table: np.ndarray) -> PyTree:
+        shapes, structure = jtu.tree_flatten(self.graph.output_structure)
+        parts = leaves_of(self.graph.output_structure, table)
+        with np.errstate(invalid="ignore"):
+            leaves = [
+                np.moveaxis(part, -1, 0).astype(shape.dtype)
+                for part, shape in zip(parts, shapes, strict=True)
+            ]
+        return jtu.tree_unflatten(structure, leaves)
+
+
+def default_threads() -> int:
+    """Threads to use where nobody says."""
+    chosen = os.environ.get(THREADS_VARIABLE, "")
+    if chosen.isdigit() and int(chosen) > 0:
+        return int(chosen)
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _run_all(work: Callable[[], Any], workers: int, stop: np.ndarray, *, quick: bool) -> None:
+    """Runs the same work in several threads, which share its queue; `stop` ends it early.
+
+    What is `quick` needs no thread: it is over before a user could interrupt.
+    """
+    if workers == 1 and quick:
+        work()
+        return
+    others = [threading.Thread(target=work, daemon=True) for _ in range(workers)]
+    for thread in others:
+        thread.start()
+    try:
+        for thread in others:
+            while thread.is_alive():
+                # Waiting without end would keep the interrupt waiting, too.
+                thread.join(_POLL)
+    except BaseException:
+        stop[0] = 1
+        for thread in others:
+            thread.join()
+        raise

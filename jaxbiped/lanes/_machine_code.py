@@ -1,0 +1,116 @@
+"""LLVM's text made into machine code, kept in the process and on disk."""
+
+import hashlib
+import os
+import tempfile
+import threading
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import llvmlite.binding as llvm
+
+from jaxbiped.lanes._host import Host
+
+CACHE_VARIABLE = "JAXBIPED_CACHE"
+"""Environment variable: the folder for compiled code; empty for none on disk."""
+_DIGEST = 32
+
+
+class MachineCode:
+    """A loaded function. It stays for the life of the process.
+
+    Attributes:
+        address: of its entry.
+        instructions: how many machine instructions it has; None where it came from disk.
+    """
+
+    def __init__(self, engine: Any, entry: str) -> None:
+        self._engine = engine
+        self.address: int = engine.get_function_address(entry)
+
+
+_LOADED: dict[str, MachineCode] = {}
+_LOCK = threading.Lock()
+
+
+def machine_code(text: str, entry: str, host: Host) -> MachineCode:
+    """The code of a module, compiled where neither the process nor the disk has it."""
+    key = hashlib.sha256("\n".join([text, entry, *map(str, host), *_versions()]).encode())
+    name = key.hexdigest()
+    with _LOCK:
+        if name not in _LOADED:
+            _LOADED[name] = _loaded(text, entry, host, _folder(), name)
+        return _LOADED[name]
+
+
+def assembly(text: str, host: Host) -> str:
+    """A module as the host's assembly, to look at."""
+    machine = _target_machine(host)
+    return str(machine.emit_assembly(_optimised(text, machine)))
+
+
+def _versions() -> tuple[str, str]:
+    return str(llvmlite.__version__), str(llvm.llvm_version_info)
+
+
+def _target_machine(host: Host) -> Any:
+    target = llvm.Target.from_triple(host.triple)
+    return target.create_target_machine(cpu=host.cpu, features=host.features, opt=2, jit=True)
+
+
+def _optimised(text: str, machine: Any) -> Any:
+    module = llvm.parse_assembly(text)
+    module.verify()
+    # No vectorisers: the vectors are there. Sums are never reordered, so results stay the same.
+    options = llvm.create_pipeline_tuning_options(speed_level=1)
+    options.slp_vectorization = options.loop_vectorization = False
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    return module
+
+
+def _loaded(text: str, entry: str, host: Host, folder: Path | None, name: str) -> MachineCode:
+    machine = _target_machine(host)
+    path = None if folder is None else folder / f"{name}.o"
+    stored = None if path is None else _read(path)
+    if stored is None:
+        stored = bytes(machine.emit_object(_optimised(text, machine)))
+        if path is not None:
+            _write(path, stored)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    engine.add_object_file(llvm.ObjectFileRef.from_data(stored))
+    engine.finalize_object()
+    return MachineCode(engine, entry)
+
+
+def _folder() -> Path | None:
+    """Where compiled code is kept: safe to delete at any time."""
+    chosen = os.environ.get(CACHE_VARIABLE)
+    if chosen is None:
+        base = os.environ.get("XDG_CACHE_HOME")
+        home = Path(base) if base else Path.home() / ".cache"
+        return home / "jaxbiped" / "lanes"
+    return Path(chosen) / "lanes" if chosen else None
+
+
+def _read(path: Path) -> bytes | None:
+    """Stored code; None where there is none, or not what was written."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    digest, code = content[:_DIGEST], content[_DIGEST:]
+    return code if hashlib.sha256(code).digest() == digest else None
+
+
+def _write(path: Path, code: bytes) -> None:
+    """Stores code, whole or not at all; without a place to store it there is no harm."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent)
+        with os.fdopen(handle, "wb") as file:
+            file.write(hashlib.sha256(code).digest() + code)
+        os.replace(temporary, path)
+    except OSError:
+        return

@@ -1,0 +1,148 @@
+"""A simulation as four functions of JAX, and their graph."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.lanes._elements import KINDS, Array, array_of, converted
+from jaxbiped.lanes._emit import emit
+from jaxbiped.lanes._graph import Block, Kind, Value
+
+
+class Program(NamedTuple):
+    """What every lane does, from taking a simulation to giving it back.
+
+    Leaves of inputs, of what is carried and of outputs are numbers or arrays of static shape.
+
+    Attributes:
+        start: what is carried at first, `start(inputs)`.
+        attempt: one attempted step, `attempt(inputs, carried)`, gives what is then carried and
+            whether the simulation is over (boolean).
+        finish: outputs, `finish(inputs, carried)`.
+        record: `record(inputs, carried, next_time)` gives whether there is something to record
+            (boolean) and what, a list of numbers. It is asked until it has nothing more where
+            `scheduled`, else once after each attempt. None: nothing is recorded.
+        scheduled: whether records are made at times of a schedule, the next of which it is given.
+    """
+
+    start: Callable[[PyTree], PyTree]
+    attempt: Callable[[PyTree, PyTree], tuple[PyTree, Scalar]]
+    finish: Callable[[PyTree, PyTree], PyTree]
+    record: Callable[[PyTree, PyTree, Scalar], tuple[Scalar, Sequence[Scalar]]] | None = None
+    scheduled: bool = False
+
+
+class Graph(NamedTuple):
+    """A program's operations.
+
+    Attributes:
+        prepare: what depends on a simulation's inputs alone.
+        begin, body, end, notes: blocks of `start`, `attempt`, `finish` and `record`.
+        inputs: what is read, `carried` what is carried, one array for each leaf.
+        first: what is carried at first; `following` after an attempt.
+        done: whether the simulation is over.
+        outputs: 64-bit floating-point numbers, all; `constants` those that are always the same, by
+            their places, which `outputs` leaves out.
+        next_time: of the schedule. `recording`, `recorded`: see `Program.record`.
+        output_structure: of the pytree of outputs, with shapes and dtypes.
+    """
+
+    prepare: Block
+    begin: Block
+    body: Block
+    end: Block
+    notes: Block
+    inputs: list[Value]
+    carried: list[Array]
+    first: list[Array]
+    following: list[Array]
+    done: Value
+    outputs: list[Value]
+    constants: dict[int, float]
+    next_time: Value
+    recording: Value | None
+    recorded: list[Value]
+    scheduled: bool
+    output_structure: PyTree
+
+
+def graph_of(program: Program, inputs: PyTree) -> Graph:
+    """Traces a program for inputs of these shapes and dtypes."""
+    prepare = Block(invariant=True)
+    begin, body, end = Block(prepare), Block(prepare), Block(prepare)
+    notes = Block(prepare)
+    given = [_inputs(prepare, leaf) for leaf in jtu.tree_leaves(inputs)]
+    carried_shape = jax.eval_shape(program.start, inputs)
+    carried = [_inputs(body, leaf) for leaf in jtu.tree_leaves(carried_shape)]
+    first, _ = _emitted(begin, program.start, (inputs,), given)
+    following, _ = _emitted(body, program.attempt, (inputs, carried_shape), [*given, *carried])
+    finals, structure = _emitted(end, program.finish, (inputs, carried_shape), [*given, *carried])
+    next_time = Value("input", (), Kind.F64, notes)
+    recording, recorded = None, []
+    if program.record is not None:
+        time = jax.ShapeDtypeStruct((), jnp.float64)
+        arguments = [*given, *carried, array_of([next_time], ())]
+        mask, *values = _emitted(notes, program.record, (inputs, carried_shape, time), arguments)[0]
+        recording = mask.item()
+        recorded = [converted(notes, v, Kind.F64) for a in values for v in a.ravel()]
+    *following, done = following
+    outputs = [converted(end, v, Kind.F64) for array in finals for v in array.ravel()]
+    return Graph(
+        prepare=prepare,
+        begin=begin,
+        body=body,
+        end=end,
+        notes=notes,
+        inputs=[v for array in given for v in array.ravel()],
+        carried=carried,
+        first=_matched(begin, first, carried),
+        following=_matched(body, following, carried),
+        done=done.item(),
+        outputs=[v for v in outputs if v.constant is None],
+        constants={i: v.constant for i, v in enumerate(outputs) if v.constant is not None},
+        next_time=next_time,
+        recording=recording,
+        recorded=recorded,
+        scheduled=program.scheduled,
+        output_structure=structure,
+    )
+
+
+def leaves_of(structure: PyTree, table: Any) -> list[Any]:
+    """A table of outputs (numbers, …) cut into arrays of the leaves' shapes, (*shape, …)."""
+    leaves, place = [], 0
+    for leaf in jax.tree.leaves(structure):
+        size = int(np.prod(leaf.shape))
+        leaves.append(table[place : place + size].reshape((*leaf.shape, *table.shape[1:])))
+        place += size
+    return leaves
+
+
+def _inputs(block: Block, leaf: Any) -> Array:
+    kind = KINDS[np.dtype(leaf.dtype)]
+    shape = np.shape(leaf)
+    return array_of([Value("input", (), kind, block) for _ in range(int(np.prod(shape)))], shape)
+
+
+def _emitted(
+    block: Block, function: Callable[..., Any], shapes: tuple[Any, ...], arrays: list[Array]
+) -> tuple[list[Array], PyTree]:
+    closed, structure = jax.make_jaxpr(function, return_shape=True)(*shapes)
+    return emit(block, closed.jaxpr, closed.consts, arrays), structure
+
+
+def _matched(block: Block, arrays: list[Array], like: list[Array]) -> list[Array]:
+    """The same values, each as the kind that is carried."""
+    return [
+        array_of(
+            [converted(block, v, w.kind) for v, w in zip(a.ravel(), b.ravel(), strict=True)],
+            b.shape,
+        )
+        for a, b in zip(arrays, like, strict=True)
+    ]

@@ -1,0 +1,59 @@
+"""The same gait from both engines."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+
+
+@pytest.fixture(scope="module")
+def gaits():
+    return {
+        engine: jb.find_gait(jb.seed_scene(), engine=engine, radius_sensitivities=False)
+        for engine in ("lanes", "xla")
+    }
+
+
+def test_both_find_the_same_gait_and_the_same_derivatives(gaits):
+    ours, theirs = gaits["lanes"], gaits["xla"]
+    assert (ours.engine, theirs.engine) == ("lanes", "xla")
+    assert ours.outcome == theirs.outcome == jb.Search.FOUND
+    for name in ("period", "step_length", "speed", "peak_normal", "spectral_radius"):
+        a, b = (float(getattr(gait.measures, name)) for gait in (ours, theirs))
+        assert a == pytest.approx(b, rel=5e-5)
+    assert float(ours.unit_multiplier_error) < 1e-4
+    np.testing.assert_allclose(ours.multipliers[:4], theirs.multipliers[:4], atol=5e-5)
+    for name in ("period", "step_length", "speed", "peak_normal"):
+        a, b = (np.array(getattr(gait.elasticities, name)) for gait in (ours, theirs))
+        np.testing.assert_allclose(a, b, rtol=5e-4, atol=1e-8)
+
+
+def test_tight_is_tighter():
+    gait = jb.find_gait(
+        jb.seed_scene(), accuracy="tight", engine="lanes", radius_sensitivities=False
+    )
+    assert float(gait.unit_multiplier_error) < 1e-6
+    assert float(gait.measures.period) == pytest.approx(0.4408349, abs=1e-7)
+
+
+def test_many_scenes_at_once_give_what_each_gives_alone(gaits):
+    slopes = jnp.array([0.018, 0.02, 0.022])
+
+    def period(slope):
+        gait = jb.find_gait(jb.seed_scene(slope=slope), engine="lanes", radius_sensitivities=False)
+        return gait.measures.period, gait.elasticities.period
+
+    together = jax.vmap(period)(slopes)
+    alone = gaits["lanes"]
+    np.testing.assert_allclose(together[0][1], alone.measures.period, rtol=1e-6)
+    np.testing.assert_allclose(together[1][1], alone.elasticities.period, rtol=5e-4, atol=1e-8)
+    assert np.all(np.diff(together[0]) > 0.0)
+
+
+def test_lanes_are_refused_what_they_cannot_do():
+    with pytest.raises(jb.ArgumentError, match="Kvaerno3 is not one of its solvers"):
+        jb.find_gait(jb.seed_scene(), solver="kvaerno3", engine="lanes")
+    with pytest.raises(jb.ArgumentError, match="choose one of auto, xla, lanes"):
+        jb.find_gait(jb.seed_scene(), engine="fast")
