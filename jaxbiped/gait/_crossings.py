@@ -1,7 +1,7 @@
 """Which switches the steps of a known motion end past, and what that does to second tangents."""
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +10,9 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._radau import Rates, stacked, velocities, with_seeds
 from jaxbiped.solve._landing import MARGIN
+
+SIDES = (1.0, 4.0, 16.0, -1.0, -4.0, -16.0)
+"""When, in units of the margin, the two sides of a switch are looked at: first the new one."""
 
 
 class Crossings(NamedTuple):
@@ -38,43 +41,66 @@ def crossings_of(
     after: Scalar,
     parameters: Scalar,
 ) -> Crossings:
-    def values(z: Scalar) -> Scalar:
-        return jnp.stack([jnp.zeros(()), *(surface.value for surface in surfaces(z))])
-
-    def live(z: Scalar) -> Scalar:
-        return jnp.stack([jnp.asarray(False), *(jnp.asarray(s.live) for s in surfaces(z))])
+    """The crossings of many steps, from states `before` to states `after`, shape (steps, c)."""
 
     def one(before: Scalar, after: Scalar) -> Crossings:
-        old, new = (jnp.concatenate([y, parameters]) for y in (before, after))
-        idle = jnp.zeros_like(parameters)
-
-        def rate(z: Scalar) -> Scalar:
-            return jnp.concatenate([stacked(rates)(z), idle])
-
-        def back(past: Scalar) -> Scalar:
-            return new - past * rate(new - 0.5 * past * velocity)
-
-        velocity = rate(new)
-        beyond, slopes = jax.jvp(values, (new,), (velocity,))
-        crossed = ((values(old) > 0.0) != (beyond > 0.0)) & (live(old) | live(new))
-        which = jnp.argmax(crossed)
-        found = crossed[which]
-        slope = jnp.where(found, slopes[which], 1.0)
-        first = jnp.where(found, beyond[which] / slope, 0.0)
-        # The switch's rate changes fast: once more from there.
-        past = first + jnp.where(found, values(back(first))[which] / slope, 0.0)
-        z = back(past)
-        gradient = jax.jacrev(values)(z)[which]
-        early = jnp.where(found, gradient / jnp.where(found, gradient @ rate(z), 1.0), 0.0)
-        return Crossings(found, past, z[: after.shape[0]], early)
+        return crossing_of(rates, surfaces, before, after, parameters)
 
     return jax.vmap(one)(before, after)
+
+
+def crossing_of(
+    rates: Rates,
+    surfaces: Callable[[Scalar], Sequence[Switch]],
+    before: Scalar,
+    after: Scalar,
+    parameters: Scalar,
+) -> Crossings:
+    """The crossing of one step: the first in the switches' order, where there are several."""
+    old, new = (jnp.concatenate([y, parameters]) for y in (before, after))
+    idle = jnp.zeros_like(parameters)
+
+    def values(z: Scalar) -> list[Scalar]:
+        return [surface.value for surface in surfaces(z)]
+
+    def live(z: Scalar) -> list[Any]:
+        return [surface.live for surface in surfaces(z)]
+
+    def rate(z: Scalar) -> Scalar:
+        return jnp.concatenate([stacked(rates)(z), idle])
+
+    def back(past: Scalar) -> Scalar:
+        return new - past * rate(new - 0.5 * past * velocity)
+
+    velocity = rate(new)
+    beyond, slopes = jax.jvp(values, (new,), (velocity,))
+    changed = [(a > 0.0) != (b > 0.0) for a, b in zip(values(old), beyond, strict=True)]
+    found, chosen = jnp.asarray(False), []
+    for change, was, is_ in zip(changed, live(old), live(new), strict=True):
+        chosen.append(change & (was | is_) & ~found)
+        found = found | chosen[-1]
+
+    def picked(each: Sequence[Scalar], otherwise: float) -> Scalar:
+        value = jnp.asarray(otherwise)
+        for here, candidate in zip(chosen, each, strict=True):
+            value = jnp.where(here, candidate, value)
+        return value
+
+    slope = picked(slopes, 1.0)
+    first = picked(beyond, 0.0) / slope
+    # The switch's rate changes fast: once more from there.
+    past = first + picked(values(back(first)), 0.0) / slope
+    z = back(past)
+    rows = jax.jacrev(lambda z: jnp.stack([jnp.zeros(()), *values(z)]))(z)
+    gradient = picked(list(rows[1:]), 0.0)
+    early = jnp.where(found, gradient / jnp.where(found, gradient @ rate(z), 1.0), 0.0)
+    return Crossings(found, past, z[: after.shape[0]], early)
 
 
 def sides_of(rates: Rates, crossings: Crossings, parameters: Scalar) -> Scalar:
     """Points on the new and then the old side of each crossing, shape (steps, 6, c)."""
     speed = velocities(rates, crossings.landed, parameters)
-    away = MARGIN * jnp.array([1.0, 4.0, 16.0, -1.0, -4.0, -16.0])
+    away = MARGIN * jnp.array(SIDES)
     return crossings.landed[:, None] + away[:, None] * speed[:, None]
 
 

@@ -42,7 +42,7 @@ from jaxbiped.gait._radau import (
 )
 from jaxbiped.solve._landing import MARGIN
 
-_LONG_AGO = 1.0
+LONG_AGO = 1.0
 """Time [s] since the last switch, where none is known."""
 CHUNK = 64
 """Steps that are solved at once."""
@@ -91,7 +91,7 @@ def along_path(
         return start + CHUNK, reached, after
 
     never = jnp.asarray(False)
-    reached = _Reached(times[0], states[0], never, times[0] - _LONG_AGO)
+    reached = _Reached(times[0], states[0], never, times[0] - LONG_AGO)
     begin = (jnp.asarray(0), reached, bent)
     return jax.lax.while_loop(lambda c: c[0] < steps, chunk, begin)[2]
 

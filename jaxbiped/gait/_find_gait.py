@@ -106,7 +106,6 @@ def find_gait(
         steps=int(period),
         max_solver_steps=MOST_SOLVER_STEPS[accuracy],
         engine=chosen,
-        second_engine="xla" if _is_traced((scene, start)) else chosen,
     )
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),

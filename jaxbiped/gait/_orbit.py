@@ -114,9 +114,8 @@ def _radius_slopes(
     vector, left = _leading(jacobian)
     turned = jnp.stack([vector.real, vector.imag], axis=1)
     family = slopes_of(last).recurring
-    seeds, _ = seeded(args, active, m)
-    none = jnp.zeros((len(active), 2))
-    second = second_turn(turning, seeds, like, last, turned, family, none, seeds.seeds[:, m:])
+    seeds, sizes = seeded(args, active, m)
+    second = second_turn(turning, seeds, like, last, turned, family, sizes)
     change = left @ jax.lax.complex(second[:m, :, 0], second[:m, :, 1])
     value = left @ (jacobian.astype(vector.dtype) @ vector)
     slopes = (jnp.conj(value) * change).real / jnp.abs(value)

@@ -11,18 +11,18 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._field_rates import FieldRates
 from jaxbiped.solve._fence import fenced
 
 _ROOT = 6.0**0.5
 _NODES = np.array([(4 - _ROOT) / 10, (4 + _ROOT) / 10, 1.0])
-_RADAU = np.array(
+RADAU = np.array(
     [
         [(88 - 7 * _ROOT) / 360, (296 - 169 * _ROOT) / 1800, (-2 + 3 * _ROOT) / 225],
         [(296 + 169 * _ROOT) / 1800, (88 + 7 * _ROOT) / 360, (-2 - 3 * _ROOT) / 225],
         [(16 - _ROOT) / 36, (16 + _ROOT) / 36, 1 / 9],
     ]
 )
+"""Weights of the rates at the nodes."""
 Rates = Callable[[Sequence[Scalar]], list[Scalar]]
 """Components and parameters, one by one, to the rates: pulling back through arrays of them makes
 programs that compile for seconds."""
@@ -81,7 +81,7 @@ def collocation_points(rates: Rates, path: Path, parameters: Scalar) -> Scalar:
     points = before + s * (start[:, None] + s * (second[:, None] + s * third[:, None]))
     c = path.before.shape[1]
     slopes = share[..., None] * jax.vmap(lambda y: velocities(rates, y, parameters))(points)
-    residual = points - before - jnp.einsum("ij,njc->nic", _RADAU, slopes)
+    residual = points - before - jnp.einsum("ij,njc->nic", RADAU, slopes)
     matrix = _matrix(gradients(rates, points, parameters)[..., :c], share)
     correction = jnp.linalg.solve(matrix, residual.reshape(-1, 3 * c, 1))
     return points - correction.reshape(points.shape)
@@ -98,8 +98,6 @@ def gradients(
 
     By reverse mode: the rates are few.
     """
-    if isinstance(rates, FieldRates) and rates.engine == "lanes":
-        return _gradients_by_lanes(rates, points, parameters, along, along_parameters)
     size = points.shape[-1]
     unit = jnp.eye(size)
     constants = list(parameters)
@@ -124,23 +122,6 @@ def gradients(
         return jax.vmap(one, axis_size=flat.shape[0])(every)
 
     rows = fenced(moves, pulled)
-    return rows.reshape(*points.shape, size + parameters.shape[0])
-
-
-def _gradients_by_lanes(
-    rates: FieldRates,
-    points: Scalar,
-    parameters: Scalar,
-    along: Scalar | None,
-    along_parameters: Scalar | None,
-) -> Scalar:
-    def one(y: Scalar, tangent: Scalar) -> Scalar:
-        whole = None if along_parameters is None else jnp.concatenate([tangent, along_parameters])
-        return rates.gradients_by_lanes(jnp.concatenate([y, parameters]), whole)
-
-    size = points.shape[-1]
-    flat = points.reshape(-1, size)
-    rows = jax.vmap(one)(flat, flat if along is None else along.reshape(-1, size))
     return rows.reshape(*points.shape, size + parameters.shape[0])
 
 
@@ -185,14 +166,14 @@ def collocation(path: Path, jacobians: Scalar) -> Collocation:
 def _matrix(jacobians: Scalar, share: Scalar) -> Scalar:
     """I − A ⊗ (share_j J_j), shape (steps, 3 c, 3 c)."""
     steps, _, c, _ = jacobians.shape
-    blocks = jnp.einsum("ij,njab->niajb", _RADAU, share[..., None, None] * jacobians)
+    blocks = jnp.einsum("ij,njab->niajb", RADAU, share[..., None, None] * jacobians)
     return jnp.eye(3 * c) - blocks.reshape(steps, 3 * c, 3 * c)
 
 
 def _spread(forcing: Scalar, share: Scalar) -> Scalar:
     """(A ⊗ I) (share_j b_j) of forcings (steps, 3, c, n), shape (steps, 3 c, n)."""
     steps, _, c, n = forcing.shape
-    total = jnp.einsum("ij,njab->niab", _RADAU, share[..., None, None] * forcing)
+    total = jnp.einsum("ij,njab->niab", RADAU, share[..., None, None] * forcing)
     return total.reshape(steps, 3 * c, n)
 
 

@@ -1,6 +1,5 @@
 """Second derivatives of the return map at a periodic orbit."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import jax.numpy as jnp
@@ -9,11 +8,12 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._bent import Bent, bend, on_surface
+from jaxbiped.gait._bent_solve import along_nodes
 from jaxbiped.gait._curvature import along_path
 from jaxbiped.gait._field_rates import FieldRates
 from jaxbiped.gait._radau import Rates, velocities
 from jaxbiped.gait._turn import Turn, Turning, recurring_places
-from jaxbiped.solve._columns import Seeded, active_leaves, with_active
+from jaxbiped.solve._columns import Seeded, active_leaves
 from jaxbiped.solve._landing import MARGIN
 from jaxbiped.solve._passage import arrival_at
 
@@ -25,8 +25,7 @@ def second_turn(
     last: Turn,
     turned: Scalar,
     tangents: Scalar,
-    turned_seeds: Scalar,
-    tangent_seeds: Scalar,
+    sizes: Scalar,
 ) -> Scalar:
     """Second derivatives of one turn along two sets of directions.
 
@@ -35,29 +34,28 @@ def second_turn(
         args: parameters.
         like: a state, for its structure.
         last: the turn, with its nodes.
-        turned: v directions of the m recurring components, shape (m, v).
-        tangents: q others, shape (m, q).
-        turned_seeds, tangent_seeds: the same of the p active parameters.
+        turned: v directions of the m recurring components, which move no parameter; (m, v).
+        tangents: p others, each of which moves one active parameter, shape (m, p).
+        sizes: by how much, shape (p,).
 
     Returns:
-        Shape (m + 1 + d, q, v): of the recurring components on the section, the period, and the
+        Shape (m + 1 + d, p, v): of the recurring components on the section, the period, and the
         advances.
     """
     leaves, structure = jtu.tree_flatten(like)
     c, count = len(leaves), turned.shape[1]
     places = jnp.asarray(recurring_places(turning.system, like))
     drifting = jnp.asarray(turning.system.drifting, dtype=int)
-    seeds = jnp.concatenate([turned_seeds, tangent_seeds], axis=1)
+    seeds = jnp.concatenate([jnp.zeros((len(sizes), count)), jnp.diag(sizes)], axis=1)
     parameters = jnp.stack([jnp.asarray(leaf) for leaf in active_leaves(args)])
     watch = turning.watch(args.args, like)
+    rates = FieldRates(turning.system, args, structure)
 
-    def parts(z: Sequence[Scalar] | Scalar) -> tuple[PyTree, PyTree]:
-        return jtu.tree_unflatten(structure, list(z[:c])), with_active(args, list(z[c:]))
+    def parts(z: Scalar) -> tuple[PyTree, PyTree]:
+        return rates.state(list(z[:c])), rates.scene(list(z[c:]))
 
     def vector(y: PyTree) -> Scalar:
         return jnp.stack(jtu.tree_leaves(y))
-
-    rates = FieldRates(turning.system, args, structure, turning.second_engine)
 
     def surfaces(z: Scalar) -> Any:
         state, scene = parts(z)
@@ -86,7 +84,10 @@ def second_turn(
         nodes = nodes.at[end].set(vector(arrived))
         # A section may be a switch, as touchdown is: the motion begins and ends before it.
         clock, nodes = _earlier(rates, clock, nodes, jnp.stack([0, end]), parameters)
-        bent = along_path(rates, surfaces, clock, nodes, parameters, bent, seeds, count)
+        if turning.engine == "lanes":
+            bent = along_nodes(rates, clock, nodes, end, bent, sizes)
+        else:
+            bent = along_path(rates, surfaces, clock, nodes, parameters, bent, seeds, count)
         z = jnp.concatenate([nodes[end], parameters])
         if k + 1 < turning.steps:
             bent = bend(renewed, z, bent, seeds, count)

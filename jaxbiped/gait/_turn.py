@@ -31,8 +31,7 @@ class Turning(eqx.Module):
         steps: arrivals that make one turn.
         time_limit: longest time to the next arrival [s].
         max_solver_steps: cap on the attempted steps to the next arrival.
-        engine: "xla" or "lanes"; `second_engine` the same for second derivatives, of which the
-            lanes compile sooner, but a batch is the faster in XLA.
+        engine: "xla" or "lanes".
     """
 
     system: AbstractSystem
@@ -42,7 +41,6 @@ class Turning(eqx.Module):
     steps: int = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)
-    second_engine: str = eqx.field(static=True, default="xla")
 
     def watch(self, args: PyTree, y: PyTree, *, peak: bool = True) -> Watch:
         """What the solves land on: a section is looked at after the arrival's renewal."""

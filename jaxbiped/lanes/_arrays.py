@@ -24,6 +24,20 @@ def _slice(a: Array, *, start_indices: Any, limit_indices: Any, strides: Any, **
     return a[tuple(slice(*part) for part in parts)]
 
 
+def _padded(a: Array, filler: Array, *, padding_config: Any, **_: Any) -> Array:
+    """Filled up before, behind and between the entries; cut off where the filling is negative."""
+    for axis, (before, behind, between) in enumerate(padding_config):
+        size = (a.shape[axis] - 1) * (between + 1) + 1 if a.shape[axis] else 0
+        shape = list(a.shape)
+        shape[axis] = max(before, 0) + size + max(behind, 0)
+        whole = np.full(shape, filler.item(), dtype=object)
+        rows = np.moveaxis(whole, axis, 0)
+        rows[max(before, 0) : max(before, 0) + size : between + 1] = np.moveaxis(a, axis, 0)
+        end = len(rows) + min(behind, 0)
+        a = np.moveaxis(rows[-min(before, 0) : end], 0, axis)
+    return a
+
+
 def _concatenate(*arrays: Array, dimension: int, **_: Any) -> Array:
     return np.concatenate(arrays, axis=dimension)
 
@@ -36,6 +50,7 @@ MOVES: dict[str, Callable[..., Array]] = {
     "transpose": lambda a, *, permutation, **_: np.transpose(a, permutation),
     "slice": _slice,
     "concatenate": _concatenate,
+    "pad": _padded,
     "stack": lambda *arrays, axis=0, **_: np.stack(arrays, axis=axis),
     "rev": lambda a, *, dimensions, **_: np.flip(a, tuple(dimensions)),
 }

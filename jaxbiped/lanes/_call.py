@@ -26,12 +26,14 @@ def call(
     inputs: PyTree,
     schedule: Schedule | None = None,
     *,
+    tape: Any = None,
     room: int = 0,
     quick: bool = False,
 ) -> tuple[PyTree, Recorded | None]:
     """Runs one simulation, or under `vmap` many at once, each in a lane.
 
-    There is room for `room` records, or for one at each time of a schedule.
+    There is room for `room` records, or for one at each time of a schedule. A `tape`, shape
+    (rows, numbers), is for programs that read one.
 
     It has no derivative of its own. Outside of `jit` it runs at once and an
     interrupt ends it; inside, it is called back from the compiled program, and an interrupt waits.
@@ -40,12 +42,15 @@ def call(
     leaves = jtu.tree_leaves(inputs)
     params: dict[str, Any] = dict(compiled=compiled, schedule=schedule, room=room, quick=quick)
     # One array each way: every array that crosses costs time.
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+    rows = [] if tape is None else [tape]
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in [*leaves, *rows]):
         numbers = [jnp.ravel(jnp.asarray(leaf, dtype=jnp.float64)) for leaf in leaves]
-        table, *rest = (leaf[0] for leaf in _RUN.bind(jnp.concatenate(numbers)[None], **params))
+        given = [jnp.concatenate(numbers), *rows]
+        table, *rest = (leaf[0] for leaf in _RUN.bind(*[x[None] for x in given], **params))
     else:
-        given = [np.ravel(np.asarray(leaf, dtype=np.float64)) for leaf in leaves]
-        table, *rest = (leaf[0] for leaf in _run(np.concatenate(given)[None], **params))
+        known = [np.ravel(np.asarray(leaf, dtype=np.float64)) for leaf in leaves]
+        given = [np.concatenate(known), *(np.asarray(x) for x in rows)]
+        table, *rest = (leaf[0] for leaf in _run(*[x[None] for x in given], **params))
     records: Any = [jnp.asarray(leaf) for leaf in rest]
     recorded = Recorded(*records) if rest else None
     return _outputs(compiled, table), recorded
@@ -59,14 +64,21 @@ def _outputs(compiled: CompiledProgram, table: Any) -> PyTree:
 
 
 def _run(
-    numbers: Any, *, compiled: CompiledProgram, schedule: Schedule | None, room: int, quick: bool
+    numbers: Any,
+    tape: Any = None,
+    *,
+    compiled: CompiledProgram,
+    schedule: Schedule | None,
+    room: int,
+    quick: bool,
 ) -> list[np.ndarray]:
-    """Of inputs (n, k): outputs (n, o), and what was recorded."""
+    """Of inputs (n, k) and their tapes: outputs (n, o), and what was recorded."""
     times = None if schedule is None else schedule.times
     room = room if times is None else len(times)
     table = np.asarray(numbers).T
     alone = quick and table.shape[1] == 1
-    found, recorded = compiled.run_table(table, schedule=times, room=room, quick=alone)
+    rows = None if tape is None else np.asarray(tape)
+    found, recorded = compiled.run_table(table, schedule=times, tape=rows, room=room, quick=alone)
     return [found.T, *(recorded or ())]
 
 

@@ -112,6 +112,10 @@ def _apply(block: Block, equation: Any, inputs: list[Array]) -> list[Array]:
     if name == "split":
         cuts = np.cumsum(params["sizes"])[:-1]
         return list(np.split(inputs[0], cuts, axis=params["axis"]))
+    if name == "unstack":
+        return [
+            np.asarray(part, dtype=object) for part in np.moveaxis(inputs[0], params["axis"], 0)
+        ]
     if name == "cond":
         return _branches(block, params["branches"], inputs)
     if name == "scan":

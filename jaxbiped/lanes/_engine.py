@@ -77,6 +77,7 @@ class CompiledProgram:
         inputs: PyTree,
         *,
         schedule: np.ndarray | None = None,
+        tape: np.ndarray | None = None,
         room: int = 0,
         threads: int | None = None,
         width: int | None = None,
@@ -87,6 +88,7 @@ class CompiledProgram:
         Args:
             inputs: of all simulations; 64-bit floating-point numbers, whatever they stand for.
             schedule: increasing times of the records, shape (m,), where the program has such.
+            tape: rows for each simulation, shape (n, rows, numbers), where the program reads such.
             room: records that each simulation has room for.
             threads: how many to use; the environment's or the machine's choice unless given.
             width: simulations in one vector; the results do not depend on it.
@@ -103,7 +105,13 @@ class CompiledProgram:
         ]
         table = np.concatenate(rows).astype(np.float64)
         found, recorded = self.run_table(
-            table, schedule=schedule, room=room, threads=threads, width=width, quick=quick
+            table,
+            schedule=schedule,
+            tape=tape,
+            room=room,
+            threads=threads,
+            width=width,
+            quick=quick,
         )
         return Ran(self._outputs(found), recorded)
 
@@ -112,6 +120,7 @@ class CompiledProgram:
         table: np.ndarray,
         *,
         schedule: np.ndarray | None = None,
+        tape: np.ndarray | None = None,
         room: int = 0,
         threads: int | None = None,
         width: int | None = None,
@@ -122,6 +131,10 @@ class CompiledProgram:
         count = table.shape[1]
         outputs = np.full((len(self.graph.outputs), count), np.nan)
         times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
+        rows = np.zeros((count, 1, 0)) if tape is None else tape
+        rows = np.ascontiguousarray(rows, dtype=np.float64)
+        assert rows.shape[1] > 0
+        assert (rows.shape[0], rows.shape[2]) == (count, len(self.graph.row))
         records = np.full((count, room, len(self.graph.recorded)), np.nan)
         record_counts = np.zeros(count, dtype=np.int64)
         queue, stop = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
@@ -134,8 +147,11 @@ class CompiledProgram:
             records=records,
             record_counts=record_counts,
             schedule=times,
+            tape=rows,
         )
-        numbers = dict(count=count, record_room=room, schedule_length=len(times))
+        numbers = dict(
+            count=count, record_room=room, schedule_length=len(times), tape_length=rows.shape[1]
+        )
         fields = np.array(
             [arrays[n].ctypes.data if n in arrays else numbers[n] for n in FIELDS], dtype=np.int64
         )

@@ -37,7 +37,7 @@ class _Kernel:
         self.needed = Needed(results)
         self.writer = Writer(width, host.width, host.scales, self.needed)
         self.t = self.writer.text
-        sizes = Sizes(len(graph.inputs), len(graph.outputs), len(graph.recorded))
+        sizes = Sizes(len(graph.inputs), len(graph.outputs), len(graph.recorded), len(graph.row))
         self.lanes = Lanes(self.t, width, sizes, scheduled=graph.scheduled)
         self.kept: list[tuple[Value, Place]] = []
 
@@ -59,6 +59,8 @@ class _Kernel:
         w, graph, rooms = self.writer, self.graph, self.lanes.rooms
         for offset, value in enumerate(graph.inputs):
             w.homes[id(value)] = Place(rooms.taken, offset)
+        for offset, value in enumerate(graph.row):
+            w.homes[id(value)] = Place(rooms.row, offset)
         w.homes[id(graph.next_time)] = Place(rooms.next_time, 0)
         for value in _computed(graph.prepare, self.needed):
             self.kept.append((value, Place(w.room(value.kind, 1), 0)))
@@ -138,6 +140,8 @@ class _Kernel:
         going = t.assign(f"icmp eq i64 {stop}, 0")
         t.line(f"br i1 {going}, label %step, label %leave")
         t.begin("step")
+        if graph.row:
+            lanes.visit_where("reading", "live", lanes.read)
         with t.scope():
             w.write(graph.body)
             found = [

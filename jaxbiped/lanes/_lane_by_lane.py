@@ -1,4 +1,4 @@
-"""What the lanes of a vector do one by one: taking simulations, giving outputs, recording."""
+"""What lanes do one by one: taking simulations, reading rows, giving outputs, recording."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -17,25 +17,29 @@ FIELDS = (
     "record_room",
     "schedule",
     "schedule_length",
+    "tape",
+    "tape_length",
 )
 """What a kernel's entry takes: 64-bit numbers one behind the other, addresses among them."""
-_NUMBERS = ("count", "record_room", "schedule_length")
+_NUMBERS = ("count", "record_room", "schedule_length", "tape_length")
 
 
 class Sizes(NamedTuple):
-    """How many numbers a simulation takes, gives, and has in a record; 0 for no records."""
+    """How many numbers a simulation takes, gives, has in a record, and in a row of its tape."""
 
     inputs: int
     outputs: int
     recorded: int
+    row: int
 
 
 class Rooms(NamedTuple):
-    """Where in memory the lanes' inputs, outputs, records and next times are."""
+    """Where in memory the lanes' inputs, outputs, records, rows of the tape and next times are."""
 
     taken: str
     given: str
     noted: str
+    row: str
     next_time: str
 
 
@@ -52,8 +56,8 @@ class Lanes:
         sizes, rooms: see there.
         scheduled: whether records follow a schedule.
         field: names of the `FIELDS`.
-        bits: where each lane's simulation (`index`, −1 for none), its records (`counts`) and its
-            marks (`done`, `live`, `fresh`, `wants`) are.
+        bits: where each lane's simulation (`index`, −1 for none), its records (`counts`), the
+            rows that it has read (`rows`) and its marks (`done`, `live`, `fresh`, `wants`) are.
     """
 
     def __init__(self, text: Text, width: int, sizes: Sizes, *, scheduled: bool) -> None:
@@ -65,7 +69,7 @@ class Lanes:
             self.field[name] = text.assign(f"load {kind}, ptr {at}, align 8")
         many = [max(size, 1) * width for size in sizes]
         self.rooms = Rooms(*[text.room(Kind.F64, size) for size in (*many, width)])
-        self.bits = {name: text.room(Kind.I64, width) for name in ("index", "counts")}
+        self.bits = {name: text.room(Kind.I64, width) for name in ("index", "counts", "rows")}
         self.bits |= {name: text.room(Kind.BOOL, width) for name in _MARKS}
         for lane in range(width):
             text.line(f"store i64 -1, ptr {text.address(self.bits['index'], Kind.I64, lane)}")
@@ -102,6 +106,8 @@ class Lanes:
         t.line(f"store i64 {following}, ptr {index_at}")
         t.line(f"store i8 1, ptr {fresh_at}")
         t.line(f"store i64 0, ptr {count_at}")
+        if self.sizes.row:
+            t.line(f"store i64 0, ptr {t.address(self.bits['rows'], Kind.I64, lane)}")
         if self.scheduled:
             self._schedule(lane, "0")
         self._copy(
@@ -114,6 +120,23 @@ class Lanes:
         t.line(f"store i8 0, ptr {fresh_at}")
         t.line(f"br label %{after}")
         t.begin(after)
+
+    def read(self, lane: str) -> None:
+        """A lane reads the next row of its tape, behind the last one that one again."""
+        t = self.text
+        at = t.address(self.bits["rows"], Kind.I64, lane)
+        place = t.assign(f"load i64, ptr {at}")
+        index = t.assign(f"load i64, ptr {t.address(self.bits['index'], Kind.I64, lane)}")
+        first = t.assign(f"mul i64 {index}, {self.field['tape_length']}")
+        row = t.assign(f"mul i64 {t.assign(f'add i64 {first}, {place}')}, {self.sizes.row}")
+        for k in range(self.sizes.row):
+            there = t.address(self.field["tape"], Kind.F64, t.assign(f"add i64 {row}, {k}"))
+            number = t.assign(f"load double, ptr {there}")
+            here = t.assign(f"add i64 {lane}, {k * self.width}")
+            t.line(f"store double {number}, ptr {t.address(self.rooms.row, Kind.F64, here)}")
+        following = t.assign(f"add i64 {place}, 1")
+        more = t.assign(f"icmp slt i64 {following}, {self.field['tape_length']}")
+        t.line(f"store i64 {t.assign(f'select i1 {more}, i64 {following}, i64 {place}')}, ptr {at}")
 
     def _copy(self, many: int, own: str, lane: str, array: str, index: str, *, out: bool) -> None:
         """Copies one lane's numbers to or from its column of an array (numbers, simulations)."""

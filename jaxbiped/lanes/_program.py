@@ -24,6 +24,8 @@ class Program(NamedTuple):
         start: what is carried at first, `start(inputs)`.
         attempt: one attempted step, `attempt(inputs, carried)`, gives what is then carried and
             whether the simulation is over (boolean).
+        tape: numbers in each row of a tape, of which every attempt reads the next row as a third
+            argument, shape (tape,); behind the last row that one again. 0: there is none.
         finish: outputs, `finish(inputs, carried)`.
         record: `record(inputs, carried, next_time)` gives whether there is something to record
             (boolean) and what, a list of numbers. It is asked until it has nothing more where
@@ -32,10 +34,11 @@ class Program(NamedTuple):
     """
 
     start: Callable[[PyTree], PyTree]
-    attempt: Callable[[PyTree, PyTree], tuple[PyTree, Scalar]]
+    attempt: Callable[..., tuple[PyTree, Scalar]]
     finish: Callable[[PyTree, PyTree], PyTree]
     record: Callable[[PyTree, PyTree, Scalar], tuple[Scalar, Sequence[Scalar]]] | None = None
     scheduled: bool = False
+    tape: int = 0
 
 
 class Graph(NamedTuple):
@@ -46,6 +49,7 @@ class Graph(NamedTuple):
         begin, body, end, notes: blocks of `start`, `attempt`, `finish` and `record`.
         inputs: what is read, `carried` what is carried, one array for each leaf.
         first: what is carried at first; `following` after an attempt.
+        row: of the tape.
         done: whether the simulation is over.
         outputs: 64-bit floating-point numbers, all; `constants` those that are always the same, by
             their places, which `outputs` leaves out.
@@ -62,6 +66,7 @@ class Graph(NamedTuple):
     carried: list[Array]
     first: list[Array]
     following: list[Array]
+    row: list[Value]
     done: Value
     outputs: list[Value]
     constants: dict[int, float]
@@ -81,7 +86,14 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
     carried_shape = jax.eval_shape(program.start, inputs)
     carried = [_inputs(body, leaf) for leaf in jtu.tree_leaves(carried_shape)]
     first, _ = _emitted(begin, program.start, (inputs,), given)
-    following, _ = _emitted(body, program.attempt, (inputs, carried_shape), [*given, *carried])
+    shapes: tuple[Any, ...] = (inputs, carried_shape)
+    arguments = [*given, *carried]
+    row: list[Value] = []
+    if program.tape:
+        shape = jax.ShapeDtypeStruct((program.tape,), jnp.float64)
+        shapes, arguments = (*shapes, shape), [*arguments, _inputs(body, shape)]
+        row = list(arguments[-1])
+    following, _ = _emitted(body, program.attempt, shapes, arguments)
     finals, structure = _emitted(end, program.finish, (inputs, carried_shape), [*given, *carried])
     next_time = Value("input", (), Kind.F64, notes)
     recording, recorded = None, []
@@ -103,6 +115,7 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
         carried=carried,
         first=_matched(begin, first, carried),
         following=_matched(body, following, carried),
+        row=row,
         done=done.item(),
         outputs=[v for v in outputs if v.constant is None],
         constants={i: v.constant for i, v in enumerate(outputs) if v.constant is not None},

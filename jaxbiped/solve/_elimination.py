@@ -30,16 +30,19 @@ def inverse(matrix: Matrix) -> list[list[Scalar]]:
         for i, row in enumerate(matrix)
     ]
     for k in range(size):
+        # The first column is the pivot's; once eliminated, it is known and left out.
         for i in range(k + 1, size):
-            larger = jnp.abs(rows[i][..., k]) > jnp.abs(rows[k][..., k])
+            larger = jnp.abs(rows[i][..., 0]) > jnp.abs(rows[k][..., 0])
             above, below = rows[k], rows[i]
             rows[k] = jnp.where(larger[..., None], below, above)
             rows[i] = jnp.where(larger[..., None], above, below)
-        rows[k] = rows[k] / rows[k][..., k : k + 1]
+        heads = [row[..., :1] for row in rows]
+        rows = [row[..., 1:] for row in rows]
+        rows[k] = rows[k] / heads[k]
         for i in range(size):
             if i != k:
-                rows[i] = rows[i] - rows[i][..., k : k + 1] * rows[k]
-    return [[row[..., size + j] for j in range(size)] for row in rows]
+                rows[i] = rows[i] - heads[i] * rows[k]
+    return [[row[..., j] for j in range(size)] for row in rows]
 
 
 def times(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:

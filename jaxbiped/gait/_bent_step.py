@@ -1,0 +1,285 @@
+"""One step of first and second tangents, one direction at a time, for lanes.
+
+The equations are those of `_curvature` and the method that of `_radau`; here the components whose
+rate is a component are eliminated by hand, and the step is one, not many.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxbiped._types import Scalar
+from jaxbiped.gait._crossings import SIDES, Crossings, jump_of
+from jaxbiped.gait._radau import RADAU, Path
+from jaxbiped.solve._elimination import inverse
+from jaxbiped.solve._landing import MARGIN
+from jaxbiped.solve._linearisation import linearise
+
+Field = Callable[[Sequence[Scalar], Sequence[Scalar]], list[Scalar]]
+"""Rates of all components, of components and active parameters."""
+
+
+class Order(NamedTuple):
+    """Components in the order that the algebra wants: those whose rate is a component first.
+
+    Attributes:
+        every: positions of all components in that order.
+        direct: how many come first; the rate of each is the component as far behind them.
+    """
+
+    every: tuple[int, ...]
+    direct: int
+
+    @property
+    def kept(self) -> tuple[int, ...]:
+        """Positions of the others."""
+        return self.every[self.direct :]
+
+    def sorted(self, vector: Any) -> Any:
+        """The last axis of an array in this order."""
+        return jnp.stack([vector[..., i] for i in self.every], axis=-1)
+
+    def restored(self, vector: Any) -> Any:
+        """The last axis of an array from this order in the components' own."""
+        return jnp.stack(
+            [vector[..., self.every.index(i)] for i in range(len(self.every))], axis=-1
+        )
+
+
+def order_of(field: Field, y: Sequence[Scalar], parameters: Sequence[Scalar]) -> Order:
+    """The order of a field's components."""
+    found = linearise(lambda t, y: field(y, parameters), jnp.zeros(()), list(y))
+    direct, kept = found.direct(), found.kept()
+    sources = list(direct.values())
+    rest = [i for i in kept if i not in sources]
+    return Order((*direct, *sources, *rest), len(direct))
+
+
+class Stages(NamedTuple):
+    """A step of y' = J y + b by Radau IIA, in the order of `order`; k components are kept.
+
+    Attributes:
+        order: of the components.
+        weights: of the rates at the three collocation points in the changes up to each, (3, 3).
+        by_kept: Jacobian of the kept rates by the kept components there, (3, k, k).
+        by_direct: the same by the direct ones, (3, k, d).
+        inverse: of the equations of the kept components at all points, (3 k, 3 k).
+    """
+
+    order: Order
+    weights: Any
+    by_direct: Any
+    inverse: Any
+
+    @staticmethod
+    def of(order: Order, share: Any, jacobians: Any) -> "Stages":
+        """From the Jacobians of the kept rates, (3, k, c), their columns in order."""
+        weights = RADAU * share
+        d, k = order.direct, len(order.kept)
+        by_direct, by_kept = jacobians[..., :d], jacobians[..., d:]
+        blocks = weights[:, None, :, None] * jnp.swapaxes(by_kept, 0, 1)[None]
+        if d:
+            # A direct component follows its rate: the equation of a second derivative.
+            once = weights[:, :, None, None] * by_direct[None]
+            twice = jnp.einsum("ijka,jl->ikla", once, weights)
+            nothing = jnp.zeros((3, k, 3, k - d))
+            blocks = blocks + jnp.concatenate([twice, nothing], axis=-1)
+        matrix = jnp.eye(3 * k) - blocks.reshape(3 * k, 3 * k)
+        rows = inverse([list(row) for row in matrix])
+        return Stages(order, weights, by_direct, jnp.stack([jnp.stack(row) for row in rows]))
+
+    def solve(self, start: Any, forcing: Any) -> Any:
+        """The solution at the collocation points, (3, c), from its start (c,), forced (3, k)."""
+        d = self.order.direct
+        direct, kept = start[:d], start[d:]
+        pushed = forcing + self.by_direct @ direct if d else forcing
+        right = (kept + self.weights @ pushed).reshape(-1)
+        found = (self.inverse @ right).reshape(3, -1)
+        if not d:
+            return found
+        return jnp.concatenate([direct + self.weights @ found[:, :d], found], axis=1)
+
+
+class Linear(NamedTuple):
+    """The field about one step, all in order; n = c + p.
+
+    Attributes:
+        stages: the step's equations.
+        points: states at the collocation points, (3, c), in the components' own order.
+        by_parameter: derivatives of the kept rates there, (3, k, p).
+        at_start: of the kept rates by all where the step starts, (k, n).
+        velocity: rates there, (c,).
+        jump: of the derivatives of the kept rates where the step ends, (k, n).
+    """
+
+    stages: Stages
+    points: Any
+    by_parameter: Any
+    at_start: Any
+    velocity: Any
+    jump: Any
+
+
+def linear_about(
+    field: Field, order: Order, path: Path, crossing: Crossings, parameters: Any
+) -> Linear:
+    """The field about the step of a `Path` whose leaves have no leading axis."""
+    part, share = (each[0] for each in jax.tree.map(lambda x: x[None], path).clock())
+    rows = _Rows(field, order, parameters)
+    c = len(order.every)
+    begins, ends = rows.velocity(path.before), rows.velocity(path.after)
+    points = _collocated(rows, order, path, part, share, begins, ends)
+    # A step that ends on a switch belongs to the old side; a corrected point may lie beyond.
+    short = jnp.where(crossing.crossed, path.after - MARGIN * ends, points[2])
+    points = jnp.concatenate([points[:2], short[None]])
+    away = MARGIN * jnp.asarray(SIDES)[:, None] * ends
+    found = jax.lax.map(
+        rows.gradient, jnp.concatenate([points, path.before[None], crossing.landed + away])
+    )
+    stages = Stages.of(order, share, found[:3, :, :c])
+    jump = jump_of(found[None, 4:])[0]
+    return Linear(stages, points, found[:3, :, c:], found[3], order.sorted(begins), jump)
+
+
+def _collocated(
+    rows: "_Rows", order: Order, path: Path, part: Any, share: Any, begins: Any, ends: Any
+) -> Any:
+    """The collocation points: a cubic, once corrected."""
+    h, change = path.span, path.after - path.before
+    start, end = h * begins, h * ends
+    second, third = 3.0 * change - 2.0 * start - end, start + end - 2.0 * change
+    s = part[:, None]
+    points = path.before + s * (start + s * (second + s * third))
+    velocities, found = jax.lax.map(
+        lambda y: (rows.velocity(y), rows.gradient(y)),
+        # Two more, for a loop of the generated code.
+        jnp.concatenate([points, points[:2]]),
+    )
+    stages = Stages.of(order, share, found[:3, :, : len(order.every)])
+    residual = order.sorted(points - path.before - (RADAU * share) @ velocities[:3])
+    return points - order.restored(_corrected(stages, residual))
+
+
+def _corrected(stages: Stages, residual: Any) -> Any:
+    """What Newton's method takes off the collocation points for this residual, (3, c)."""
+    d = stages.order.direct
+    direct, kept = residual[:, :d], residual[:, d:]
+    # (I − A ⊗ J) u = r with the direct components of u eliminated.
+    pushed = (stages.by_direct @ direct[..., None])[..., 0] if d else jnp.zeros_like(kept)
+    right = (kept + stages.weights @ pushed).reshape(-1)
+    found = (stages.inverse @ right).reshape(3, -1)
+    if not d:
+        return found
+    return jnp.concatenate([direct + stages.weights @ found[:, :d], found], axis=1)
+
+
+class _Rows:
+    """Rates and their derivatives at one point."""
+
+    def __init__(self, field: Field, order: Order, parameters: Any) -> None:
+        self.field, self.order, self.parameters = field, order, list(parameters)
+
+    def velocity(self, y: Any) -> Any:
+        return jnp.stack(self.field(list(y), self.parameters))
+
+    def gradient(self, y: Any) -> Any:
+        """Derivatives of the kept rates, (k, n)."""
+        return self._rows(self._kept, list(y))
+
+    def bend(self, y: Any, along: Any) -> Any:
+        """Derivatives of the kept rates' derivative along a tangent of the state, (k, n)."""
+        tangent = list(along)
+
+        def turned(y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
+            return jax.jvp(lambda y: self._kept(y, q), (y,), (tangent,))[1]
+
+        return self._rows(turned, list(y))
+
+    def _kept(self, y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
+        every = self.field(y, q)
+        return [every[i] for i in self.order.kept]
+
+    def _rows(self, function: Callable[..., list[Scalar]], y: list[Scalar]) -> Any:
+        """By reverse mode: the kept rates are few."""
+        _, pull = jax.vjp(function, y, self.parameters)
+        size = len(self.order.kept)
+        found = []
+        for i in range(size):
+            state, parameter = pull([jnp.asarray(1.0 if i == j else 0.0) for j in range(size)])
+            found.append(jnp.stack([*(state[j] for j in self.order.every), *parameter]))
+        return jnp.stack(found)
+
+
+class Tangents(NamedTuple):
+    """Rows in order: turned ones (v, c), families' (p, c), and mixed second ones (p, v, c)."""
+
+    turned: Any
+    family: Any
+    second: Any
+
+
+def tangent_step(
+    field: Field,
+    linear: Linear,
+    crossing: Crossings,
+    fresh: Any,
+    sizes: Any,
+    parameters: Any,
+    before: Tangents,
+) -> Tangents:
+    """Tangents after the step.
+
+    `sizes`, shape (p,): by how much each parameter moves along its family's tangent. The turned
+    tangents move none.
+    """
+    order, stages, velocity = linear.stages.order, linear.stages, linear.velocity
+    c, d = len(order.every), order.direct
+    rows = _Rows(field, order, parameters)
+    square = velocity @ velocity
+
+    def flow_part(tangent: Any) -> Any:
+        return jnp.where(fresh, 0.0, (tangent @ velocity) / square)
+
+    def change_of(tangent: Any, forcing: Any) -> Any:
+        """The rate of a tangent where the step starts."""
+        kept = linear.at_start[:, :c] @ tangent + forcing
+        return jnp.concatenate([tangent[d : 2 * d], kept]) if d else kept
+
+    none = jnp.zeros_like(linear.at_start[:, 0])
+    count = before.turned.shape[0]
+    shifts = [flow_part(before.turned[v]) for v in range(count)]
+    rates = [change_of(before.turned[v], none) for v in range(count)]
+    unforced = jnp.zeros_like(linear.by_parameter[..., 0])
+    at_stages = [
+        stages.solve(before.turned[v] - shifts[v] * velocity, unforced) for v in range(count)
+    ]
+    turned = jnp.stack([each[2] for each in at_stages])
+    tangents = order.restored(jnp.concatenate(at_stages))
+    points = jnp.concatenate([linear.points] * count)
+    bends = jax.lax.map(lambda each: rows.bend(*each), (points, tangents))
+    bends = bends.reshape(count, 3, *bends.shape[1:])
+    flow = change_of(velocity, none)
+    jumped = turned @ linear.jump[:, :c].T
+    early = order.sorted(crossing.early[:c])
+
+    def one(each: Any) -> Any:
+        family, second, size, start_force, forcing, bend_force, early_own = each
+        shift = flow_part(family)
+        begun = stages.solve(family - shift * velocity, forcing * size)
+        rate = change_of(family, start_force * size)
+        soon = early @ begun[2] + early_own * size
+        ends = []
+        for v in range(count):
+            shifted = shifts[v] * shift * flow - shifts[v] * rate - shift * rates[v]
+            bent = (bends[v, ..., :c] @ begun[..., None])[..., 0] + bend_force[v] * size
+            end = stages.solve(second[v] + shifted, bent)[2]
+            ends.append(jnp.concatenate([end[:d], end[d:] + jumped[v] * soon]))
+        return begun[2], jnp.stack(ends)
+
+    by_parameter = jnp.moveaxis(linear.by_parameter, -1, 0)
+    own = jnp.moveaxis(bends[..., c:], -1, 0)
+    items = (before.family, before.second, sizes, linear.at_start[:, c:].T, by_parameter, own)
+    family, second = jax.lax.map(one, (*items, crossing.early[c:]))
+    return Tangents(turned, family, second)
