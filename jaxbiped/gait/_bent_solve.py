@@ -59,7 +59,13 @@ class _Now(NamedTuple):
 
 
 def along_nodes(
-    rates: FieldRates, times: Scalar, states: Scalar, steps: Scalar, bent: Bent, sizes: Scalar
+    system: AbstractSystem,
+    rates: FieldRates,
+    times: Scalar,
+    states: Scalar,
+    steps: Scalar,
+    bent: Bent,
+    sizes: Scalar,
 ) -> Bent:
     """`along_path` by lanes.
 
@@ -68,7 +74,7 @@ def along_nodes(
     """
     c, p = states.shape[1], sizes.shape[0]
     structure = jtu.tree_structure(rates.args.args)
-    compiled = _compiled(rates.system, rates.args.active, structure, rates.structure)
+    compiled = _compiled(system, rates.args.active, structure, rates.structure)
     given = _Given(
         args=rates.args.args,
         sizes=sizes,
@@ -111,6 +117,8 @@ class _BentSolve:
 
     def __init__(self, system: AbstractSystem, active: tuple[int, ...], structure: Any) -> None:
         self.system, self.active, self.structure = system, active, structure
+        # Compiled by itself, it is traced once, not at each of its many uses.
+        self.field = jax.jit(system.vector_field)
 
     def program(self) -> Program:
         """The program: its tape's rows are time and state at the ends of the steps."""
@@ -174,9 +182,8 @@ class _BentSolve:
 
     def _rates(self, given: _Given) -> FieldRates:
         nothing = jnp.zeros((0, 0))
-        return FieldRates(
-            self.system, Seeded(given.args, nothing, nothing, self.active), self.structure
-        )
+        seeded = Seeded(given.args, nothing, nothing, self.active)
+        return FieldRates(self.field, seeded, self.structure)
 
     def _order(self, given: _Given) -> Order:
         rates = self._rates(given)

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.gait._crossings import SIDES, Crossings, jump_of
 from jaxbiped.gait._radau import RADAU, Path
-from jaxbiped.solve._elimination import inverse
+from jaxbiped.solve._elimination import inverse, solution
 from jaxbiped.solve._landing import MARGIN
 from jaxbiped.solve._linearisation import linearise
 
@@ -63,15 +63,14 @@ class Stages(NamedTuple):
     Attributes:
         order: of the components.
         weights: of the rates at the three collocation points in the changes up to each, (3, 3).
-        by_kept: Jacobian of the kept rates by the kept components there, (3, k, k).
-        by_direct: the same by the direct ones, (3, k, d).
-        inverse: of the equations of the kept components at all points, (3 k, 3 k).
+        by_direct: Jacobian of the kept rates by the d direct components there, (3, k, d).
+        matrix: of the equations of the kept components at all points, (3 k, 3 k).
     """
 
     order: Order
     weights: Any
     by_direct: Any
-    inverse: Any
+    matrix: Any
 
     @staticmethod
     def of(order: Order, share: Any, jacobians: Any) -> "Stages":
@@ -87,16 +86,17 @@ class Stages(NamedTuple):
             nothing = jnp.zeros((3, k, 3, k - d))
             blocks = blocks + jnp.concatenate([twice, nothing], axis=-1)
         matrix = jnp.eye(3 * k) - blocks.reshape(3 * k, 3 * k)
-        rows = inverse([list(row) for row in matrix])
-        return Stages(order, weights, by_direct, jnp.stack([jnp.stack(row) for row in rows]))
+        return Stages(order, weights, by_direct, matrix)
 
-    def solve(self, start: Any, forcing: Any) -> Any:
-        """The solution at the collocation points, (3, c), from its start (c,), forced (3, k)."""
+    def solve(self, right: Any, forcing: Any, solved: Callable[[Any], Any]) -> Any:
+        """u of (I − A ⊗ J) u = r + (A ⊗ I) b, shape (3, c), of r (3, c) and b of the kept (3, k).
+
+        `solved` gives what the matrix takes to a vector.
+        """
         d = self.order.direct
-        direct, kept = start[:d], start[d:]
-        pushed = forcing + self.by_direct @ direct if d else forcing
-        right = (kept + self.weights @ pushed).reshape(-1)
-        found = (self.inverse @ right).reshape(3, -1)
+        direct, kept = right[:, :d], right[:, d:]
+        pushed = forcing + (self.by_direct @ direct[..., None])[..., 0] if d else forcing
+        found = solved((kept + self.weights @ pushed).reshape(-1)).reshape(3, -1)
         if not d:
             return found
         return jnp.concatenate([direct + self.weights @ found[:, :d], found], axis=1)
@@ -159,20 +159,9 @@ def _collocated(
     )
     stages = Stages.of(order, share, found[:3, :, : len(order.every)])
     residual = order.sorted(points - path.before - (RADAU * share) @ velocities[:3])
-    return points - order.restored(_corrected(stages, residual))
-
-
-def _corrected(stages: Stages, residual: Any) -> Any:
-    """What Newton's method takes off the collocation points for this residual, (3, c)."""
-    d = stages.order.direct
-    direct, kept = residual[:, :d], residual[:, d:]
-    # (I − A ⊗ J) u = r with the direct components of u eliminated.
-    pushed = (stages.by_direct @ direct[..., None])[..., 0] if d else jnp.zeros_like(kept)
-    right = (kept + stages.weights @ pushed).reshape(-1)
-    found = (stages.inverse @ right).reshape(3, -1)
-    if not d:
-        return found
-    return jnp.concatenate([direct + stages.weights @ found[:, :d], found], axis=1)
+    unforced = jnp.zeros((3, len(order.kept)))
+    off = stages.solve(residual, unforced, lambda right: solution(stages.matrix, right))
+    return points - order.restored(off)
 
 
 class _Rows:
@@ -247,14 +236,19 @@ def tangent_step(
         kept = linear.at_start[:, :c] @ tangent + forcing
         return jnp.concatenate([tangent[d : 2 * d], kept]) if d else kept
 
+    inverted = inverse([list(row) for row in stages.matrix])
+    matrix = jnp.stack([jnp.stack(row) for row in inverted])
+
+    def carried(start: Any, forcing: Any) -> Any:
+        """At the collocation points, (3, c)."""
+        return stages.solve(jnp.stack([start] * 3), forcing, lambda right: matrix @ right)
+
     none = jnp.zeros_like(linear.at_start[:, 0])
     count = before.turned.shape[0]
     shifts = [flow_part(before.turned[v]) for v in range(count)]
     rates = [change_of(before.turned[v], none) for v in range(count)]
     unforced = jnp.zeros_like(linear.by_parameter[..., 0])
-    at_stages = [
-        stages.solve(before.turned[v] - shifts[v] * velocity, unforced) for v in range(count)
-    ]
+    at_stages = [carried(before.turned[v] - shifts[v] * velocity, unforced) for v in range(count)]
     turned = jnp.stack([each[2] for each in at_stages])
     tangents = order.restored(jnp.concatenate(at_stages))
     points = jnp.concatenate([linear.points] * count)
@@ -267,14 +261,14 @@ def tangent_step(
     def one(each: Any) -> Any:
         family, second, size, start_force, forcing, bend_force, early_own = each
         shift = flow_part(family)
-        begun = stages.solve(family - shift * velocity, forcing * size)
+        begun = carried(family - shift * velocity, forcing * size)
         rate = change_of(family, start_force * size)
         soon = early @ begun[2] + early_own * size
         ends = []
         for v in range(count):
             shifted = shifts[v] * shift * flow - shifts[v] * rate - shift * rates[v]
             bent = (bends[v, ..., :c] @ begun[..., None])[..., 0] + bend_force[v] * size
-            end = stages.solve(second[v] + shifted, bent)[2]
+            end = carried(second[v] + shifted, bent)[2]
             ends.append(jnp.concatenate([end[:d], end[d:] + jumped[v] * soon]))
         return begun[2], jnp.stack(ends)
 

@@ -1,6 +1,6 @@
 """The rates of a system as a function of components and parameters."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -9,7 +9,6 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._system import AbstractSystem
 from jaxbiped.solve._columns import Seeded, with_active
 
 
@@ -20,12 +19,12 @@ class FieldRates(eqx.Module):
     seconds.
 
     Attributes:
-        system: whose rates.
+        field: the vector field (t, state, args).
         args: parameters, the active ones among them replaced.
         structure: of the state.
     """
 
-    system: AbstractSystem
+    field: Callable[[Any, PyTree, PyTree], PyTree] = eqx.field(static=True)
     args: Seeded
     structure: Any = eqx.field(static=True)
 
@@ -40,4 +39,4 @@ class FieldRates(eqx.Module):
     def __call__(self, z: Sequence[Scalar]) -> list[Scalar]:
         c = self.structure.num_leaves
         state, scene = self.state(z[:c]), self.scene(z[c:])
-        return jtu.tree_leaves(self.system.vector_field(jnp.zeros(()), state, scene))
+        return jtu.tree_leaves(self.field(jnp.zeros(()), state, scene))

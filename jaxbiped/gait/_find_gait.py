@@ -136,6 +136,9 @@ def _find(
     searching = (turning, scene, active, start, precision, method)
     if _is_traced(searching):
         return describe(_searched(*searching))
+    kind = _kind_of((searching, names, radius))
+    if kind in _COMPILED:
+        return describe(_searched(*searching))
     # Two programs, so that the second compiles while the first one does: run on nothing, it ends
     # at once.
     with ThreadPoolExecutor(max_workers=1) as meanwhile:
@@ -143,7 +146,20 @@ def _find(
         ready = meanwhile.submit(describe, nothing)
         found = _searched(*searching)
         ready.result()
+    _COMPILED.add(kind)
     return describe(found)
+
+
+_COMPILED: set[Any] = set()
+"""Kinds of searches whose programs are compiled."""
+
+
+def _kind_of(tree: PyTree) -> Any:
+    """What decides whether one compiled program can serve for another."""
+    arrays, rest = eqx.partition(tree, eqx.is_array)
+    shapes = tuple((leaf.shape, leaf.dtype) for leaf in jtu.tree_leaves(arrays))
+    leaves, structure = jtu.tree_flatten(rest)
+    return jtu.tree_structure(arrays), shapes, tuple(leaves), structure
 
 
 def _is_traced(tree: PyTree) -> bool:

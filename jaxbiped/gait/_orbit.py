@@ -1,5 +1,6 @@
 """A periodic orbit, its stability and its sensitivities."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
@@ -83,9 +84,11 @@ def orbit_of(
     differentiable = turning.steps == 1 or turning.system.renews_by_symmetry
     if radius and active and differentiable:
         both = jax.tree.map(lambda a, b: jnp.stack([a, b]), last, coarse)
-        radius_slopes, looser_slopes = jax.lax.map(
-            lambda each: _radius_slopes(turning, args, active, guess, each), both
-        )
+        # Lanes take both at once; XLA would compute in lockstep and compile for longer.
+        each_of = jax.vmap if turning.engine == "lanes" else _one_by_one
+        radius_slopes, looser_slopes = each_of(
+            lambda each: _radius_slopes(turning, args, active, guess, each)
+        )(both)
         radius_errors = jnp.abs(radius_slopes - looser_slopes)
     return Orbit(found, state, stability, slopes, errors, radius_slopes, radius_errors, sizes)
 
@@ -120,6 +123,10 @@ def _radius_slopes(
     value = left @ (jacobian.astype(vector.dtype) @ vector)
     slopes = (jnp.conj(value) * change).real / jnp.abs(value)
     return jnp.where(last.jumps > 0, jnp.nan, slopes)
+
+
+def _one_by_one(function: Callable[[Turn], Scalar]) -> Callable[[Turn], Scalar]:
+    return lambda turns: jax.lax.map(function, turns)
 
 
 def _leading(jacobian: Scalar) -> tuple[Scalar, Scalar]:

@@ -49,7 +49,7 @@ def second_turn(
     seeds = jnp.concatenate([jnp.zeros((len(sizes), count)), jnp.diag(sizes)], axis=1)
     parameters = jnp.stack([jnp.asarray(leaf) for leaf in active_leaves(args)])
     watch = turning.watch(args.args, like)
-    rates = FieldRates(turning.system, args, structure)
+    rates = FieldRates(turning.system.vector_field, args, structure)
 
     def parts(z: Scalar) -> tuple[PyTree, PyTree]:
         return rates.state(list(z[:c])), rates.scene(list(z[c:]))
@@ -85,7 +85,7 @@ def second_turn(
         # A section may be a switch, as touchdown is: the motion begins and ends before it.
         clock, nodes = _earlier(rates, clock, nodes, jnp.stack([0, end]), parameters)
         if turning.engine == "lanes":
-            bent = along_nodes(rates, clock, nodes, end, bent, sizes)
+            bent = along_nodes(turning.system, rates, clock, nodes, end, bent, sizes)
         else:
             bent = along_path(rates, surfaces, clock, nodes, parameters, bent, seeds, count)
         z = jnp.concatenate([nodes[end], parameters])

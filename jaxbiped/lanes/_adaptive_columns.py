@@ -1,5 +1,6 @@
 """The adaptive solve of a state with its derivatives, from a start to a section, for lanes."""
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -100,7 +101,9 @@ class AdaptiveColumns:
         *,
         save_nodes: bool,
     ) -> None:
-        self.solver, self.watch, self.active = solver, watch, active
+        self.solver, self.active = solver, active
+        # Compiled by itself, the field is traced once, not at each of its many uses.
+        self.watch = dataclasses.replace(watch, field=jax.jit(watch.field))
         self.save_nodes = save_nodes
         self.term: Any = diffrax.ODETerm(watch.field)
 
@@ -203,15 +206,12 @@ class AdaptiveColumns:
         """The columns after the step, and the largest norm of their errors."""
 
         def moved(column: Any, floor: Scalar, forcing: Any | None) -> tuple[Any, Scalar]:
-            before = [column[i] for i in range(column.shape[0])]
-            end, error = column_step(step, before, forcing)
-            sizes = [jnp.maximum(jnp.abs(a), jnp.abs(b)) for a, b in zip(before, end, strict=True)]
-            least = SHARE * _largest(sizes) + floor
-            scaled = [
-                e / (given.tangent_rtol * (s + least)) for e, s in zip(error, sizes, strict=True)
-            ]
-            square = sum(e * e for e in scaled) / len(scaled)
-            return jnp.stack(end), jnp.where(jnp.isnan(square), jnp.inf, square)
+            end, error = column_step(step, column, forcing)
+            sizes = jnp.maximum(jnp.abs(column), jnp.abs(end))
+            least = SHARE * jnp.max(sizes) + floor
+            scaled = error / (given.tangent_rtol * (sizes + least))
+            square = jnp.sum(scaled * scaled) / len(scaled)
+            return end, jnp.where(jnp.isnan(square), jnp.inf, square)
 
         found, norms = [], []
         by_state, by_parameter = now.columns
@@ -249,13 +249,6 @@ def _chosen(keep: Scalar, new: Any, old: Any) -> Any:
 
 def _row(keep: Scalar, highest: Scalar, new: Any, old: Any, peak: Any) -> tuple[Any, Any]:
     return jnp.where(keep, new, old), jnp.where(highest, new, peak)
-
-
-def _largest(values: list[Scalar]) -> Scalar:
-    found = values[0]
-    for value in values[1:]:
-        found = jnp.maximum(found, value)
-    return found
 
 
 def _along_rows(

@@ -107,7 +107,10 @@ def _abstract(*leaves: Any, **params: Any) -> list[Any]:
 
 
 def _called_back(*leaves: Any, **params: Any) -> Any:
-    shapes = _shapes(leaves[0].shape[0], **params)
+    count = leaves[0].shape[0]
+    # While XLA compiles the rest, this compiles as well.
+    params["compiled"].make_ready(count)
+    shapes = _shapes(count, **params)
     return jax.pure_callback(lambda *given: _run(*given, **params), shapes, *leaves)
 
 

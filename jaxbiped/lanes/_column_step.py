@@ -129,65 +129,55 @@ def _derivatives(
     return jax.lax.map(at_stage, tuple(stacked))
 
 
-def column_step(
-    step: Differentiated, column: Sequence[Any], forcing: Any | None
-) -> tuple[list[Any], list[Any]]:
+def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple[Any, Any]:
     """The derivative of a step along one direction: of the new state, and of its error estimate.
 
-    `column` are the components' derivatives, in their own order; `forcing` that of the kept rates
-    at every stage by a parameter, shape (stages, kept), None for a direction of state alone.
+    `column` are the components' derivatives, shape (c,), in their own order; `forcing` that of the
+    kept rates at every stage by a parameter, shape (stages, kept), None for a direction of state
+    alone.
     """
     tableau, stages, order = step.tableau, step.stages, step.order
     g, led = stages.step, len(stages.direct)
-    start = [column[i] for i in order]
+    start = jnp.stack([column[i] for i in order])
+    nothing = jnp.zeros_like(start)
     inverse, entries = _inverse(stages)
-    increments: list[list[Any]] = []
+    increments: list[Any] = []
     for i in range(len(tableau.alpha)):
-        argument = _plus(start, _weighted(tableau.a[i - 1] if i else (), increments))
-        memory = _weighted([tableau.gamma * c for c in tableau.c[i - 1]] if i else (), increments)
-        right = _times(step.by_curvature[i], start)
+        argument = start + _weighted(tableau.a[i - 1] if i else (), increments, nothing)
+        coefficients = [tableau.gamma * c for c in tableau.c[i - 1]] if i else ()
+        memory = _weighted(coefficients, increments, nothing)
+        right = step.by_curvature[i] @ start + step.by_state[i] @ argument
         if forcing is not None:
-            right = [a + b for a, b in zip(right, forcing[i], strict=True)]
-        right = [a + b for a, b in zip(right, _times(step.by_state[i], argument), strict=True)]
-        right = _plus([g * r for r in right], memory and memory[led:])
-        through = _plus([g * a for a in argument[led : 2 * led]], memory and memory[:led])
-        pushed = [g * e for e in _times(entries, through)]
-        solved = _times(inverse, _plus(right, pushed))
-        followers = [a + g * b for a, b in zip(through, solved, strict=False)]
-        increments.append([*followers, *solved])
+            right = right + forcing[i]
+        through = g * argument[led : 2 * led] + memory[:led]
+        solved = inverse @ (g * (right + entries @ through) + memory[led:])
+        followers = through + g * solved[:led]
+        increments.append(jnp.concatenate([followers, solved]))
     back = [order.index(i) for i in range(len(column))]
-    end = _plus(start, _weighted(end_weights(tableau), increments))
-    error = _weighted(error_weights(tableau), increments)
-    return [end[i] for i in back], [error[i] for i in back]
+    end = start + _weighted(end_weights(tableau), increments, nothing)
+    error = _weighted(error_weights(tableau), increments, nothing)
+    return jnp.stack([end[i] for i in back]), jnp.stack([error[i] for i in back])
 
 
-def _inverse(stages: Stages) -> tuple[list[list[Any]], list[list[Any]]]:
-    """(I − g J)⁻¹ of the kept components, and their J by the direct ones (None for zero)."""
+def _inverse(stages: Stages) -> tuple[Any, Any]:
+    """(I − g J)⁻¹ of the kept components, and their J by the direct ones."""
     kept = kept_in_order(stages)
     places = [stages.kept.index(i) for i in kept]
-    inverse = [[stages.factors[i][j] for j in places] for i in places]
-    return inverse, [[stages.jacobian[i][p] for p in stages.direct] for i in kept]
-
-
-def _times(matrix: Any, vector: Sequence[Any]) -> list[Any]:
-    found = []
-    for row in matrix:
-        terms = [a * b for a, b in zip(row, vector, strict=True) if a is not None]
-        found.append(sum(terms[1:], terms[0]) if terms else jnp.zeros_like(vector[0]))
-    return found
-
-
-def _weighted(weights: Sequence[float], increments: Sequence[Sequence[Any]]) -> list[Any]:
-    """Σ weights_j increments_j; nothing where there are none."""
-    pairs = [(w, u) for w, u in zip(weights, increments, strict=False) if w != 0.0]
-    if not pairs:
-        return []
-    return [
-        sum(w * u[k] for w, u in pairs[1:]) + pairs[0][0] * pairs[0][1][k]
-        for k in range(len(increments[0]))
+    inverse = jnp.stack([jnp.stack([stages.factors[i][j] for j in places]) for i in places])
+    if not stages.direct:
+        return inverse, jnp.zeros((len(kept), 0))
+    zero = jnp.zeros_like(stages.step)
+    entries = [
+        [
+            zero if entry is None else entry
+            for entry in (stages.jacobian[i][p] for p in stages.direct)
+        ]
+        for i in kept
     ]
+    return inverse, jnp.stack([jnp.stack(row) for row in entries])
 
 
-def _plus(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
-    """a + b, where `b` may be nothing."""
-    return [x + y for x, y in zip(a, b, strict=True)] if b else list(a)
+def _weighted(weights: Sequence[float], increments: Sequence[Any], nothing: Any) -> Any:
+    """Σ weights_j increments_j."""
+    terms = [w * u for w, u in zip(weights, increments, strict=False) if w != 0.0]
+    return sum(terms[1:], terms[0]) if terms else nothing

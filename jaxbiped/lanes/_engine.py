@@ -54,7 +54,8 @@ class CompiledProgram:
         self.graph: Graph = graph_of(program, inputs)
         self._shapes = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jtu.tree_leaves(inputs)]
         self._code: dict[int, MachineCode] = {}
-        self._lock = threading.Lock()
+        self._begun: set[int] = set()
+        self._lock, self._making = threading.Lock(), threading.Lock()
 
     def text(self, width: int) -> str:
         """The program as LLVM's text."""
@@ -67,10 +68,19 @@ class CompiledProgram:
 
     def code(self, width: int) -> MachineCode:
         """The machine code, for vectors of this width."""
-        with self._lock:
+        with self._making:
             if width not in self._code:
                 self._code[width] = machine_code(self.text(width), ENTRY, host())
             return self._code[width]
+
+    def make_ready(self, count: int) -> None:
+        """Begins to compile, in the background, what running `count` simulations needs."""
+        width = _width(count, default_threads())
+        with self._lock:
+            begun = width in self._code or width in self._begun
+            self._begun.add(width)
+        if not begun:
+            threading.Thread(target=self.code, args=(width,)).start()
 
     def run(
         self,
@@ -138,7 +148,7 @@ class CompiledProgram:
         records = np.full((count, room, len(self.graph.recorded)), np.nan)
         record_counts = np.zeros(count, dtype=np.int64)
         queue, stop = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
-        chosen = (1 if count == 1 else host().width) if width is None else width
+        chosen = _width(count, threads or default_threads()) if width is None else width
         arrays = dict(
             queue=queue,
             stop=stop,
@@ -191,6 +201,11 @@ def default_threads() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def _width(count: int, threads: int) -> int:
+    """Simulations in one vector: a thread that has only one is faster with it alone."""
+    return 1 if count <= threads else host().width
 
 
 def _run_all(work: Callable[[], Any], workers: int, stop: np.ndarray, *, quick: bool) -> None:

@@ -25,17 +25,13 @@ def inverse(matrix: Matrix) -> list[list[Scalar]]:
     size = len(matrix)
     known = [entry for row in matrix for entry in row if entry is not None]
     zero = jnp.zeros_like(sum(known[1:], known[0]))
+    # A row begins with the entries that are not eliminated yet.
     rows = [
         jnp.stack([*(zero if e is None else e + zero for e in row), *_unit(zero, size, i)], axis=-1)
         for i, row in enumerate(matrix)
     ]
     for k in range(size):
-        # The first column is the pivot's; once eliminated, it is known and left out.
-        for i in range(k + 1, size):
-            larger = jnp.abs(rows[i][..., 0]) > jnp.abs(rows[k][..., 0])
-            above, below = rows[k], rows[i]
-            rows[k] = jnp.where(larger[..., None], below, above)
-            rows[i] = jnp.where(larger[..., None], above, below)
+        _largest_first(rows, k)
         heads = [row[..., :1] for row in rows]
         rows = [row[..., 1:] for row in rows]
         rows[k] = rows[k] / heads[k]
@@ -43,6 +39,33 @@ def inverse(matrix: Matrix) -> list[list[Scalar]]:
             if i != k:
                 rows[i] = rows[i] - heads[i] * rows[k]
     return [[row[..., j] for j in range(size)] for row in rows]
+
+
+def solution(matrix: Scalar, right: Scalar) -> Scalar:
+    """The solution of a square system (n, n), with right side (n,), by Gauss with pivoting."""
+    rows = [jnp.append(row, value) for row, value in zip(matrix, right, strict=True)]
+    for k in range(len(rows)):
+        _largest_first(rows, k)
+        heads = [row[:1] for row in rows]
+        rows[k:] = [row[1:] for row in rows[k:]]
+        rows[k] = rows[k] / heads[k]
+        for i in range(k + 1, len(rows)):
+            rows[i] = rows[i] - heads[i] * rows[k]
+    found: list[Scalar] = []
+    for row in reversed(rows):
+        # A row is what is right of its pivot's one.
+        known = [a * x for a, x in zip(row[:-1], found[::-1], strict=True)] if found else []
+        found.append(row[-1] - sum(known[1:], known[0]) if known else row[-1])
+    return jnp.stack(found[::-1])
+
+
+def _largest_first(rows: list[Scalar], k: int) -> None:
+    """Brings the row with the largest first entry to place `k`, of those from there on."""
+    for i in range(k + 1, len(rows)):
+        larger = jnp.abs(rows[i][..., :1]) > jnp.abs(rows[k][..., :1])
+        above, below = rows[k], rows[i]
+        rows[k] = jnp.where(larger, below, above)
+        rows[i] = jnp.where(larger, above, below)
 
 
 def times(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
