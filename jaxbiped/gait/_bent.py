@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
+from jaxbiped.gait._flow import Flow
 from jaxbiped.gait._radau import Rates, stacked
 
 
@@ -22,6 +23,37 @@ class Bent(NamedTuple):
     second: Scalar
 
 
+Each = Callable[[Callable[[Scalar], Scalar]], Callable[[Scalar], Scalar]]
+"""Of a function of a vector: the same of a matrix, column by column."""
+
+
+def at_once(function: Callable[[Scalar], Scalar]) -> Callable[[Scalar], Scalar]:
+    """All columns at once."""
+    return jax.vmap(function, in_axes=-1, out_axes=-1)
+
+
+def renewed(
+    flow: Flow,
+    z: Scalar,
+    bent: Bent,
+    seeds: Scalar,
+    count: int,
+    *,
+    final: bool,
+    each: Each = at_once,
+) -> tuple[Bent, Scalar]:
+    """Tangents after an arrival at `z`, and the time's mixed second tangents, shape (q, v).
+
+    Of the `final` arrival tangents on the section; of one before it at a fixed time, whose second
+    tangents are zero.
+    """
+    time = jnp.zeros(bent.second.shape[1:])
+    if final:
+        bent, times = on_surface(flow, flow.section, z, bent, seeds, count, each)
+        time = times.second
+    return bend(flow.renewed, z, bent, seeds, count), time
+
+
 def on_surface(
     rates: Rates,
     surface: Callable[[Scalar], Scalar],
@@ -29,6 +61,7 @@ def on_surface(
     bent: Bent,
     seeds: Scalar,
     count: int,
+    each: Each = at_once,
 ) -> tuple[Bent, Bent]:
     """Tangents at a fixed time turned into tangents on the surface g = 0 that `z` lies on.
 
@@ -50,7 +83,7 @@ def on_surface(
     slope = gradient @ flow
     times = -(gradient @ moved) / slope
     on = moved + flow[:, None] * times
-    bends = jax.vmap(turned, in_axes=-1, out_axes=-1)(moved)
+    bends = each(turned)(moved)
     by_v, by_q = times[:count], times[count:]
     second = bent.second + jnp.einsum("cv,q->cqv", bends[:, :count], by_q)
     second = second + jnp.einsum("cq,v->cqv", bends[:, count:], by_v)

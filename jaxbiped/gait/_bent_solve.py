@@ -1,6 +1,7 @@
 """Second tangents along a motion that is already known, by lanes."""
 
 import functools
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -9,11 +10,11 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._bent import Bent
+from jaxbiped.gait._bent import Bent, renewed
 from jaxbiped.gait._bent_step import Order, Tangents, linear_about, order_of, tangent_step
 from jaxbiped.gait._crossings import crossing_of
 from jaxbiped.gait._curvature import LONG_AGO
-from jaxbiped.gait._field_rates import FieldRates
+from jaxbiped.gait._flow import Arrival, Flow
 from jaxbiped.gait._radau import Path
 from jaxbiped.gait._system import AbstractSystem
 from jaxbiped.lanes._call import call
@@ -59,24 +60,24 @@ class _Now(NamedTuple):
 
 
 def along_nodes(
-    system: AbstractSystem,
-    rates: FieldRates,
+    flow: Flow,
     times: Scalar,
     states: Scalar,
     steps: Scalar,
     bent: Bent,
     sizes: Scalar,
-) -> Bent:
-    """`along_path` by lanes.
+    *,
+    final: bool,
+) -> tuple[Bent, Scalar]:
+    """`along_path` and `renewed` by lanes.
 
     Of the tangents the two turned ones come first, and move no parameter; of the others each moves
     one, by `sizes`, shape (p,). `steps` is how many there are.
     """
-    c, p = states.shape[1], sizes.shape[0]
-    structure = jtu.tree_structure(rates.args.args)
-    compiled = _compiled(system, rates.args.active, structure, rates.structure)
+    args = jtu.tree_structure(flow.args.args)
+    compiled = _compiled(flow.system, flow.arrival, flow.args.active, args, flow.structure, final)
     given = _Given(
-        args=rates.args.args,
+        args=flow.args.args,
         sizes=sizes,
         t=times[0],
         state=states[0],
@@ -86,14 +87,17 @@ def along_nodes(
         steps=steps,
     )
     tape = jnp.concatenate([times[1:, None], states[1:]], axis=1)
-    found, _ = call(compiled, given, tape=tape, quick=True)
-    first = jnp.concatenate([found.turned, found.family]).T
-    return Bent(first.reshape(c, _COUNT + p), jnp.transpose(found.second, (2, 0, 1)))
+    return call(compiled, given, tape=tape, quick=True)[0]
 
 
 @functools.lru_cache(maxsize=256)
 def _compiled(
-    system: AbstractSystem, active: tuple[int, ...], args: Any, state: Any
+    system: AbstractSystem,
+    arrival: Arrival,
+    active: tuple[int, ...],
+    args: Any,
+    state: Any,
+    final: bool,
 ) -> CompiledProgram:
     def numbers(*shape: int) -> Any:
         return jax.ShapeDtypeStruct(shape, jnp.float64)
@@ -109,21 +113,25 @@ def _compiled(
         numbers(p, _COUNT, c),
         numbers(),
     )
-    return CompiledProgram(_BentSolve(system, active, state).program(), shapes)
+    # Compiled by itself, the field is traced once, not at each of its many uses.
+    field = jax.jit(system.vector_field)
+
+    def flow(given: _Given) -> Flow:
+        nothing = jnp.zeros((0, 0))
+        return Flow(system, arrival, field, Seeded(given.args, nothing, nothing, active), state)
+
+    return CompiledProgram(_BentSolve(flow, 1 + c, final).program(), shapes)
 
 
 class _BentSolve:
-    """The functions of the program."""
+    """The functions of the program: its tape's rows are time and state at the ends of steps."""
 
-    def __init__(self, system: AbstractSystem, active: tuple[int, ...], structure: Any) -> None:
-        self.system, self.active, self.structure = system, active, structure
-        # Compiled by itself, it is traced once, not at each of its many uses.
-        self.field = jax.jit(system.vector_field)
+    def __init__(self, flow: Callable[[_Given], Flow], row: int, final: bool) -> None:
+        self.flow, self.row, self.final = flow, row, final
 
     def program(self) -> Program:
-        """The program: its tape's rows are time and state at the ends of the steps."""
-        tape = 1 + self.structure.num_leaves
-        return Program(self.start, self.attempt, self.finish, tape=tape)
+        """The program."""
+        return Program(self.start, self.attempt, self.finish, tape=self.row)
 
     def start(self, given: _Given) -> _Now:
         order = self._order(given)
@@ -139,18 +147,13 @@ class _BentSolve:
         )
 
     def attempt(self, given: _Given, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
-        order, rates = self._order(given), self._rates(given)
+        flow, order, parameters = self.flow(given), self._order(given), self._parameters(given)
         t, node = row[0], row[1:]
-        parameters = jnp.stack([jnp.asarray(q) for q in active_leaves(rates.args)])
 
         def field(y: Any, q: Any) -> list[Scalar]:
-            return rates([*y, *q])
+            return flow([*y, *q])
 
-        def surfaces(z: Scalar) -> Any:
-            c = self.structure.num_leaves
-            return self.system.switches(rates.scene(list(z[c:])), rates.state(list(z[:c])))
-
-        crossing = crossing_of(rates, surfaces, now.node, node, parameters)
+        crossing = crossing_of(flow, flow.surfaces, now.node, node, parameters)
         end = t - crossing.past
         path = Path(
             before=now.state,
@@ -176,16 +179,27 @@ class _BentSolve:
         )
         return after, count >= given.steps
 
-    def finish(self, given: _Given, now: _Now) -> Tangents:
-        order = self._order(given)
-        return Tangents(*(order.restored(part) for part in now.tangents))
+    def finish(self, given: _Given, now: _Now) -> tuple[Bent, Scalar]:
+        """Tangents after the arrival, and the time's second ones."""
+        order, parameters = self._order(given), self._parameters(given)
+        tangents = Tangents(*(order.restored(part) for part in now.tangents))
+        bent = Bent(
+            jnp.concatenate([tangents.turned, tangents.family]).T,
+            jnp.transpose(tangents.second, (2, 0, 1)),
+        )
+        seeds = jnp.concatenate([jnp.zeros((len(parameters), _COUNT)), jnp.diag(given.sizes)], 1)
+        z = jnp.concatenate([now.node, parameters])
+        return renewed(self.flow(given), z, bent, seeds, _COUNT, final=self.final, each=_one_by_one)
 
-    def _rates(self, given: _Given) -> FieldRates:
-        nothing = jnp.zeros((0, 0))
-        seeded = Seeded(given.args, nothing, nothing, self.active)
-        return FieldRates(self.field, seeded, self.structure)
+    def _parameters(self, given: _Given) -> Scalar:
+        return jnp.stack([jnp.asarray(q) for q in active_leaves(self.flow(given).args)])
 
     def _order(self, given: _Given) -> Order:
-        rates = self._rates(given)
-        parameters = active_leaves(rates.args)
-        return order_of(lambda y, q: rates([*y, *q]), list(given.state), parameters)
+        flow = self.flow(given)
+        return order_of(
+            lambda y, q: flow([*y, *q]), list(given.state), list(self._parameters(given))
+        )
+
+
+def _one_by_one(function: Callable[[Scalar], Scalar]) -> Callable[[Scalar], Scalar]:
+    return lambda matrix: jax.lax.map(function, matrix.T).T

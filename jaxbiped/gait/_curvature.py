@@ -15,14 +15,12 @@ start what V and Q have of the flow is taken out, which is only to read their mo
 times, and C changes with it.
 """
 
-from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._bent import Bent
 from jaxbiped.gait._crossings import (
     Crossings,
@@ -31,6 +29,7 @@ from jaxbiped.gait._crossings import (
     jump_of,
     sides_of,
 )
+from jaxbiped.gait._flow import Flow
 from jaxbiped.gait._radau import (
     Path,
     Rates,
@@ -49,8 +48,7 @@ CHUNK = 64
 
 
 def along_path(
-    rates: Rates,
-    surfaces: Callable[[Scalar], Sequence[Switch]],
+    flow: Flow,
     times: Scalar,
     states: Scalar,
     parameters: Scalar,
@@ -61,8 +59,7 @@ def along_path(
     """Carries tangents along a motion whose steps end at `times` and `states`.
 
     Args:
-        rates: the vector field.
-        surfaces: switches of a vector of components and parameters.
+        flow: what moves.
         times: shape (s + 1,), infinite beyond the motion's end.
         states: shape (s + 1, c).
         parameters: shape (p,).
@@ -85,9 +82,9 @@ def along_path(
         start, reached, now = carried
         t = jax.lax.dynamic_slice_in_dim(times, start, CHUNK + 1)
         y = jax.lax.dynamic_slice_in_dim(states, start, CHUNK + 1)
-        found = crossings_of(rates, surfaces, y[:-1], y[1:], parameters)
+        found = crossings_of(flow, flow.surfaces, y[:-1], y[1:], parameters)
         path, reached = _path(reached, t[1:] - found.past, found)
-        after = _chunk(rates, path, found, parameters, now, seeds, count)
+        after = _chunk(flow, path, found, parameters, now, seeds, count)
         return start + CHUNK, reached, after
 
     never = jnp.asarray(False)

@@ -1,17 +1,15 @@
 """Second derivatives of the return map at a periodic orbit."""
 
-from typing import Any
-
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._bent import Bent, bend, on_surface
+from jaxbiped.gait._bent import Bent, renewed
 from jaxbiped.gait._bent_solve import along_nodes
 from jaxbiped.gait._curvature import along_path
-from jaxbiped.gait._field_rates import FieldRates
-from jaxbiped.gait._radau import Rates, velocities
+from jaxbiped.gait._flow import Flow
+from jaxbiped.gait._radau import velocities
 from jaxbiped.gait._turn import Turn, Turning, recurring_places
 from jaxbiped.solve._columns import Seeded, active_leaves
 from jaxbiped.solve._landing import MARGIN
@@ -49,27 +47,8 @@ def second_turn(
     seeds = jnp.concatenate([jnp.zeros((len(sizes), count)), jnp.diag(sizes)], axis=1)
     parameters = jnp.stack([jnp.asarray(leaf) for leaf in active_leaves(args)])
     watch = turning.watch(args.args, like)
-    rates = FieldRates(turning.system.vector_field, args, structure)
-
-    def parts(z: Scalar) -> tuple[PyTree, PyTree]:
-        return rates.state(list(z[:c])), rates.scene(list(z[c:]))
-
-    def vector(y: PyTree) -> Scalar:
-        return jnp.stack(jtu.tree_leaves(y))
-
-    def surfaces(z: Scalar) -> Any:
-        state, scene = parts(z)
-        return turning.system.switches(scene, state)
-
-    def renewed(z: Scalar) -> Scalar:
-        state, scene = parts(z)
-        return vector(turning.system.renew(scene, state))
-
-    def section(z: Scalar) -> Scalar:
-        state, scene = parts(z)
-        assert watch.section is not None
-        return watch.section(scene, state)[0]
-
+    assert watch.section is not None
+    flow = Flow(turning.system, watch.section, turning.system.vector_field, args, structure)
     first = jnp.zeros((c, seeds.shape[1])).at[places].set(jnp.concatenate([turned, tangents], 1))
     bent = Bent(first, jnp.zeros((c, tangents.shape[1], count)))
     times, states = last.nodes
@@ -81,29 +60,28 @@ def second_turn(
             watch, jtu.tree_unflatten(structure, list(nodes[end])), args.args
         )
         clock = times[k].at[end].add(-past)
-        nodes = nodes.at[end].set(vector(arrived))
+        nodes = nodes.at[end].set(jnp.stack(jtu.tree_leaves(arrived)))
         # A section may be a switch, as touchdown is: the motion begins and ends before it.
-        clock, nodes = _earlier(rates, clock, nodes, jnp.stack([0, end]), parameters)
+        clock, nodes = _earlier(flow, clock, nodes, jnp.stack([0, end]), parameters)
+        final = k + 1 == turning.steps
         if turning.engine == "lanes":
-            bent = along_nodes(turning.system, rates, clock, nodes, end, bent, sizes)
-        else:
-            bent = along_path(rates, surfaces, clock, nodes, parameters, bent, seeds, count)
+            bent, period = along_nodes(flow, clock, nodes, end, bent, sizes, final=final)
+            continue
+        bent = along_path(flow, clock, nodes, parameters, bent, seeds, count)
         z = jnp.concatenate([nodes[end], parameters])
-        if k + 1 < turning.steps:
-            bent = bend(renewed, z, bent, seeds, count)
-    on_section, period = on_surface(rates, section, z, bent, seeds, count)
-    final = bend(renewed, z, on_section, seeds, count)
-    parted = [final.second[places], period.second[None], final.second[drifting]]
+        bent, period = renewed(flow, z, bent, seeds, count, final=final)
+    second = bent.second
+    parted = [second[places], period[None], second[drifting]]
     return jnp.concatenate(parted)
 
 
 def _earlier(
-    rates: Rates,
+    flow: Flow,
     clock: Scalar,
     nodes: Scalar,
     places: Scalar,
     parameters: Scalar,
 ) -> tuple[Scalar, Scalar]:
     """Times and states, some of them as little earlier as tells a switch's sides apart."""
-    back = -MARGIN * velocities(rates, nodes[places], parameters)
+    back = -MARGIN * velocities(flow, nodes[places], parameters)
     return clock.at[places].add(-MARGIN), nodes.at[places].add(back)
