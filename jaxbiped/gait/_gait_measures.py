@@ -16,6 +16,7 @@ from jaxbiped.gait._parameters import chosen_parameters
 from jaxbiped.gait._return_map import return_map
 from jaxbiped.gait._section import AbstractSection
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._elimination import solution
 
 _RECURRING = State._fields[1:]
 
@@ -107,7 +108,7 @@ def _by_correction(
     )
     change = jnp.stack([getattr(once.state, n) - getattr(state, n) for n in _RECURRING])
     size = len(_RECURRING)
-    step = jnp.linalg.solve(jnp.eye(size) - gait.return_jacobian[:size], change)
+    step = solution(jnp.eye(size) - gait.return_jacobian[:size], change)
     moved = {n: getattr(state, n) + step[i] for i, n in enumerate(_RECURRING)}
     by_period, by_length = gait.return_jacobian[size:]
     time, length = once.time + by_period @ step, once.state.hip_x + by_length @ step

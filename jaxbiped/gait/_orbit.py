@@ -10,6 +10,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.gait._search import Found
 from jaxbiped.gait._second_turn import second_turn
+from jaxbiped.gait._small_matrices import eigen, inverted, solved
 from jaxbiped.gait._stability import Stability, stability_of
 from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with
 
@@ -97,7 +98,7 @@ def slopes_of(last: Turn) -> Slopes:
     """x(p) = P(x(p), p) differentiated: dx = (I − P_x)⁻¹ P_p, and all else by the chain rule."""
     m = last.recurring.shape[0]
     by_state, by_parameter = last.jacobian[:, :m], last.jacobian[:, m:]
-    recurring = jnp.linalg.solve(jnp.eye(m) - by_state, by_parameter)
+    recurring = solved(jnp.eye(m) - by_state, by_parameter)
 
     def total(rows: Scalar) -> Scalar:
         return rows[..., m:] + rows[..., :m] @ recurring
@@ -132,6 +133,6 @@ def _one_by_one(function: Callable[[Turn], Scalar]) -> Callable[[Turn], Scalar]:
 def _leading(jacobian: Scalar) -> tuple[Scalar, Scalar]:
     """Right and left eigenvectors of the largest eigenvalue, wᵀ v = 1."""
     finite = jnp.all(jnp.isfinite(jacobian))
-    values, vectors = jnp.linalg.eig(jnp.where(finite, jacobian, jnp.eye(jacobian.shape[0])))
+    values, vectors = eigen(jnp.where(finite, jacobian, jnp.eye(jacobian.shape[0])))
     largest = jnp.argmax(jnp.abs(values))
-    return vectors[:, largest], jnp.linalg.inv(vectors)[largest]
+    return vectors[:, largest], inverted(vectors)[largest]

@@ -10,6 +10,7 @@ import optax
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
+from jaxbiped.gait._small_matrices import solved
 from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with, turn
 from jaxbiped.solve._passage import Precision
 
@@ -237,6 +238,6 @@ def _step(
         # A trial that did not return: go half way back.
         return jnp.where(better, step, 0.5 * (now.trial - base)), optimiser
     normal = slope.T @ slope + damping * jnp.eye(m)
-    damped = -jnp.linalg.solve(normal, slope.T @ change)
-    newton = -jnp.linalg.solve(slope, change)
+    damped = -solved(normal, slope.T @ change)
+    newton = -solved(slope, change)
     return jnp.where(damping > 0.0, damped, newton), now.optimiser

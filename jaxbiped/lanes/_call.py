@@ -106,12 +106,29 @@ def _abstract(*leaves: Any, **params: Any) -> list[Any]:
     return [jax.core.ShapedArray(shape.shape, shape.dtype) for shape in shapes]
 
 
-def _called_back(*leaves: Any, **params: Any) -> Any:
-    count = leaves[0].shape[0]
+def _lowered(context: Any, *operands: Any, **params: Any) -> Any:
+    """A call back from the compiled program, with arrays of NumPy.
+
+    `jax.pure_callback` would make arrays of JAX of them, which copies, and where they are large
+    waits for a thread of the same pool that this call holds: for ever, on few cores.
+    """
+
+    def run(*given: np.ndarray) -> tuple[np.ndarray, ...]:
+        return tuple(_run(*given, **params))
+
     # While XLA compiles the rest, this compiles as well.
-    params["compiled"].make_ready(count)
-    shapes = _shapes(count, **params)
-    return jax.pure_callback(lambda *given: _run(*given, **params), shapes, *leaves)
+    params["compiled"].make_ready(context.avals_in[0].shape[0])
+    results, _, _ = mlir.emit_python_callback(
+        context,
+        run,
+        None,
+        list(operands),
+        context.avals_in,
+        context.avals_out,
+        has_side_effect=False,
+        returns_token=False,
+    )
+    return results
 
 
 def _differentiated(primals: Any, tangents: Any, **params: Any) -> Any:
@@ -141,4 +158,4 @@ _RUN.def_impl(_implemented)
 _RUN.def_abstract_eval(_abstract)
 ad.primitive_jvps[_RUN] = _differentiated
 batching.primitive_batchers[_RUN] = _batched
-mlir.register_lowering(_RUN, mlir.lower_fun(_called_back, multiple_results=True))
+mlir.register_lowering(_RUN, _lowered)
