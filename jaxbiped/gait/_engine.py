@@ -5,17 +5,36 @@ from typing import Any
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
+from jaxbiped.gait._gradient import AbstractGradient, Reverse
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 
 
-def orbit_engine(engine: str, *, solver: Any, section: Any, leaves: Any) -> str:
+def orbit_engine(
+    engine: str,
+    *,
+    solver: Any,
+    section: Any,
+    leaves: Any,
+    gradient: AbstractGradient | None = None,
+    own_system: bool = False,
+) -> str:
     """The engine that "auto" stands for, or the one that is asked for.
+
+    Args:
+        engine: one of `ENGINES`.
+        solver, section: the orbit's.
+        leaves: all numbers that are given.
+        gradient: how the motion itself is to be differentiated.
+        own_system: whether the system is the user's own; nobody knows if lanes can express it.
 
     Raises:
         ArgumentError: an unknown name, or lanes for what they cannot do.
     """
-    return engine_for(engine, obstacle=_obstacle(solver, section, leaves))
+    obstacle = _obstacle(solver, section, leaves)
+    if isinstance(gradient, Reverse):
+        obstacle = "gradient = Reverse() goes back through the steps of diffrax"
+    return engine_for(engine, obstacle=obstacle, prefers_xla=own_system)
 
 
 def _obstacle(solver: Any, section: Any, leaves: Any) -> str | None:

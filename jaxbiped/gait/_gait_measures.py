@@ -1,5 +1,7 @@
 """Measures of the periodic gait as a function of the scene that JAX can differentiate."""
 
+from collections.abc import Callable
+
 import equinox as eqx
 import equinox.internal as eqxi
 import jax
@@ -11,9 +13,9 @@ from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
-from jaxbiped.gait._gradient import AbstractGradient, Implicit
+from jaxbiped.gait._gradient import AbstractGradient, Implicit, Reverse
 from jaxbiped.gait._parameters import chosen_parameters
-from jaxbiped.gait._return_map import return_map
+from jaxbiped.gait._return_map import Return, return_map
 from jaxbiped.gait._section import AbstractSection
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._elimination import solution
@@ -29,6 +31,7 @@ def gait_measures(
     period: int = 1,
     section: AbstractSection | None = None,
     accuracy: str = "balanced",
+    engine: str = "auto",
 ) -> Measures:
     """Measures of the gait that `find_gait` finds, differentiable by the scene.
 
@@ -39,7 +42,7 @@ def gait_measures(
     NaN where no gait is found.
 
     Args:
-        scene, guess, period, section, accuracy: as for `find_gait`.
+        scene, guess, period, section, accuracy, engine: as for `find_gait`.
         gradient: how to differentiate.
 
     Raises:
@@ -62,10 +65,25 @@ def gait_measures(
         parameters=None if implicit else (),
         accuracy=accuracy,
         radius_sensitivities=implicit,
+        engine=engine,
     )
     if implicit:
         return _by_theorem(scene, gait)
-    return _by_correction(scene, gait, gradient, period, section, accuracy)
+
+    def turn(state: State) -> Return:
+        reverse = isinstance(gradient, Reverse)
+        return return_map(
+            scene,
+            state,
+            section=section,
+            steps=period,
+            gradient=gradient,
+            accuracy=accuracy,
+            # Only the search can be by lanes where the motion is differentiated in reverse.
+            engine="xla" if reverse else engine,
+        )
+
+    return _by_correction(gait, turn)
 
 
 def _by_theorem(scene: Scene, gait: Gait) -> Measures:
@@ -93,19 +111,10 @@ def _attached_jvp(primals: tuple, tangents: tuple) -> tuple[Measures, Measures]:
 _SECOND = "gait_measures by Implicit(), which has first derivatives only; a second"
 
 
-def _by_correction(
-    scene: Scene,
-    gait: Gait,
-    gradient: AbstractGradient,
-    period: int,
-    section: AbstractSection | None,
-    accuracy: str,
-) -> Measures:
+def _by_correction(gait: Gait, turn: Callable[[State], Return]) -> Measures:
     """Newton's correction at the gait changes nothing but has the gait's derivatives."""
     state = gait.measures.state
-    once = return_map(
-        scene, state, section=section, steps=period, gradient=gradient, accuracy=accuracy
-    )
+    once = turn(state)
     change = jnp.stack([getattr(once.state, n) - getattr(state, n) for n in _RECURRING])
     size = len(_RECURRING)
     step = solution(jnp.eye(size) - gait.return_jacobian[:size], change)

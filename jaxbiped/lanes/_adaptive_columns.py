@@ -233,7 +233,9 @@ class AdaptiveColumns:
             norms.append(jnp.max(squares))
         else:
             found.append(by_parameter)
-        worst = norms[0] if len(norms) == 1 else jnp.maximum(*norms)
+        worst = jnp.zeros(())
+        for norm in norms:
+            worst = jnp.maximum(worst, norm)
         return found, jnp.sqrt(worst)
 
     def _controller(self, given: Crossing, columns_norm: Scalar) -> Landing:
