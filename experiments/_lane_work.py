@@ -72,7 +72,7 @@ def peak_flops() -> float:
 
 def _compiled(scene: jb.Scene) -> CompiledProgram:
     setting = Setting(jb.Rodas4(), _WATCH, counting=False, quick=False)
-    return compiled_solve(setting, jtu.tree_structure(scene), dense=False)
+    return compiled_solve(setting, jtu.tree_structure(scene))
 
 
 def flops_per_step() -> int:

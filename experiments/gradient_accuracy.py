@@ -9,7 +9,6 @@ import dataclasses
 import time
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 from _options import Options, parse
@@ -49,19 +48,20 @@ class Stepped(jb.AbstractSystem):
     """The walker, its switches hidden from the solver or not.
 
     Attributes:
-        lands: whether steps end just past every switch.
+        lands: whether steps end just past every switch; traced.
     """
 
     drifting = jb.Walking.drifting
-    lands: bool = eqx.field(static=True)
+    lands: Any
 
     def vector_field(self, t: Any, y: jb.State, args: jb.Scene) -> jb.State:
         """The walker's."""
         return jb.vector_field(t, y, args)
 
     def switches(self, args: jb.Scene, y: jb.State) -> tuple[jb.Switch, ...]:
-        """The walker's, or none."""
-        return jb.switches(args, y) if self.lands else ()
+        """The walker's, or none that is live."""
+        found = jb.switches(args, y)
+        return tuple(each._replace(live=each.live & self.lands) for each in found)
 
     def ending(self, args: jb.Scene, y: jb.State) -> Any:
         """The walker's."""
@@ -111,10 +111,10 @@ def laws(quick: bool) -> dict[str, jb.Scene]:
 def footstep(scene: jb.Scene, start: jb.State, lands: bool, precision: Precision) -> Turn:
     """One footstep from mid-stance, with derivatives by the state and by log K.
 
-    Tolerances are traced: all of them share one compiled program.
+    Whether it lands and the tolerances are traced: all of them share one compiled program.
     """
     turning = Turning(
-        system=Stepped(lands),
+        system=Stepped(jnp.asarray(lands)),
         section=jb.MidStance(),
         solver=jb.Rodas4(),
         time_limit=jnp.asarray(10.0),

@@ -55,10 +55,10 @@ from jaxbiped.gait._parameters import parameter_names as parameter_names
 from jaxbiped.gait._return_map import Return as Return
 from jaxbiped.gait._return_map import return_map as return_map
 from jaxbiped.gait._search import Search as Search
-from jaxbiped.gait._section import AbstractSection as AbstractSection
-from jaxbiped.gait._section import HeelStrike as HeelStrike
-from jaxbiped.gait._section import MidStance as MidStance
-from jaxbiped.gait._section import Section as Section
+from jaxbiped.dynamics._section import AbstractSection as AbstractSection
+from jaxbiped.dynamics._section import HeelStrike as HeelStrike
+from jaxbiped.dynamics._section import MidStance as MidStance
+from jaxbiped.dynamics._section import Section as Section
 from jaxbiped.gait._stability import Bifurcation as Bifurcation
 from jaxbiped.gait._system import AbstractSystem as AbstractSystem
 from jaxbiped.gait._system import Walking as Walking

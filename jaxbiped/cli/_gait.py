@@ -14,11 +14,11 @@ from jaxbiped import _clock
 from jaxbiped._checks import check_choice
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
+from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._search import Search
-from jaxbiped.gait._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.gait._stability import Bifurcation
 
 _SECTIONS: dict[str, type[AbstractSection]] = {"mid-stance": MidStance, "heel-strike": HeelStrike}

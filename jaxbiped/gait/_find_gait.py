@@ -14,13 +14,13 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._types import as_float
+from jaxbiped.dynamics._section import AbstractSection, MidStance
 from jaxbiped.dynamics._state import State, checked_state
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gait import Gait, described
 from jaxbiped.gait._parameters import chosen_parameters
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._search import Found, Method, search
-from jaxbiped.gait._section import AbstractSection, MidStance
 from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.gait._system import Walking
 from jaxbiped.gait._turn import Turning

@@ -10,13 +10,13 @@ import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gradient import AbstractGradient, Implicit, Reverse
 from jaxbiped.gait._parameters import chosen_parameters
 from jaxbiped.gait._return_map import Return, return_map
-from jaxbiped.gait._section import AbstractSection
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._elimination import solution
 

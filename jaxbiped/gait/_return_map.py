@@ -13,10 +13,10 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice, check_positive
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._section import AbstractSection, MidStance
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gradient import AbstractGradient, Forward, check_anywhere
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
-from jaxbiped.gait._section import AbstractSection, MidStance
 from jaxbiped.gait._system import AbstractSystem, Walking
 from jaxbiped.gait._turn import PARAMETER_FLOOR, STATE_FLOOR, Turning
 from jaxbiped.lanes._adaptive_columns import Crossed

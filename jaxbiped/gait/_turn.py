@@ -9,7 +9,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._section import AbstractSection
+from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._system import AbstractSystem
 from jaxbiped.lanes._passage import passage_by_lanes
 from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns

@@ -1,5 +1,6 @@
 """The adaptive solve of a scene as a program for lanes: the same steps as through diffrax."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import diffrax
@@ -10,7 +11,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._motion import vector_field
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.lanes._end_of_solve import clipped
 from jaxbiped.lanes._program import Program
 from jaxbiped.scene._scene import Scene
@@ -22,6 +24,7 @@ from jaxbiped.solve._rosenbrock import AbstractRosenbrock, step_of
 from jaxbiped.solve._step_control import first_step, step_control
 
 _TERM: Any = diffrax.ODETerm(vector_field)
+_BISECTIONS = 50
 
 
 class Solve(NamedTuple):
@@ -48,13 +51,18 @@ class Solve(NamedTuple):
 
 
 class Solved(NamedTuple):
-    """One simulation's outputs: the last state and time, how it ended, and its steps."""
+    """One simulation's outputs: the last state and time, how it ended, and its steps.
+
+    `lowest` and `highest` are the extremes of what was asked for, None where nothing was.
+    """
 
     t: Any
     state: State
     ending: Any
     accepted: Any
     rejected: Any
+    lowest: PyTree = None
+    highest: PyTree = None
 
 
 class _Now(NamedTuple):
@@ -69,15 +77,36 @@ class _Now(NamedTuple):
     events: tuple[Scalar, ...]
     counted: Scalar
     last: "_Last | None"
+    extremes: tuple[PyTree, PyTree] | None
 
 
 class _Last(NamedTuple):
-    """The last attempt: whether it was accepted, when it began, and its dense output."""
+    """The last attempt: when it began, its dense output, and whether it is of note.
 
-    accepted: Scalar
+    It is where it was accepted, or where there is a section, where it ended past an arrival there.
+    `changed` is whether the legs' names are exchanged for the next arrival.
+    """
+
+    noted: Scalar
+    changed: Scalar
     t: Scalar
     state: State
     coefficients: tuple[State, ...]
+
+
+class Saved(NamedTuple):
+    """What a program saves of a simulation, besides its end. All hashable.
+
+    Attributes:
+        times: whether it records the state at the times of a schedule.
+        section: where it does; None: nowhere.
+        extremes: a function of (scene, state) whose extremes over the steps' ends are wanted, or
+            None.
+    """
+
+    times: bool = False
+    section: AbstractSection | None = None
+    extremes: Callable[[Scene, State], PyTree] | None = None
 
 
 class AdaptiveSolve:
@@ -87,23 +116,24 @@ class AdaptiveSolve:
         solver: its steps.
         watch: misfortunes that end it.
         counting: whether footsteps are counted.
-        dense: whether the last step's dense output is carried, for records.
+        saved: what is saved.
     """
 
     def __init__(
-        self, solver: AbstractRosenbrock, watch: tuple[str, ...], *, counting: bool, dense: bool
+        self, solver: AbstractRosenbrock, watch: tuple[str, ...], *, counting: bool, saved: Saved
     ) -> None:
-        self.solver, self.counting, self.dense = solver, counting, dense
+        self.solver, self.counting, self.saved = solver, counting, saved
+        self.dense = saved.times or saved.section is not None
         self.events = ending_events(watch)
 
     def program(self) -> Program:
-        """The program; where `dense`, it records the state at the times of a schedule."""
+        """The program."""
         return Program(
             self.start,
             self.attempt,
             self.finish,
             record=self.record if self.dense else None,
-            scheduled=self.dense,
+            scheduled=self.saved.times,
         )
 
     def start(self, solve: Solve) -> _Now:
@@ -123,9 +153,13 @@ class AdaptiveSolve:
         if self.dense:
             nothing = jtu.tree_map(jnp.zeros_like, solve.state)
             rows = len(self.solver.tableau.dense)
-            last = _Last(none, zero, nothing, tuple([nothing] * rows))
+            last = _Last(none, jnp.asarray(True), zero, nothing, tuple([nothing] * rows))
         events = tuple([none] * len(self.events))
-        return _Now(zero, next_t, solve.state, control, count, count, events, none, last)
+        extremes = None
+        if self.saved.extremes is not None:
+            values = _numbers(self.saved.extremes(solve.scene, solve.state))
+            extremes = (values, values)
+        return _Now(zero, next_t, solve.state, control, count, count, events, none, last, extremes)
 
     def attempt(self, solve: Solve, now: _Now) -> tuple[_Now, Scalar]:
         with fences_down():
@@ -154,7 +188,8 @@ class AdaptiveSolve:
             rejected=now.rejected + (1 - one),
             events=tuple(events),
             counted=counted,
-            last=_Last(keep, now.t, now.state, dense) if self.dense else None,
+            last=self._last(solve.scene, now, keep, state, dense) if self.dense else None,
+            extremes=self._extremes(solve.scene, now, keep, state),
         )
         attempts = (after.accepted + after.rejected).astype(solve.most_attempts.dtype)
         over = (t >= solve.duration) | (attempts >= solve.most_attempts) | ~none | counted
@@ -171,20 +206,61 @@ class AdaptiveSolve:
             done=done,
             out_of_steps=jnp.asarray(True),
         )
-        return Solved(now.t, now.state, code, now.accepted, now.rejected)
+        low, high = (None, None) if now.extremes is None else now.extremes
+        return Solved(now.t, now.state, code, now.accepted, now.rejected, low, high)
 
     def record(self, solve: Solve, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-        """The state at a time within the last step."""
-        assert now.last is not None
-        inside = now.last.accepted & (time <= now.t)
+        """The state at a time within the last step, or at its arrival at the section."""
+        last = now.last
+        assert last is not None
         dense = self.solver.interpolation_cls(
-            t0=now.last.t,
-            t1=now.t,
-            y0=now.last.state,
-            y1=now.state,
-            coefficients=now.last.coefficients,
+            t0=last.t, t1=now.t, y0=last.state, y1=now.state, coefficients=last.coefficients
         )
-        return inside, [time, *dense.evaluate(time)]
+        section = self.saved.section
+        if section is None:
+            return last.noted & (time <= now.t), [time, *dense.evaluate(time)]
+
+        def arrival() -> list[Scalar]:
+            # The names that the arrival went by: they have been exchanged since.
+            def value(state: State) -> Scalar:
+                return section.value(solve.scene, _named(~last.changed, state))
+
+            def halve(_: Any, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+                middle = 0.5 * (ends[0] + ends[1])
+                before = value(dense.evaluate(middle)) < 0.0
+                return jnp.where(before, middle, ends[0]), jnp.where(before, ends[1], middle)
+
+            time = jax.lax.fori_loop(0, _BISECTIONS, halve, (last.t, now.t))[1]
+            return [time, *dense.evaluate(time)]
+
+        nothing = [jnp.zeros_like(now.t)] * (1 + len(now.state))
+        return last.noted, jax.lax.cond(last.noted, arrival, lambda: nothing)
+
+    def _last(
+        self, scene: Scene, now: _Now, keep: Scalar, state: State, dense: tuple[State, ...]
+    ) -> _Last:
+        assert now.last is not None
+        section, changed, noted = self.saved.section, now.last.changed, keep
+        if section is not None:
+            before, after = (_named(changed, y) for y in (now.state, state))
+            rises = (section.value(scene, before) < 0.0) & (section.value(scene, after) >= 0.0)
+            # The first step of a solve never counts, so it may start on its section.
+            noted = keep & (now.accepted > 0) & rises & section.counts(scene, after)
+            changed = changed ^ noted
+        return _Last(noted, changed, now.t, now.state, dense)
+
+    def _extremes(
+        self, scene: Scene, now: _Now, keep: Scalar, state: State
+    ) -> tuple[PyTree, PyTree] | None:
+        if now.extremes is None or self.saved.extremes is None:
+            return None
+        values = _numbers(self.saved.extremes(scene, state))
+
+        def chosen(combine: Any, old: PyTree) -> PyTree:
+            return jtu.tree_map(lambda a, b: jnp.where(keep, combine(a, b), a), old, values)
+
+        low, high = now.extremes
+        return chosen(jnp.minimum, low), chosen(jnp.maximum, high)
 
     def _controller(self, solve: Solve) -> Any:
         control: Any = step_control(solve.rtol, solve.atol, rms_norm)
@@ -195,6 +271,15 @@ class AdaptiveSolve:
 
     def _error_order(self) -> Any:
         return self.solver.error_order(_TERM)
+
+
+def _named(changed: Scalar, state: State) -> State:
+    """The state with its legs' names exchanged, where they are."""
+    return jtu.tree_map(lambda a, b: jnp.where(changed, a, b), exchange_legs(state), state)
+
+
+def _numbers(values: PyTree) -> PyTree:
+    return jtu.tree_map(lambda x: jnp.asarray(x, dtype=jnp.float64), values)
 
 
 def shapes_of(scene: PyTree) -> Solve:

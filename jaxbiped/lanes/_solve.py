@@ -14,7 +14,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._motion import vector_field
 from jaxbiped.dynamics._state import State
 from jaxbiped.dynamics._switches import switches
-from jaxbiped.lanes._adaptive import AdaptiveSolve, Solve, Solved, shapes_of
+from jaxbiped.lanes._adaptive import AdaptiveSolve, Saved, Solve, Solved, shapes_of
 from jaxbiped.lanes._adaptive_columns import Crossed
 from jaxbiped.lanes._call import Schedule, call
 from jaxbiped.lanes._crossing import cross
@@ -37,7 +37,7 @@ class Setting(NamedTuple):
     """What a program is made for, besides a scene's structure; see `AdaptiveSolve`.
 
     Attributes:
-        solver, watch, counting: see there.
+        solver, watch, counting, saved: see there.
         quick: see `call`.
     """
 
@@ -45,6 +45,7 @@ class Setting(NamedTuple):
     watch: tuple[str, ...]
     counting: bool
     quick: bool
+    saved: Saved = Saved()
 
 
 def solved(solve: Solve, setting: Setting) -> Solved:
@@ -60,26 +61,30 @@ def solved(solve: Solve, setting: Setting) -> Solved:
     """
     leaves, structure = jtu.tree_flatten(solve)
     if not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
-        compiled = compiled_solve(setting, jtu.tree_structure(solve.scene), dense=False)
+        compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
         return call(compiled, solve, quick=setting.quick)[0]
     return Solved(*_unflat(_differentiable(setting, structure)(*leaves)))
 
 
-def solved_at(solve: Solve, setting: Setting, times: np.ndarray) -> tuple[Solved, Recorded]:
-    """The same with records of the time and the state's eight components at each of `times`.
+def solved_and_saved(
+    solve: Solve, setting: Setting, *, times: np.ndarray | None = None, room: int = 0
+) -> tuple[Solved, Recorded | None]:
+    """The same with what the setting saves: records of the time and the state's eight components.
 
-    It has no derivatives.
+    They are made at each of `times`, or for the first `room` arrivals at a section. It has no
+    derivatives.
     """
-    compiled = compiled_solve(setting, jtu.tree_structure(solve.scene), dense=True)
-    found, recorded = call(compiled, solve, Schedule(times), quick=setting.quick)
-    assert recorded is not None
-    return found, recorded
+    compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
+    schedule = None if times is None else Schedule(times)
+    return call(compiled, solve, schedule, room=room, quick=setting.quick)
 
 
 @functools.lru_cache(maxsize=256)
-def compiled_solve(setting: Setting, scene: Any, *, dense: bool) -> CompiledProgram:
+def compiled_solve(setting: Setting, scene: Any) -> CompiledProgram:
     """The program for scenes of one structure (see `jax.tree.structure`)."""
-    body = AdaptiveSolve(setting.solver, setting.watch, counting=setting.counting, dense=dense)
+    body = AdaptiveSolve(
+        setting.solver, setting.watch, counting=setting.counting, saved=setting.saved
+    )
     placeholder = jtu.tree_unflatten(scene, [0.0] * scene.num_leaves)
     return CompiledProgram(body.program(), shapes_of(placeholder))
 
@@ -89,7 +94,7 @@ def _differentiable(setting: Setting, structure: Any) -> Callable[..., list[Scal
     @jax.custom_jvp
     def run(*leaves: Scalar) -> list[Scalar]:
         solve = jtu.tree_unflatten(structure, leaves)
-        compiled = compiled_solve(setting, jtu.tree_structure(solve.scene), dense=False)
+        compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
         found, _ = call(compiled, solve, quick=setting.quick)
         return jtu.tree_leaves(found)
 

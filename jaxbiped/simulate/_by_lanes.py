@@ -10,9 +10,9 @@ import numpy as np
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._state import State
-from jaxbiped.lanes._adaptive import Solve
+from jaxbiped.lanes._adaptive import Saved, Solve
 from jaxbiped.lanes._end_of_solve import almost
-from jaxbiped.lanes._solve import Setting, compiled_solve, solved, solved_at
+from jaxbiped.lanes._solve import Setting, compiled_solve, solved, solved_and_saved
 from jaxbiped.solve._footstep_limit import PATIENCE
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.solve._trajectory import Trajectory
@@ -27,12 +27,18 @@ _QUICK = 100_000
 
 def by_lanes(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`."""
-    if run.times is None:
-        ended = solved(_solve(run), _setting(run))
+    if run.times is None and run.section is None:
+        if run.extremes is None:
+            ended, recorded = solved(_solve(run), _setting(run)), None
+        else:
+            ended, recorded = solved_and_saved(_solve(run), _setting(run))
         t = jnp.reshape(ended.t, (1,))
         state = jtu.tree_map(lambda leaf: jnp.reshape(leaf, (1,)), ended.state)
     else:
-        ended, recorded = solved_at(_solve(run), _setting(run), np.asarray(run.times))
+        times = None if run.times is None else np.asarray(run.times)
+        room = 0 if run.section is None else run.most_arrivals
+        ended, recorded = solved_and_saved(_solve(run), _setting(run), times=times, room=room)
+        assert recorded is not None
         # As diffrax has it: infinite where the solve ended before.
         reached = jnp.arange(recorded.values.shape[0]) < recorded.counts
         values = jnp.where(reached[:, None], recorded.values, jnp.inf)
@@ -44,6 +50,9 @@ def by_lanes(run: "Simulation") -> Trajectory:
         accepted=ended.accepted,
         rejected=ended.rejected,
         dense=None,
+        arrivals=None if run.section is None or recorded is None else jnp.asarray(recorded.counts),
+        lowest=ended.lowest,
+        highest=ended.highest,
         engine="lanes",
     )
 
@@ -53,9 +62,8 @@ def prepared_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
 
     Where only the end is asked for, what JAX does around it is compiled as well.
     """
-    structure = jtu.tree_structure(run.scene)
-    compiled_solve(_setting(run), structure, dense=run.times is not None).code(1)
-    return _compiled if run.times is None else by_lanes
+    compiled_solve(_setting(run), jtu.tree_structure(run.scene)).code(1)
+    return _compiled if run.times is None and run.section is None else by_lanes
 
 
 _compiled = eqx.filter_jit(by_lanes)
@@ -64,7 +72,8 @@ _compiled = eqx.filter_jit(by_lanes)
 def _setting(run: "Simulation") -> Setting:
     assert isinstance(run.solver, AbstractRosenbrock)
     quick = run.max_solver_steps <= _QUICK
-    return Setting(run.solver, run.watch, run.steps is not None, quick)
+    saved = Saved(run.times is not None, run.section, run.extremes)
+    return Setting(run.solver, run.watch, run.steps is not None, quick, saved)
 
 
 def _solve(run: "Simulation") -> Solve:

@@ -1,5 +1,6 @@
 """Simulating a scene from a start."""
 
+from collections.abc import Callable
 from typing import Any, Literal
 
 import diffrax
@@ -7,16 +8,17 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._motion import vector_field
+from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State, checked_state
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._by_lanes import by_lanes, prepared_lanes
 from jaxbiped.simulate._engine import chosen_engine
+from jaxbiped.simulate._saved_times import check_times
 from jaxbiped.solve._accuracy import check_precision, rms_norm, tolerances
 from jaxbiped.solve._ending import WATCHES, Ending, ending_code, ending_events
 from jaxbiped.solve._footstep_limit import PATIENCE, FootstepLimit
@@ -35,7 +37,9 @@ def simulate(
     accuracy: str = "balanced",
     rtol: float | None = None,
     atol: float | None = None,
-    save: Literal["steps", "end"] | Array = "steps",
+    save: Literal["steps", "end"] | Array | AbstractSection = "steps",
+    most_arrivals: int = 64,
+    extremes: Callable[[Scene, State], PyTree] | None = None,
     watch: tuple[str, ...] = WATCHES,
     max_solver_steps: int = 65536,
     adjoint: diffrax.AbstractAdjoint | None = None,
@@ -57,8 +61,13 @@ def simulate(
         accuracy: "fast", "balanced" or "tight" (see `ACCURACIES`).
         rtol: relative tolerance, in place of the accuracy's.
         atol: absolute tolerance (SI), in place of a hundredth of the relative one.
-        save: "steps" for every step and the continuous solution, "end" for the final state, or
-            an array of increasing times [s], shape (n,), at which to save.
+        save: "steps" for every step and the continuous solution, "end" for the final state, an
+            array of increasing times [s], shape (n,), at which to save, or a section (by lanes
+            only), at whose arrivals to save: `HeelStrike()` saves the footsteps. The legs take
+            turns there as in `return_map`, but the states saved keep their own names.
+        most_arrivals: how many arrivals at a section there is room for.
+        extremes: a function of (scene, state) whose least and largest values, number by number,
+            over the ends of all steps are wanted (by lanes only).
         watch: which misfortunes end the solve: any of "fall", "stop", "stumble".
         max_solver_steps: cap on the solver's attempted steps.
         adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
@@ -82,6 +91,8 @@ def simulate(
         rtol=rtol,
         atol=atol,
         save=save,
+        most_arrivals=most_arrivals,
+        extremes=extremes,
         watch=watch,
         max_solver_steps=max_solver_steps,
         adjoint=adjoint,
@@ -106,6 +117,9 @@ class Simulation(eqx.Module):
     watch: tuple[str, ...] = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)
+    section: AbstractSection | None = eqx.field(static=True)
+    most_arrivals: int = eqx.field(static=True)
+    extremes: Callable[[Scene, State], PyTree] | None = eqx.field(static=True)
 
     @staticmethod
     def prepare(
@@ -119,6 +133,8 @@ class Simulation(eqx.Module):
         rtol: float | None = None,
         atol: float | None = None,
         save: Any = "steps",
+        most_arrivals: int = 64,
+        extremes: Callable[[Scene, State], PyTree] | None = None,
         watch: tuple[str, ...] = WATCHES,
         max_solver_steps: int = 65536,
         adjoint: diffrax.AbstractAdjoint | None = None,
@@ -139,8 +155,11 @@ class Simulation(eqx.Module):
             check_choice("watch", name, WATCHES)
         if isinstance(save, str):
             check_choice("save", save, ("steps", "end"))
-        if not isinstance(save, str):
-            _check_times(save, time)
+        check_positive("most_arrivals", most_arrivals)
+        section = save if isinstance(save, AbstractSection) else None
+        timed = section is None and not isinstance(save, str)
+        if timed:
+            check_times(save, time)
         relative, absolute = tolerances(accuracy, rtol, atol)
         dtype = jnp.result_type(state.hip_z)
         check_precision(scene, dtype)
@@ -157,12 +176,14 @@ class Simulation(eqx.Module):
             adjoint=adjoint,
             leaves=(scene, state, time),
             times=save,
+            section=section,
+            extremes=extremes,
         )
         return Simulation(
             scene=jtu.tree_map(cast, scene),
             state=state,
             duration=cast(time),
-            times=None if isinstance(save, str) else cast(save),
+            times=cast(save) if timed else None,
             rtol=cast(relative),
             atol=cast(absolute),
             solver=method,
@@ -172,6 +193,9 @@ class Simulation(eqx.Module):
             watch=tuple(watch),
             max_solver_steps=int(max_solver_steps),
             engine=chosen,
+            section=section,
+            most_arrivals=int(most_arrivals),
+            extremes=extremes,
         )
 
     def __call__(self) -> Trajectory:
@@ -184,17 +208,6 @@ class Simulation(eqx.Module):
             return CompiledSimulation(prepared_lanes(self), self)
         program = _solve.lower(self).compile()  # type: ignore[attr-defined]
         return CompiledSimulation(program, self)
-
-
-def _check_times(times: Any, duration: Any) -> None:
-    if isinstance(times, jax.core.Tracer) or isinstance(duration, jax.core.Tracer):
-        return
-    values = np.asarray(times, dtype=float)
-    allowed = values.ndim == 1 and np.all(np.diff(values) >= 0.0)
-    if not allowed or not np.all((values >= 0.0) & (values <= float(duration))):
-        raise ArgumentError(
-            f"save = {values} is not allowed: it must be increasing times from 0 to {duration} s."
-        )
 
 
 class CompiledSimulation:

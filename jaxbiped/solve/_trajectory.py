@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float, Int, PyTree
 
 from jaxbiped.dynamics._state import State
 from jaxbiped.solve._ending import Ending
@@ -22,6 +22,9 @@ class Trajectory(eqx.Module):
         ending: code of an `Ending`; `Ending(int(code))` names it.
         accepted, rejected: numbers of the solver's steps.
         dense: the continuous solution, where all steps were saved.
+        arrivals: how many arrivals at a section there were, where these were saved; those beyond
+            the room for them are lost. The times of missing ones are infinite.
+        lowest, highest: extremes over the ends of the steps, where they were asked for.
         engine: what computed it, "xla" or "lanes".
     """
 
@@ -31,6 +34,9 @@ class Trajectory(eqx.Module):
     accepted: Int[Array, "..."]
     rejected: Int[Array, "..."]
     dense: diffrax.DenseInterpolation | None
+    arrivals: Int[Array, "..."] | None = None
+    lowest: PyTree = None
+    highest: PyTree = None
     engine: str = eqx.field(static=True, default="xla")
 
     @property

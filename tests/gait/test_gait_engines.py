@@ -1,5 +1,7 @@
 """The same gait from both engines."""
 
+import functools
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,10 +12,7 @@ import jaxbiped as jb
 
 @pytest.fixture(scope="module")
 def gaits():
-    return {
-        engine: jb.find_gait(jb.seed_scene(), engine=engine, radius_sensitivities=False)
-        for engine in ("lanes", "xla")
-    }
+    return {engine: jb.find_gait(jb.seed_scene(), engine=engine) for engine in ("lanes", "xla")}
 
 
 def test_both_find_the_same_gait_and_the_same_derivatives(gaits):
@@ -28,6 +27,18 @@ def test_both_find_the_same_gait_and_the_same_derivatives(gaits):
     for name in ("period", "step_length", "speed", "peak_normal"):
         a, b = (np.array(getattr(gait.elasticities, name)) for gait in (ours, theirs))
         np.testing.assert_allclose(a, b, rtol=5e-4, atol=1e-8)
+    a, b = (np.array(gait.elasticities.spectral_radius) for gait in (ours, theirs))
+    np.testing.assert_allclose(a, b, rtol=5e-4, atol=1e-7)
+
+
+def test_the_radius_of_a_cycle_of_two_is_that_of_one_squared():
+    once, twice = (
+        jb.find_gait(jb.seed_scene(), period=k, parameters=("K", "slope"), engine="lanes")
+        for k in (1, 2)
+    )
+    np.testing.assert_allclose(
+        twice.elasticities.spectral_radius, 2.0 * once.elasticities.spectral_radius, rtol=2e-3
+    )
 
 
 def test_tight_is_tighter():
@@ -50,6 +61,37 @@ def test_many_scenes_at_once_give_what_each_gives_alone(gaits):
     np.testing.assert_allclose(together[0][1], alone.measures.period, rtol=1e-6)
     np.testing.assert_allclose(together[1][1], alone.elasticities.period, rtol=5e-4, atol=1e-8)
     assert np.all(np.diff(together[0]) > 0.0)
+
+
+def test_a_return_map_and_its_derivatives_by_both():
+    def arrival(engine, K, theta):
+        state = jb.seed_state()._replace(theta_1=theta)
+        found = jb.return_map(jb.seed_scene(K=K), state, engine=engine)
+        return jnp.stack([*found.state, found.time])
+
+    where, along = (1e6, jb.seed_state().theta_1), (1e4, 0.1)
+    ours, theirs = (
+        jax.jit(lambda *z, e=engine: jax.jvp(functools.partial(arrival, e), z, along))(*where)
+        for engine in ("lanes", "xla")
+    )
+    np.testing.assert_allclose(ours[0], theirs[0], atol=1e-7)
+    np.testing.assert_allclose(ours[1], theirs[1], rtol=5e-4, atol=1e-6)
+    with pytest.raises(RuntimeError, match="no reverse mode"):
+        jax.jacrev(functools.partial(arrival, "lanes"))(*where)
+
+
+def test_a_large_batch_of_gaits_ends():
+    """Batched calls of LAPACK once waited for each other for ever."""
+
+    def radius(slope):
+        gait = jb.find_gait(
+            jb.seed_scene(slope=slope), parameters=("K",), radius_sensitivities=False
+        )
+        return gait.measures.spectral_radius, gait.ending
+
+    radii, endings = jax.jit(jax.vmap(radius))(jnp.linspace(0.0195, 0.0205, 256))
+    assert np.all(np.asarray(endings) == int(jb.Search.FOUND))
+    assert np.all(np.abs(np.diff(radii)) < 1e-3)
 
 
 def test_lanes_are_refused_what_they_cannot_do():

@@ -50,6 +50,13 @@ def _arrays(x):
     return jnp.concatenate([both.ravel(), matrix[:, ::-1].T.reshape(-1)[1:4]])
 
 
+def _padded(x):
+    row = jnp.stack([x, x + 1.0, 2.0 * x])
+    inner = jax.lax.pad(row, 0.5, [(1, 2, 1)])
+    first, *rest = jnp.unstack(jax.lax.pad(row, 0.0, [(-1, 1, 0)]))
+    return jnp.concatenate([inner, jnp.stack([first * 3.0, *rest])])
+
+
 def _whole(x):
     number = jnp.round(jnp.clip(x, -1e6, 1e6)).astype(jnp.int32)
     return jnp.where((number & 1) != 0, number + 3, number * 2).astype(jnp.float64)
@@ -74,6 +81,7 @@ CASES = {
     "nested": _nested,
     "mapped": _mapped,
     "arrays": _arrays,
+    "padded": _padded,
     "whole numbers": _whole,
     "unrolled": _unrolled,
 }

@@ -30,7 +30,7 @@ WATCH = ("fall", "stop", "stumble")
 
 def _program():
     setting = Setting(jb.Rodas4(), WATCH, counting=False, quick=True)
-    return compiled_solve(setting, jtu.tree_structure(SCENE), dense=False)
+    return compiled_solve(setting, jtu.tree_structure(SCENE))
 
 
 def _inputs(starts, duration=0.3, most=20000.0, scene=SCENE):

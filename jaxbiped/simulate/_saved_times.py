@@ -1,0 +1,20 @@
+"""The times at which a simulation saves."""
+
+from typing import Any
+
+import jax
+import numpy as np
+
+from jaxbiped._checks import ArgumentError
+
+
+def check_times(times: Any, duration: Any) -> None:
+    """Raises `ArgumentError` unless they increase and lie within the duration [s]."""
+    if isinstance(times, jax.core.Tracer) or isinstance(duration, jax.core.Tracer):
+        return
+    values = np.asarray(times, dtype=float)
+    allowed = values.ndim == 1 and np.all(np.diff(values) >= 0.0)
+    if not allowed or not np.all((values >= 0.0) & (values <= float(duration))):
+        raise ArgumentError(
+            f"save = {values} is not allowed: it must be increasing times from 0 to {duration} s."
+        )

@@ -1,0 +1,105 @@
+"""Saving arrivals at sections, and extremes, by lanes."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+
+DURATION = 2.0
+
+
+def _walk(**options):
+    options = {"duration": DURATION, "accuracy": "tight", **options}
+    return jb.simulate(jb.seed_scene(), jb.seed_state(), **options)
+
+
+def _heights(scene, state):
+    return {"hip": state.hip_z, "speeds": (state.hip_vx, state.omega_1)}
+
+
+def test_heel_strikes_are_the_walks_footsteps(seed_walk):
+    scene, whole = seed_walk
+    expected = jb.heel_strikes(scene, whole).time_s
+    walk = _walk(save=jb.HeelStrike(), most_arrivals=6)
+    count = int(walk.arrivals)
+    assert (walk.engine, count) == ("lanes", len(expected))
+    np.testing.assert_allclose(walk.t[:count], expected, atol=1e-7)
+    assert np.all(np.isinf(walk.t[count:]))
+    at = whole.at(walk.t[:count])
+    for ours, theirs in zip(walk.state, at, strict=True):
+        np.testing.assert_allclose(ours[:count], theirs, atol=2e-5)
+
+
+def test_arrivals_without_room_are_counted():
+    walk = _walk(save=jb.HeelStrike(), most_arrivals=2)
+    assert walk.t.shape == (2,)
+    assert int(walk.arrivals) == 4
+
+
+def test_mid_stances_are_the_return_maps():
+    walk = _walk(save=jb.MidStance())
+    once = jb.return_map(jb.seed_scene(), jb.seed_state(), accuracy="tight")
+    twice = jb.return_map(jb.seed_scene(), jb.seed_state(), steps=2, accuracy="tight")
+    np.testing.assert_allclose(walk.t[:2], [once.time, twice.time], atol=1e-7)
+    # The first one names its legs the other way round, the second one as the start.
+    np.testing.assert_allclose(walk.state.theta_2[0], once.state.theta_1, atol=1e-7)
+    np.testing.assert_allclose(walk.state.theta_1[1], twice.state.theta_1, atol=1e-7)
+
+
+def test_any_function_is_a_section():
+    def falls(scene, state):
+        return -state.hip_vz
+
+    def anywhere(scene, state):
+        return jnp.asarray(True)
+
+    walk = _walk(save=jb.Section(falls, anywhere), duration=0.5)
+    count = int(walk.arrivals)
+    assert count >= 1
+    np.testing.assert_allclose(walk.state.hip_vz[:count], 0.0, atol=1e-10)
+
+
+def test_extremes_are_those_of_the_steps(seed_walk):
+    _, whole = seed_walk
+    walk = _walk(save="end", extremes=_heights)
+    for found, reduce in ((walk.lowest, np.min), (walk.highest, np.max)):
+        assert found["hip"] == pytest.approx(float(reduce(whole.state.hip_z)), abs=1e-6)
+        assert found["speeds"][0] == pytest.approx(float(reduce(whole.state.hip_vx)), abs=1e-4)
+
+
+def test_many_give_what_each_gives_alone():
+    speeds = jnp.array([0.1, 0.35, 0.38, 0.4, 0.9])
+
+    def one(speed):
+        state = jb.seed_state()._replace(hip_vx=speed)
+        walk = jb.simulate(
+            jb.seed_scene(),
+            state,
+            duration=1.0,
+            save=jb.HeelStrike(),
+            most_arrivals=4,
+            extremes=_heights,
+        )
+        return walk.t, walk.state, walk.arrivals, walk.lowest, walk.highest, walk.ending
+
+    together = jax.jit(jax.vmap(one))(speeds)
+    for k, speed in enumerate(speeds):
+        for a, b in zip(jax.tree.leaves(together), jax.tree.leaves(one(speed)), strict=True):
+            np.testing.assert_array_equal(a[k], b)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        (dict(save=jb.HeelStrike(), engine="xla"), "only lanes do that"),
+        (dict(extremes=_heights), "does not save every step"),
+        (dict(save="end", extremes=_heights, solver="kvaerno3"), "Kvaerno3 is not one"),
+        (dict(save=jb.MidStance(), most_arrivals=0), "most_arrivals = 0 is not allowed"),
+        (dict(save=jb.MidStance(), engine="fast"), "choose one of auto, xla, lanes"),
+    ],
+)
+def test_what_is_not_allowed_is_said(options, sentence):
+    with pytest.raises(jb.ArgumentError, match=sentence):
+        _walk(**options)
