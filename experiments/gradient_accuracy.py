@@ -44,36 +44,56 @@ ERRORS = {
 }
 
 
-class Stepped(jb.AbstractSystem):
-    """The walker, its switches hidden from the solver or not.
+class Stepping(NamedTuple):
+    """A scene and how to step.
 
     Attributes:
-        lands: whether steps end just past every switch; traced.
+        scene: the walker.
+        lands: 1.0 where steps end just past every switch, 0.0 where they do not.
     """
 
-    drifting = jb.Walking.drifting
+    scene: jb.Scene
     lands: Any
 
-    def vector_field(self, t: Any, y: jb.State, args: jb.Scene) -> jb.State:
+
+class Stepped(jb.AbstractSystem):
+    """The walker, its switches hidden from the solver or not."""
+
+    drifting = jb.Walking.drifting
+
+    def vector_field(self, t: Any, y: jb.State, args: Stepping) -> jb.State:
         """The walker's."""
-        return jb.vector_field(t, y, args)
+        return jb.vector_field(t, y, args.scene)
 
-    def switches(self, args: jb.Scene, y: jb.State) -> tuple[jb.Switch, ...]:
-        """The walker's, or none that is live."""
-        found = jb.switches(args, y)
-        return tuple(each._replace(live=each.live & self.lands) for each in found)
+    def switches(self, args: Stepping, y: jb.State) -> tuple[jb.Switch, ...]:
+        """The walker's; where steps do not land, none is live."""
+        lands = args.lands > 0.0
+        found = jb.switches(args.scene, y)
+        return tuple(each._replace(live=each.live & lands) for each in found)
 
-    def ending(self, args: jb.Scene, y: jb.State) -> Any:
+    def ending(self, args: Stepping, y: jb.State) -> Any:
         """The walker's."""
-        return jb.Walking().ending(args, y)
+        return jb.Walking().ending(args.scene, y)
 
-    def renew(self, args: jb.Scene, y: jb.State) -> jb.State:
+    def renew(self, args: Stepping, y: jb.State) -> jb.State:
         """Legs exchanged."""
         return jb.exchange_legs(y)
 
-    def load(self, args: jb.Scene, y: jb.State) -> None:
+    def load(self, args: Stepping, y: jb.State) -> None:
         """No largest load: no step is spent on it."""
         return None
+
+
+class Stance(jb.AbstractSection):
+    """Mid-stance."""
+
+    def value(self, args: Stepping, y: jb.State) -> Any:
+        """That of the scene."""
+        return jb.MidStance().value(args.scene, y)
+
+    def counts(self, args: Stepping, y: jb.State) -> Any:
+        """Whether leg 2 stands."""
+        return jb.MidStance().counts(args.scene, y)
 
 
 class Point(NamedTuple):
@@ -111,19 +131,19 @@ def laws(quick: bool) -> dict[str, jb.Scene]:
 def footstep(scene: jb.Scene, start: jb.State, lands: bool, precision: Precision) -> Turn:
     """One footstep from mid-stance, with derivatives by the state and by log K.
 
-    Whether it lands and the tolerances are traced: all of them share one compiled program.
+    Landing and tolerances are traced: all of them share one compiled program.
     """
     turning = Turning(
-        system=Stepped(jnp.asarray(lands)),
-        section=jb.MidStance(),
+        system=Stepped(),
+        section=Stance(),
         solver=jb.Rodas4(),
         time_limit=jnp.asarray(10.0),
         steps=1,
         max_solver_steps=MOST_STEPS,
         engine="xla",
     )
-    _, active = chosen_parameters(scene, ("K",))
-    seeds, _ = seeded(scene, active, len(start) - 1)
+    _, active = chosen_parameters(scene, ("K",))  # whose places are the same in a Stepping
+    seeds, _ = seeded(Stepping(scene, jnp.asarray(float(lands))), active, len(start) - 1)
     traced = Precision(*map(jnp.asarray, precision))
     return turn(turning, seeds, start, traced, jnp.asarray(False))
 

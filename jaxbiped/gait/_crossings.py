@@ -80,8 +80,7 @@ def crossing_of(
         chosen.append(change & (was | is_) & ~found)
         found = found | chosen[-1]
 
-    def picked(each: Sequence[Scalar], otherwise: float) -> Scalar:
-        value = jnp.asarray(otherwise)
+    def picked(each: Sequence[Scalar], value: Any) -> Scalar:
         for here, candidate in zip(chosen, each, strict=True):
             value = jnp.where(here, candidate, value)
         return value
@@ -92,7 +91,7 @@ def crossing_of(
     past = first + picked(values(back(first)), 0.0) / slope
     z = back(past)
     rows = jax.jacrev(lambda z: jnp.stack([jnp.zeros(()), *values(z)]))(z)
-    gradient = picked(list(rows[1:]), 0.0)
+    gradient = picked(list(rows[1:]), jnp.zeros_like(z))
     early = jnp.where(found, gradient / jnp.where(found, gradient @ rate(z), 1.0), 0.0)
     return Crossings(found, past, z[: after.shape[0]], early)
 
