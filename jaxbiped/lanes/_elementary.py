@@ -104,7 +104,7 @@ class Arithmetic:
         return self.block.add(f"libm {name}", *args, kind=Kind.F64)
 
 
-_LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
+LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 """Two parts of ln 2: the first has 33 bits, so that its product with an exponent is exact."""
 _EXP_SERIES = (
     2.510038319586702e-08,
@@ -131,7 +131,7 @@ _LOG_SERIES = (
 """Minimax coefficients of log((1 + s)/(1 − s)) (FreeBSD's msun, e_log.c), highest power first."""
 _SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
 _ONE_BITS = 0x3FF0000000000000
-_TINIEST_NORMAL = 2.2250738585072014e-308
+TINIEST_NORMAL = 2.2250738585072014e-308
 
 
 def exponential(m: Arithmetic, x: Value, low: Value | float = 0.0) -> Value:
@@ -140,13 +140,13 @@ def exponential(m: Arithmetic, x: Value, low: Value | float = 0.0) -> Value:
     clamped = m.choose(m.compare("olt", clamped, -800.0), -800.0, clamped)
     n = m.rint(m.mul(clamped, 1.0 / math.log(2.0)))
     minus = m.neg(n)
-    r = m.fma(minus, _LN2_LOW, m.fma(minus, _LN2_HIGH, clamped))
+    r = m.fma(minus, LN2_LOW, m.fma(minus, LN2_HIGH, clamped))
     r = m.add(r, low)
     value = m.add(m.fma(m.mul(r, r), m.series(r, _EXP_SERIES), r), 1.0)
     return m.scaled(value, n)
 
 
-def _parts(m: Arithmetic, x: Value) -> tuple[Value, Value]:
+def parts(m: Arithmetic, x: Value) -> tuple[Value, Value]:
     """k and f with x = 2^k (1 + f), 1 + f in [√½, √2); for x above zero, normal and finite."""
     moved = m.integer("add", m.bits(x), _ONE_BITS - _SQRT_HALF_BITS)
     exponent = m.integer("sub", m.integer("lshr", moved, 52), 1023)
@@ -156,14 +156,14 @@ def _parts(m: Arithmetic, x: Value) -> tuple[Value, Value]:
 
 def logarithm(m: Arithmetic, x: Value) -> Value:
     """The natural logarithm (FreeBSD's msun, e_log.c)."""
-    k, f = _parts(m, x)
+    k, f = parts(m, x)
     s = m.div(f, m.add(f, 2.0))
     z = m.mul(s, s)
     series = m.mul(z, m.series(z, _LOG_SERIES))
     half = m.mul(m.mul(f, f), 0.5)
-    inner = m.fma(s, m.add(half, series), m.mul(k, _LN2_LOW))
-    value = m.sub(m.mul(k, _LN2_HIGH), m.sub(m.sub(half, inner), f))
-    normal = m.both(m.compare("oge", x, _TINIEST_NORMAL), m.compare("olt", x, math.inf))
+    inner = m.fma(s, m.add(half, series), m.mul(k, LN2_LOW))
+    value = m.sub(m.mul(k, LN2_HIGH), m.sub(m.sub(half, inner), f))
+    normal = m.both(m.compare("oge", x, TINIEST_NORMAL), m.compare("olt", x, math.inf))
     rare = m.block.add("not", normal)
     return m.where_rare(rare, value, lambda inside: inside.per_lane("log", x, rare))
 
@@ -247,52 +247,3 @@ def hyperbolic_tangent(m: Arithmetic, x: Value) -> Value:
 def _near_zero(m: Arithmetic, x: Value, value: Value) -> Value:
     """`value`, but where it is x itself to the last place x: the sign of zero stays."""
     return m.choose(m.compare("olt", m.abs(x), 2.0**-27), x, value)
-
-
-def power(m: Arithmetic, x: Value, y: Value) -> Value:
-    """x ** y; what is not above zero, normal and finite by the C library."""
-    high, low = _precise_logarithm(m, x)
-    product = m.mul(y, high)
-    rest = m.fma(y, low, m.fma(y, high, m.neg(product)))
-    value = exponential(m, product, rest)
-    normal = m.both(m.compare("oge", x, _TINIEST_NORMAL), m.compare("olt", x, math.inf))
-    bounded = m.compare("olt", m.abs(product), 1e4)
-    rare = m.block.add("not", m.both(normal, bounded))
-    return m.where_rare(rare, value, lambda inside: inside.per_lane("pow", x, y, rare))
-
-
-_TWO_THIRDS = (0.6666666666666666, 3.700743415417188e-17)
-
-
-def _precise_logarithm(m: Arithmetic, x: Value) -> tuple[Value, Value]:
-    """log x in two parts, to about 2⁻⁶⁴ of itself, for x above zero and finite."""
-    k, f = _parts(m, x)
-    total = m.add(f, 2.0)
-    lost = m.sub(f, m.sub(total, 2.0))
-    s = m.div(f, total)
-    s_low = m.div(m.fma(m.neg(s), lost, m.fma(m.neg(s), total, f)), total)
-    z = m.mul(s, s)
-    z_low = m.fma(m.add(s, s), s_low, m.fma(s, s, m.neg(z)))
-    cube = m.mul(s, z)
-    cube_low = m.fma(s, z_low, m.fma(s_low, z, m.fma(s, z, m.neg(cube))))
-    third = m.mul(cube, _TWO_THIRDS[0])
-    third_low = m.fma(cube, _TWO_THIRDS[0], m.neg(third))
-    third_low = m.fma(cube_low, _TWO_THIRDS[0], m.fma(cube, _TWO_THIRDS[1], third_low))
-    tail = m.mul(m.mul(cube, z), m.series(z, _ATANH_TAIL))
-    high, low = m.add(s, s), m.add(s_low, s_low)
-    high, low = _sum(m, high, m.add(low, m.add(third_low, tail)), third)
-    shifted, shifted_low = _sum(m, m.mul(k, _LN2_HIGH), low, high)
-    return _sum(m, shifted, m.fma(k, _LN2_LOW, shifted_low), m.real(0.0))
-
-
-_ATANH_TAIL = tuple(2.0 / k for k in range(23, 4, -2))
-
-
-def _sum(m: Arithmetic, a: Value, low: Value, b: Value) -> tuple[Value, Value]:
-    """a + b + low in two parts, the second below the first's last place."""
-    total = m.add(a, b)
-    part = m.sub(total, a)
-    rest = m.add(m.sub(a, m.sub(total, part)), m.sub(b, part))
-    rest = m.add(rest, low)
-    high = m.add(total, rest)
-    return high, m.add(m.sub(total, high), rest)

@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from jaxbiped.lanes import _elementary as elementary
+from jaxbiped.lanes import _powers as powers
 from jaxbiped.lanes._graph import Block, Kind, Value
 
 Array: TypeAlias = np.ndarray
@@ -198,6 +199,22 @@ def _elementary(function: Callable[..., Value]) -> Rule:
     return rule
 
 
+def _logarithm(block: Block, a: Value, **_: Any) -> Value:
+    found: Value = _elementary(elementary.logarithm)(block, a)
+    if a.kind is Kind.F64 and found.constant is None:
+        found.logarithm_of = a
+    return found
+
+
+def _exponential(block: Block, a: Value, **_: Any) -> Value:
+    """Of y log x it is a power, and of that three halves are the usual ones: Hertz's."""
+    if a.op == "fmul":
+        for y, logarithm in (a.args, a.args[::-1]):
+            if logarithm.logarithm_of is not None:
+                return _elementary(powers.power_of_root)(block, logarithm.logarithm_of, y)
+    return _elementary(elementary.exponential)(block, a)
+
+
 def _same(block: Block, a: Value, **_: Any) -> Value:
     return a
 
@@ -217,12 +234,12 @@ ELEMENTWISE: dict[str, Rule] = {
     "round": _round,
     "floor": _direct("floor"),
     "ceil": _direct("ceil"),
-    "exp": _elementary(elementary.exponential),
-    "log": _elementary(elementary.logarithm),
+    "exp": _exponential,
+    "log": _logarithm,
     "sin": _elementary(elementary.sine),
     "cos": _elementary(elementary.cosine),
     "tanh": _elementary(elementary.hyperbolic_tangent),
-    "pow": _elementary(elementary.power),
+    "pow": _elementary(powers.power),
     "integer_pow": _whole_power,
     "square": _square,
     "eq": _compared("oeq", "eq"),

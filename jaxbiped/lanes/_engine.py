@@ -19,6 +19,8 @@ from jaxbiped.lanes._program import Graph, Program, graph_of, leaves_of
 
 THREADS_VARIABLE = "JAXBIPED_THREADS"
 """Environment variable: threads to use, else as many as the process has cores."""
+_MANY = 8
+"""Vectors for each thread from which on two are computed side by side."""
 _POLL = 0.1
 """How long to wait before looking whether the user interrupts [s]."""
 
@@ -53,6 +55,7 @@ class CompiledProgram:
         """
         self.graph: Graph = graph_of(program, inputs)
         self._shapes = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jtu.tree_leaves(inputs)]
+        self._maps = any(value.op == "map" for value in self.graph.body.values)
         self._code: dict[int, MachineCode] = {}
         self._begun: set[int] = set()
         self._lock, self._making = threading.Lock(), threading.Lock()
@@ -73,9 +76,20 @@ class CompiledProgram:
                 self._code[width] = machine_code(self.text(width), ENTRY, host())
             return self._code[width]
 
+    def width(self, count: int, threads: int) -> int:
+        """Simulations in one vector: a thread that has only one is faster with it alone.
+
+        Where there are many, two of the host's vectors side by side: while one waits, the other one
+        is computed. What a map loops over fills the caches instead.
+        """
+        if count <= threads:
+            return 1
+        many = count >= _MANY * threads * host().width
+        return host().width * (2 if many and not self._maps else 1)
+
     def make_ready(self, count: int) -> None:
         """Begins to compile, in the background, what running `count` simulations needs."""
-        width = _width(count, default_threads())
+        width = self.width(count, default_threads())
         with self._lock:
             begun = width in self._code or width in self._begun
             self._begun.add(width)
@@ -148,7 +162,7 @@ class CompiledProgram:
         records = np.full((count, room, len(self.graph.recorded)), np.nan)
         record_counts = np.zeros(count, dtype=np.int64)
         queue, stop = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
-        chosen = _width(count, threads or default_threads()) if width is None else width
+        chosen = self.width(count, threads or default_threads()) if width is None else width
         arrays = dict(
             queue=queue,
             stop=stop,
@@ -201,11 +215,6 @@ def default_threads() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def _width(count: int, threads: int) -> int:
-    """Simulations in one vector: a thread that has only one is faster with it alone."""
-    return 1 if count <= threads else host().width
 
 
 def _run_all(work: Callable[[], Any], workers: int, stop: np.ndarray, *, quick: bool) -> None:

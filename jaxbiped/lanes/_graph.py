@@ -37,13 +37,15 @@ class Value:
         kind: what it holds.
         block: where it is computed.
         number: the order in which values were made.
+        logarithm_of: of a logarithm, what it is the logarithm of; else None.
     """
 
-    __slots__ = ("args", "block", "kind", "number", "op")
+    __slots__ = ("args", "block", "kind", "logarithm_of", "number", "op")
 
     def __init__(self, op: str, args: tuple[Any, ...], kind: Kind, block: "Block") -> None:
         self.op, self.args, self.kind, self.block = op, args, kind, block
         self.number = next(_NUMBER)
+        self.logarithm_of: Value | None = None
 
     @property
     def constant(self) -> Any:

@@ -115,6 +115,24 @@ def test_any_number_is_compared_as_in_jax(numbers):
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.parametrize("exponent", [1.5, 1.2, 0.5, 2.0, -1.5, 0.0])
+def test_a_power_written_with_logarithms(exponent):
+    """As the laws have it; for 3/2 it is a product with the root."""
+
+    def force(x, n):
+        return jnp.exp(n * jnp.log(x))
+
+    points = np.concatenate([10.0 ** np.linspace(-120.0, 120.0, 26), [0.0, 1.0, 1e-310, np.inf]])
+    given = points, np.full(len(points), exponent)
+    derivatives = jax.grad(force, argnums=(0, 1))
+    found = evaluate(lambda *z: (force(*z), *derivatives(*z)), *given)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        np.testing.assert_allclose(found[0], np.exp(exponent * np.log(points)), rtol=3e-13)
+    regular = [each[:26] for each in given]
+    for a, b in zip(found[1:], jax.vmap(derivatives)(*regular), strict=True):
+        np.testing.assert_allclose(a[:26], b, rtol=3e-13)
+
+
 def _compare(a, b, library=jnp):
     return [a < b, a <= b, a == b, a != b, library.maximum(a, b), library.minimum(a, b)]
 
