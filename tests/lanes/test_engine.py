@@ -7,6 +7,7 @@ import signal
 import threading
 import time
 
+import distributed
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -171,6 +172,13 @@ def test_runs_in_spawned_processes():
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as pool:
         assert list(pool.map(_summary, range(2))) == [_summary(0)] * 2
+
+
+def test_runs_in_dask_workers():
+    here = distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None)
+    with here as cluster, cluster.get_client() as client:
+        found = list(client.get_executor(pure=False).map(_summary, range(4)))
+    assert found == [_summary(0)] * 4
 
 
 def test_the_environment_chooses_the_threads(monkeypatch):
