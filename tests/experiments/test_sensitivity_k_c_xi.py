@@ -1,0 +1,19 @@
+import pytest
+
+from tests.experiments.quick import quick_numbers
+
+
+def test_every_gait_is_found_with_its_elasticities(tmp_path):
+    numbers = quick_numbers(
+        "sensitivity_K_c_xi",
+        tmp_path,
+        keys={"parameters", "points", "without_a_gait", "disagreement_with_neighbours"},
+        pictures={"sensitivity_K_c_xi.png"},
+    )
+    assert numbers["without_a_gait"] == []
+    points = {name: row[len(row) // 2] for name, row in numbers["points"].items()}
+    for seed in points.values():
+        assert seed["measures"]["period"] == pytest.approx(0.440835, abs=1e-6)
+        assert seed["elasticities"]["peak_normal"][:2] == pytest.approx([0.139, 0.479], abs=1e-3)
+    for row in numbers["points"].values():
+        assert all(max(point["errors"]["period"]) < 1e-4 for point in row)
