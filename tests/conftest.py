@@ -1,10 +1,18 @@
 """What all tests share."""
 
+import os
+
+import hypothesis
 import jax
 import pytest
 
 import jaxbiped as jb
 from tests.reference import reference_states
+
+# What decides whether a change lands draws the same examples every time; elsewhere they are new.
+hypothesis.settings.register_profile("landing", derandomize=True, print_blob=True)
+if os.environ.get("CI"):
+    hypothesis.settings.load_profile("landing")
 
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 

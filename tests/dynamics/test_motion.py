@@ -1,5 +1,7 @@
 """Equations of motion against an independent program and closed forms."""
 
+from functools import partial
+
 import diffrax
 import jax
 import jax.numpy as jnp
@@ -13,15 +15,17 @@ import jaxbiped as jb
 from jaxbiped.dynamics._motion import leg_acceleration, leg_load
 from tests.reference import SEED, START, derivative
 
-angle = st.floats(-1.0, 1.0)
-speed = st.floats(-3.0, 3.0)
+# XLA takes subnormal numbers for zero, and a law that asks for a sign then answers otherwise.
+floats = partial(st.floats, allow_subnormal=False)
+angle = floats(-1.0, 1.0)
+speed = floats(-3.0, 3.0)
 
 
 @settings(deadline=None, max_examples=60)
 @given(
-    st.tuples(st.floats(-1, 1), st.floats(0.3, 0.45), angle, angle, speed, speed, speed, speed),
-    st.floats(0.0, 2.0),
-    st.floats(-0.1, 0.2),
+    st.tuples(floats(-1, 1), floats(0.3, 0.45), angle, angle, speed, speed, speed, speed),
+    floats(0.0, 2.0),
+    floats(-0.1, 0.2),
 )
 def test_vector_field_equals_the_independent_one(y, hip, slope):
     expected = derivative(0.0, np.array(y), SEED | dict(hip=hip, slope=slope))

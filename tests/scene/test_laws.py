@@ -25,8 +25,9 @@ FRICTIONS = [
 ]
 name = lambda law: type(law).__name__
 
-depths = st.floats(-1e-2, 1e-2)
-rates = st.floats(-2.0, 2.0)
+# XLA takes subnormal numbers for zero.
+depths = st.floats(-1e-2, 1e-2, allow_subnormal=False)
+rates = st.floats(-2.0, 2.0, allow_subnormal=False)
 
 
 @settings(deadline=None, max_examples=200)
