@@ -42,6 +42,11 @@ def _require(name: str, value: Any, allowed: str, test: Any) -> None:
         raise ArgumentError(f"{name} = {_shown(array, bad)} is not allowed: it must be {allowed}.")
 
 
+def holds_somewhere(condition: Any) -> bool:
+    """Whether a condition is known to hold in any entry; what is being traced is not known."""
+    return not _is_traced(condition) and bool(np.any(condition))
+
+
 def check_finite(name: str, value: Any) -> None:
     """Raises `ArgumentError` unless every entry of `value` is a finite number."""
     _require(name, value, "a finite number", lambda x: np.ones(x.shape, bool))
@@ -72,6 +77,19 @@ def check_below(name: str, value: Any, bound: float, why: str) -> None:
     _require(name, value, f"between {-bound:g} and {bound:g} ({why})", lambda x: abs(x) < bound)
 
 
+def check_within(
+    name: str, value: Any, lower: float, upper: float, *, open_below: bool = False
+) -> None:
+    """Raises `ArgumentError` unless lower <= value <= upper (`open_below`: lower < value)."""
+    allowed = f"{'above' if open_below else 'at least'} {lower:g} and at most {upper:g}"
+    _require(
+        name,
+        value,
+        allowed,
+        lambda x: (x > lower if open_below else x >= lower) & (x <= upper),
+    )
+
+
 def check_choice(name: str, value: Any, allowed: Iterable[str]) -> None:
     """Raises `ArgumentError` unless `value` is one of the `allowed` names."""
     names = list(allowed)
@@ -79,10 +97,11 @@ def check_choice(name: str, value: Any, allowed: Iterable[str]) -> None:
         raise ArgumentError(f"{name} = {value!r} is not known: choose one of {', '.join(names)}.")
 
 
-def check_type(name: str, value: Any, kind: type) -> None:
-    """Raises `ArgumentError` unless `value` is an instance of `kind`."""
-    if not isinstance(value, kind):
-        raise ArgumentError(f"{name} = {value!r} is not allowed: it must be a {kind.__name__}.")
+def check_type(name: str, value: Any, *kinds: type) -> None:
+    """Raises `ArgumentError` unless `value` is an instance of one of `kinds`."""
+    if not isinstance(value, kinds):
+        allowed = " or a ".join(kind.__name__ for kind in kinds)
+        raise ArgumentError(f"{name} = {value!r} is not allowed: it must be a {allowed}.")
 
 
 def check_writable_directory(name: str, path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import abc
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -9,8 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import feet, touches
-from jaxbiped.dynamics._state import State
-from jaxbiped.scene._scene import Scene
+from jaxbiped.dynamics._rigid_state import RigidState
 
 
 class AbstractSection(eqx.Module):
@@ -28,20 +28,27 @@ class AbstractSection(eqx.Module):
 class MidStance(AbstractSection):
     """The leg that stands, leg 2, passes the slope's normal on its way back, and carries."""
 
-    def value(self, args: Scene, y: State) -> Scalar:
+    def value(self, args: PyTree, y: Any) -> Scalar:
         return -y.theta_2
 
-    def counts(self, args: Scene, y: State) -> Scalar:
+    def counts(self, args: PyTree, y: Any) -> Scalar:
+        if isinstance(y, RigidState):
+            return jnp.asarray(True)
         return touches(feet(args, y).foot_2)
 
 
 class HeelStrike(AbstractSection):
     """The foot ahead comes down; by then its leg is called leg 2, the new stance leg."""
 
-    def value(self, args: Scene, y: State) -> Scalar:
+    def value(self, args: PyTree, y: Any) -> Scalar:
+        if isinstance(y, RigidState):
+            # Both feet touch where the angles are opposite; then the one ahead comes down.
+            return -(y.theta_1 + y.theta_2)
         return feet(args, y).foot_2.penetration
 
-    def counts(self, args: Scene, y: State) -> Scalar:
+    def counts(self, args: PyTree, y: Any) -> Scalar:
+        if isinstance(y, RigidState):
+            return y.theta_2 > y.theta_1
         both = feet(args, y)
         return touches(both.foot_2) & (both.foot_2.x > both.foot_1.x)
 

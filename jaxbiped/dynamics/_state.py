@@ -1,6 +1,6 @@
 """The state of the walker in minimal coordinates, and the seed's start."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
@@ -61,19 +61,19 @@ def exchange_legs(state: State) -> State:
     )
 
 
-def checked_state(state: State) -> State:
+def checked_state(state: Any, kind: type = State) -> Any:
     """`state` with every leaf a floating-point array of one shape.
 
     Raises:
-        ArgumentError: not a `State`, an entry that is not finite, or leaves of different shapes.
+        ArgumentError: not a `kind`, an entry that is not finite, or leaves of different shapes.
     """
-    check_type("state", state, State)
+    check_type("state", state, kind)
     for name, value in state._asdict().items():
         check_finite(f"state.{name}", value)
     leaves = [as_float(value) for value in state]
     shapes = {leaf.shape for leaf in leaves}
     if len(shapes) > 1:
         raise ArgumentError(
-            f"state has leaves of shapes {sorted(shapes)}: all eight must have the same shape."
+            f"state has leaves of shapes {sorted(shapes)}: all of them must have the same shape."
         )
-    return State(*leaves)
+    return kind(*leaves)

@@ -43,7 +43,7 @@ def _foot_switches(scene: Scene, foot: Foot, rate: Scalar) -> list[Switch]:
     below, touching = foot.penetration > 0.0, touches(foot)
     admitted = True if foot.admitted is None else foot.admitted
     carries = foot_force(scene, foot).normal > 0.0
-    found = [Switch(foot.penetration, admitted)]
+    found = [Switch(foot.penetration, admitted, force_jumps=scene.normal.jumps_at_touchdown)]
     reaction = scene.normal.switches(foot.penetration, foot.penetration_rate)
     found += [Switch(value, touching) for value in reaction]
     found += [Switch(value, carries) for value in scene.friction.switches(foot.slip_speed)]

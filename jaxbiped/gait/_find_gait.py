@@ -14,7 +14,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._types import as_float
-from jaxbiped.dynamics._section import AbstractSection, MidStance
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State, checked_state
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gait import Gait, described
@@ -22,8 +23,9 @@ from jaxbiped.gait._parameters import chosen_parameters
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._search import Found, Method, search
 from jaxbiped.gait._seed_start import seed_start
-from jaxbiped.gait._system import Walking
+from jaxbiped.gait._system import checked_section, system_of
 from jaxbiped.gait._turn import Turning
+from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._passage import Precision
 from jaxbiped.solve._solvers import solver_named
@@ -35,8 +37,8 @@ _PATIENCE = 50.0
 
 
 def find_gait(
-    scene: Scene,
-    guess: State | None = None,
+    scene: Scene | RigidScene,
+    guess: State | RigidState | None = None,
     *,
     period: int = 1,
     section: AbstractSection | None = None,
@@ -46,7 +48,7 @@ def find_gait(
     optimiser: optax.GradientTransformation | None = None,
     most_turns: int | None = None,
     radius_sensitivities: bool = True,
-    solver: str | diffrax.AbstractSolver = "rodas4",
+    solver: str | diffrax.AbstractSolver | None = None,
     engine: str = "auto",
 ) -> Gait:
     """Finds a periodic gait, its Floquet multipliers and its sensitivities to the parameters.
@@ -56,11 +58,12 @@ def find_gait(
     a switch. Works under `jit` and `vmap`, over scenes and over guesses.
 
     Args:
-        scene: the walker.
+        scene: the walker, compliant or rigid.
         guess: a start near the gait, on the section or not; unless given, the seed's start, its
             stance foot set down as deep for the scene's own legs and rolling as fast.
         period: footsteps in a cycle.
-        section: where the cycle begins, `MidStance()` unless given.
+        section: where the cycle begins, `MidStance()` unless given. A rigid walker's cycles begin
+            just after its impact, at `HeelStrike()`.
         parameters: names of the parameters to differentiate by (see `parameter_names`); all of
             them unless given, none for ().
         accuracy: "balanced" or "tight".
@@ -69,7 +72,8 @@ def find_gait(
         most_turns: cycles allowed; 40 for "newton", 400 for "optax".
         radius_sensitivities: whether to differentiate the spectral radius, which takes second
             derivatives of the motion.
-        solver: a name (see `SOLVERS`) or any diffrax solver without memory.
+        solver: a name (see `SOLVERS`) or any diffrax solver without memory; unless given "rodas4",
+            for a rigid walker "rodas5p".
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
 
     Returns:
@@ -78,28 +82,31 @@ def find_gait(
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
     """
-    check_type("scene", scene, Scene)
+    check_type("scene", scene, Scene, RigidScene)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_choice("method", method, ("newton", "optax"))
     check_positive("period", period)
     if int(period) != period:
         raise ArgumentError(f"period = {period} is not allowed: it must be a whole number.")
-    start = checked_state(seed_start(scene) if guess is None else guess)
-    if jnp.ndim(start.hip_z) != 0:
+    rigid = isinstance(scene, RigidScene)
+    own = RigidState if rigid else State
+    start = checked_state(seed_start(scene) if guess is None else guess, own)
+    if jnp.ndim(start.hip_x) != 0:
         raise ArgumentError(
-            f"guess has leaves of shape {jnp.shape(start.hip_z)}: give one state, and use jax.vmap "
+            f"guess has leaves of shape {jnp.shape(start.hip_x)}: give one state, and use jax.vmap "
             "for many."
         )
     most = (40 if method == "newton" else 400) if most_turns is None else most_turns
     check_positive("most_turns", most)
     scene = jtu.tree_map(as_float, scene)
     names, active = chosen_parameters(scene, parameters)
-    precision = precision_of(accuracy)
-    method_of_steps = solver_named(solver)
-    section = MidStance() if section is None else section
+    precision = precision_of(accuracy, scene)
+    usual = "rodas5p" if rigid else "rodas4"
+    method_of_steps = solver_named(usual if solver is None else solver)
+    section = checked_section(scene, section)
     chosen = orbit_engine(engine, solver=method_of_steps, section=section, leaves=(scene, start))
     turning = Turning(
-        system=Walking(),
+        system=system_of(scene),
         section=section,
         solver=method_of_steps,
         time_limit=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
@@ -122,8 +129,8 @@ def _adam() -> optax.GradientTransformation:
 
 def _find(
     turning: Turning,
-    scene: Scene,
-    start: State,
+    scene: Scene | RigidScene,
+    start: Any,
     precision: Precision,
     method: Method,
     names: tuple[str, ...],

@@ -11,11 +11,13 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_positive, check_type
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._feet import standing_height
+from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search import Search
 from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
 _SAME = 1e-4
@@ -38,7 +40,7 @@ class Gaits(NamedTuple):
     ending: Scalar
 
 
-def find_gaits(scene: Scene, starts: State, **options: Any) -> Gaits:
+def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options: Any) -> Gaits:
     """Searches a periodic gait from each of many starts, all at once, and tells them apart.
 
     For a look around: without derivatives by parameters. Give `find_gait` the state of the gait
@@ -52,7 +54,7 @@ def find_gaits(scene: Scene, starts: State, **options: Any) -> Gaits:
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
     """
-    check_type("scene", scene, Scene)
+    check_type("scene", scene, Scene, RigidScene)
     shapes = {jnp.shape(leaf) for leaf in jtu.tree_leaves(starts)}
     if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):
         raise ArgumentError(
@@ -74,8 +76,8 @@ def find_gaits(scene: Scene, starts: State, **options: Any) -> Gaits:
 
 
 @eqx.filter_jit
-def _every(scene: Scene, starts: State, options: dict[str, Any]) -> Gait:
-    def one(start: State) -> Gait:
+def _every(scene: Scene | RigidScene, starts: Any, options: dict[str, Any]) -> Gait:
+    def one(start: Any) -> Gait:
         return find_gait(scene, start, parameters=(), radius_sensitivities=False, **options)
 
     return jax.vmap(one)(starts)
@@ -94,22 +96,25 @@ def _told_apart(gaits: Gait) -> tuple[list[int], np.ndarray]:
     return first, which
 
 
-def rolling_starts(scene: Scene, count: int, *, spread: float = 0.3, seed: int = 0) -> State:
+def rolling_starts(
+    scene: Scene | RigidScene, count: int, *, spread: float = 0.3, seed: int = 0
+) -> Any:
     """Starts about the seed's: its angles and leg rates scattered, the stance foot rolling.
 
     Args:
-        scene: the walker.
+        scene: the walker, compliant or rigid.
         count: n, how many; the first is the seed's own, fitted to the scene.
         spread: largest relative change of an angle or rate.
         seed: of the random numbers.
 
     Returns:
-        Leaves of shape (n,): leg 2 stands as deep as in the seed's start, and does not slip.
+        A `State` or `RigidState` with leaves of shape (n,): leg 2 stands as deep as in the seed's
+        start, and does not slip.
 
     Raises:
         ArgumentError: count below 1, or spread not above 0.
     """
-    check_type("scene", scene, Scene)
+    check_type("scene", scene, Scene, RigidScene)
     check_positive("count", count)
     check_positive("spread", spread)
     scene = jtu.tree_map(as_float, scene)
@@ -118,6 +123,8 @@ def rolling_starts(scene: Scene, count: int, *, spread: float = 0.3, seed: int =
     factors = 1.0 + spread * scatter.at[:, 0].set(0.0)
     theta_1, theta_2 = middle.theta_1 * factors[0], middle.theta_2 * factors[1]
     omega_1, omega_2 = middle.omega_1 * factors[2], middle.omega_2 * factors[3]
+    if isinstance(scene, RigidScene):
+        return RigidState(jnp.zeros_like(theta_1), theta_1, theta_2, omega_1, omega_2)
     depth = standing_height(scene, middle.theta_2) - middle.hip_z
     reach = scene.walker.hip_to_foot
     return State(

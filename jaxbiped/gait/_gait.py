@@ -9,11 +9,11 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._state import State
 from jaxbiped.gait._orbit import Orbit, orbit_of
 from jaxbiped.gait._search import Found, Search
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.gait._turn import Turning
+from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._ending import Ending
 
@@ -24,6 +24,8 @@ _NOTHING = 1e-9
 class Measures(NamedTuple):
     """What is measured of a gait, or its derivatives; leaves of one shape.
 
+    A rigid walker's peak force is that of single support: its impacts have impulses.
+
     Attributes:
         period: duration of the cycle [s].
         step_length: advance along the slope in a cycle [m].
@@ -31,7 +33,7 @@ class Measures(NamedTuple):
         peak_normal: largest normal force on a foot [N]; None where the gradient mode has none.
         spectral_radius: largest absolute value of a Floquet multiplier, the trivial one left out;
             None where the gradient mode has none.
-        state: the state on the section, hip_x zero.
+        state: the state on the section, a `State` or a `RigidState`, hip_x zero.
     """
 
     period: Scalar
@@ -39,23 +41,26 @@ class Measures(NamedTuple):
     speed: Scalar
     peak_normal: Any
     spectral_radius: Any
-    state: State
+    state: Any
 
 
 class Gait(eqx.Module):
     """A periodic gait; under `vmap` every array gains the batch's axes. p parameters.
+
+    Shapes are those of the compliant walker, whose state has m = 7 components besides hip_x; the
+    rigid one's has 4.
 
     Attributes:
         ending: code of a `Search`; `outcome` names it.
         walk_ending: code of the `Ending` of the last trial that did not return; 0 where all did.
         measures: period, step length, speed, peak force, spectral radius and state.
         residual: largest change of a component of the state over the cycle, SI units.
-        multipliers: Floquet multipliers, largest first, without the trivial one; shape (6,).
-        multiplier_errors: their estimated errors, shape (6,).
-        directions: their eigenvectors in the space of hip_z … omega_2, shape (7, 6).
-        monodromy: derivative of a cycle at a fixed time, shape (7, 7).
+        multipliers: Floquet multipliers, largest first, without the trivial one; shape (m − 1,).
+        multiplier_errors: their estimated errors, shape (m − 1,).
+        directions: their eigenvectors in the space of the state without hip_x, shape (m, m − 1).
+        monodromy: derivative of a cycle at a fixed time, shape (m, m).
         return_jacobian: derivatives on the section by the state: of the state that returns, the
-            period and the step length; shape (9, 7).
+            period and the step length; shape (m + 2, m).
         unit_multiplier_error: distance from 1 of the multiplier that must be exactly 1.
         bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
         sensitivities: derivatives of the measures by each parameter, leaves of shape (p,).
@@ -87,7 +92,7 @@ class Gait(eqx.Module):
     turns: Scalar
     history: Scalar
     solver_steps: Scalar
-    orbit: tuple[Scalar, State]
+    orbit: tuple[Scalar, Any]
     parameters: tuple[str, ...] = eqx.field(static=True)
     engine: str = eqx.field(static=True)
 
@@ -115,8 +120,8 @@ class Gait(eqx.Module):
 @eqx.filter_jit
 def described(
     turning: Turning,
-    scene: Scene,
-    start: State,
+    scene: Scene | RigidScene,
+    start: Any,
     found: Found,
     names: tuple[str, ...],
     active: tuple[int, ...],
@@ -179,12 +184,12 @@ def _by_parameter(orbit: Orbit, measures: Measures, slopes: Any, radius: Scalar)
     """Derivatives of the measures by the parameters' own sizes, leaves of shape (p,)."""
     length, period = slopes.advance[0], slopes.period
     speed = (length - measures.speed * period) / measures.period
-    state = State(jnp.zeros_like(period), *slopes.recurring)
+    state = type(measures.state)(jnp.zeros_like(period), *slopes.recurring)
     return Measures(period, length, speed, slopes.peak, radius, state)
 
 
 def _elasticities(
-    scene: Scene, active: tuple[int, ...], measures: Measures, slopes: Measures
+    scene: PyTree, active: tuple[int, ...], measures: Measures, slopes: Measures
 ) -> Measures:
     leaves = jtu.tree_leaves(scene)
     zero = jnp.stack([leaves[i] == 0.0 for i in active]) if active else jnp.zeros(0, dtype=bool)

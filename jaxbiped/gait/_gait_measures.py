@@ -1,6 +1,7 @@
 """Measures of the periodic gait as a function of the scene that JAX can differentiate."""
 
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import equinox.internal as eqxi
@@ -10,6 +11,7 @@ import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
@@ -17,15 +19,14 @@ from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gradient import AbstractGradient, Implicit, Reverse
 from jaxbiped.gait._parameters import chosen_parameters
 from jaxbiped.gait._return_map import Return, return_map
+from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._elimination import solution
 
-_RECURRING = State._fields[1:]
-
 
 def gait_measures(
-    scene: Scene,
-    guess: State | None = None,
+    scene: Scene | RigidScene,
+    guess: State | RigidState | None = None,
     *,
     gradient: AbstractGradient | None = None,
     period: int = 1,
@@ -70,7 +71,7 @@ def gait_measures(
     if implicit:
         return _by_theorem(scene, gait)
 
-    def turn(state: State) -> Return:
+    def turn(state: State | RigidState) -> Return:
         reverse = isinstance(gradient, Reverse)
         return return_map(
             scene,
@@ -86,7 +87,7 @@ def gait_measures(
     return _by_correction(gait, turn)
 
 
-def _by_theorem(scene: Scene, gait: Gait) -> Measures:
+def _by_theorem(scene: Scene | RigidScene, gait: Gait) -> Measures:
     _, active = chosen_parameters(scene, gait.parameters)
     leaves = jtu.tree_leaves(scene)
     parameters = jnp.stack([leaves[i] for i in active])
@@ -111,14 +112,15 @@ def _attached_jvp(primals: tuple, tangents: tuple) -> tuple[Measures, Measures]:
 _SECOND = "gait_measures by Implicit(), which has first derivatives only; a second"
 
 
-def _by_correction(gait: Gait, turn: Callable[[State], Return]) -> Measures:
+def _by_correction(gait: Gait, turn: Callable[[Any], Return]) -> Measures:
     """Newton's correction at the gait changes nothing but has the gait's derivatives."""
     state = gait.measures.state
     once = turn(state)
-    change = jnp.stack([getattr(once.state, n) - getattr(state, n) for n in _RECURRING])
-    size = len(_RECURRING)
+    recurring = state._fields[1:]
+    change = jnp.stack([getattr(once.state, n) - getattr(state, n) for n in recurring])
+    size = len(recurring)
     step = solution(jnp.eye(size) - gait.return_jacobian[:size], change)
-    moved = {n: getattr(state, n) + step[i] for i, n in enumerate(_RECURRING)}
+    moved = {n: getattr(state, n) + step[i] for i, n in enumerate(recurring)}
     by_period, by_length = gait.return_jacobian[size:]
     time, length = once.time + by_period @ step, once.state.hip_x + by_length @ step
     measures = Measures(time, length, length / time, None, None, state._replace(**moved))

@@ -5,13 +5,14 @@ from typing import Any
 import jax.tree_util as jtu
 
 from jaxbiped._checks import check_choice
+from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
 _FIRST = ("K", "c", "xi")
 """The parameters that sensitivities are first asked for."""
 
 
-def parameter_names(scene: Scene) -> tuple[str, ...]:
+def parameter_names(scene: Scene | RigidScene) -> tuple[str, ...]:
     """Names of a scene's parameters: K, c and xi first, the others in the scene's order.
 
     A name is the parameter's own, `K`; where two parts have one of that name, `normal.K`.
@@ -22,7 +23,7 @@ def parameter_names(scene: Scene) -> tuple[str, ...]:
 
 
 def chosen_parameters(
-    scene: Scene, parameters: tuple[str, ...] | None
+    scene: Scene | RigidScene, parameters: tuple[str, ...] | None
 ) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """Names of the parameters asked for, all for None, and the positions of their leaves.
 
@@ -36,7 +37,7 @@ def chosen_parameters(
     return names, tuple(by_leaf.index(name) for name in names)
 
 
-def _names_by_leaf(scene: Scene) -> list[str]:
+def _names_by_leaf(scene: Scene | RigidScene) -> list[str]:
     paths = [path for path, _ in jtu.tree_flatten_with_path(scene)[0]]
     own = [_shown(path[-1:]) for path in paths]
     return [

@@ -1,18 +1,26 @@
 """Where a search begins that was given no guess."""
 
+from typing import Any
+
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import standing_height
-from jaxbiped.dynamics._state import State, seed_state
+from jaxbiped.dynamics._rigid_state import rigid_state
+from jaxbiped.dynamics._state import seed_state
+from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
 
 
-def seed_start(scene: Scene) -> State:
-    """The seed's start, fitted to the scene's legs."""
+def seed_start(scene: Scene | RigidScene) -> Any:
+    """The seed's start, fitted to the scene's legs; a rigid walker's rates also to its gravity."""
     seed, own = seed_state(), seed_scene()
+    if isinstance(scene, RigidScene):
+        pace = jnp.sqrt(scene.ground.g / scene.walker.l * own.walker.l / own.ground.g)
+        rates = dict(omega_1=seed.omega_1 * pace, omega_2=seed.omega_2 * pace)
+        return rigid_state(seed)._replace(**rates)
     depth = standing_height(own, seed.theta_2) - seed.hip_z
 
     def reach(walker: Walker) -> tuple[Scalar, Scalar]:

@@ -7,13 +7,19 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._forces import foot_forces
+from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._motion import vector_field
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._rolling import rolling, rolling_field
+from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.dynamics._switches import Switch, switches
+from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._ending import WATCHES, ending_events
+from jaxbiped.solve._ending import WATCHES, ending_events, rigid_ending
 
 
 class AbstractSystem(eqx.Module):
@@ -53,6 +59,11 @@ class AbstractSystem(eqx.Module):
         """A quantity whose largest value along the orbit is wanted, or None."""
 
 
+def system_of(scene: Scene | RigidScene) -> AbstractSystem:
+    """The system that a scene describes."""
+    return Rolling() if isinstance(scene, RigidScene) else Walking()
+
+
 class Walking(AbstractSystem):
     """The walker: legs exchanged at each footstep, the place along the slope left out."""
 
@@ -78,3 +89,41 @@ class Walking(AbstractSystem):
         """Normal force on the foot that carries more [N]."""
         forces = foot_forces(args, y)
         return jnp.maximum(forces.foot_1.normal, forces.foot_2.normal)
+
+
+def checked_section(scene: Scene | RigidScene, section: AbstractSection | None) -> AbstractSection:
+    """The section asked for, or the one that a scene's cycles begin at unless told otherwise.
+
+    Raises:
+        ArgumentError: a section other than heel strike for a rigid walker.
+    """
+    if not isinstance(scene, RigidScene):
+        return MidStance() if section is None else section
+    if section is not None and not isinstance(section, HeelStrike):
+        raise ArgumentError(
+            f"section = {section!r} is not allowed for a RigidScene: its cycles begin just after "
+            "the impact, at HeelStrike()."
+        )
+    return HeelStrike()
+
+
+class Rolling(AbstractSystem):
+    """The rigid walker: it rolls on leg 2, and exchanges support at each heel strike."""
+
+    drifting: ClassVar[tuple[int, ...]] = (RigidState._fields.index("hip_x"),)
+
+    def vector_field(self, t: Any, y: RigidState, args: RigidScene) -> RigidState:
+        return rolling_field(t, y, args)
+
+    def switches(self, args: RigidScene, y: RigidState) -> tuple[Switch, ...]:
+        return ()
+
+    def ending(self, args: RigidScene, y: RigidState) -> Scalar:
+        return rigid_ending(y)
+
+    def renew(self, args: RigidScene, y: RigidState) -> RigidState:
+        return impact(args, y).state
+
+    def load(self, args: RigidScene, y: RigidState) -> Scalar:
+        """Normal force on the foot that rolls [N]; an impact has an impulse instead."""
+        return rolling(args, y).force.normal

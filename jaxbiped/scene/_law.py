@@ -1,6 +1,7 @@
 """The two interfaces that every law of contact answers."""
 
 import abc
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -9,7 +10,14 @@ from jaxbiped._types import Scalar
 
 
 class AbstractNormalLaw(eqx.Module):
-    """Normal force of the ground on a foot as a function of penetration and its rate."""
+    """Normal force of the ground on a foot as a function of penetration and its rate.
+
+    Attributes:
+        jumps_at_touchdown: whether the force itself, not its derivatives alone, jumps where a
+            foot that comes down begins to touch. A property of the class.
+    """
+
+    jumps_at_touchdown: ClassVar[bool] = False
 
     @abc.abstractmethod
     def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
@@ -47,19 +55,28 @@ class AbstractFrictionLaw(eqx.Module):
         """Functions whose zeros are where a first or second derivative by the slip speed jumps."""
 
 
-def power(base: Scalar, exponent: Scalar) -> Scalar:
+def power(base: Scalar, exponent: Scalar | float) -> Scalar:
     """`base ** exponent` for a positive base, with one exponential shared by all derivatives."""
     return jnp.exp(exponent * jnp.log(base))
 
 
-def hertz_force(stiffness: Scalar, exponent: Scalar, penetration: Scalar) -> Scalar:
+def depth_in_contact(penetration: Scalar) -> Scalar:
+    """The penetration where above zero, else 1 m: powers of it have finite derivatives."""
+    return jnp.where(penetration > 0.0, penetration, 1.0)
+
+
+def pushing(penetration: Scalar, force: Scalar) -> Scalar:
+    """`force` [N] in contact and where above zero, else zero: no foot is pulled."""
+    return jnp.where((penetration > 0.0) & (force > 0.0), force, 0.0)
+
+
+def hertz_force(stiffness: Scalar, exponent: Scalar | float, penetration: Scalar) -> Scalar:
     """K δⁿ where δ > 0, else zero [N]; every derivative is finite at δ = 0."""
-    touching = penetration > 0.0
-    depth = jnp.where(touching, penetration, 1.0)
-    return jnp.where(touching, stiffness * power(depth, exponent), 0.0)
+    depth = depth_in_contact(penetration)
+    return jnp.where(penetration > 0.0, stiffness * power(depth, exponent), 0.0)
 
 
-def hertz_energy(stiffness: Scalar, exponent: Scalar, penetration: Scalar) -> Scalar:
+def hertz_energy(stiffness: Scalar, exponent: Scalar | float, penetration: Scalar) -> Scalar:
     """The integral of `hertz_force` over penetration [J]."""
     return hertz_force(stiffness, exponent, penetration) * penetration / (exponent + 1.0)
 

@@ -1,11 +1,20 @@
 """The seed's normal law: Hertz stiffness with a damper that grows with penetration."""
 
+from typing import Self
+
 import equinox as eqx
-import jax.numpy as jnp
 
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
-from jaxbiped.scene._law import AbstractNormalLaw, hertz_energy, hertz_force, power
+from jaxbiped.scene._law import (
+    AbstractNormalLaw,
+    depth_in_contact,
+    hertz_energy,
+    hertz_force,
+    power,
+    pushing,
+)
+from jaxbiped.scene._weight import matched_to_weight
 
 
 class RistowSchafer(AbstractNormalLaw):
@@ -32,15 +41,40 @@ class RistowSchafer(AbstractNormalLaw):
         check_not_negative("c", self.c, "N s/m^2")
         check_at_least("n", self.n, "1", 1.0)
 
+    @classmethod
+    def from_weight(
+        cls,
+        *,
+        mass: Parameter,
+        penetration: Parameter,
+        damping_ratio: Parameter,
+        g: Parameter = 9.8,
+        n: Parameter = 1.5,
+    ) -> Self:
+        """The law on which a mass stands and oscillates as told.
+
+        Args:
+            mass: what stands on the law [kg].
+            penetration: how deep it stands [m].
+            damping_ratio: of small oscillations about that [–].
+            g: gravitational acceleration [m/s²].
+            n: exponent [–].
+
+        Raises:
+            ArgumentError: mass, penetration or g not above 0, damping_ratio below 0, n below 1.
+        """
+        K, damper = matched_to_weight(
+            mass=mass, penetration=penetration, damping_ratio=damping_ratio, g=g, n=n
+        )
+        return cls(K=K, c=damper / as_float(penetration), n=n)
+
     def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
-        touching = penetration > 0.0
-        depth = jnp.where(touching, penetration, 1.0)
-        force = self.K * power(depth, self.n) + self.c * depth * rate
-        return jnp.where(touching & (force > 0.0), force, 0.0)
+        depth = depth_in_contact(penetration)
+        return pushing(penetration, self.K * power(depth, self.n) + self.c * depth * rate)
 
     def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
         """The reaction over the penetration: it leaves zero where this does."""
-        depth = jnp.where(penetration > 0.0, penetration, 1.0)
+        depth = depth_in_contact(penetration)
         return (self.K * power(depth, self.n - 1.0) + self.c * rate,)
 
     def elastic_force(self, penetration: Scalar) -> Scalar:

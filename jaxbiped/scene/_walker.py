@@ -2,7 +2,12 @@
 
 import equinox as eqx
 
-from jaxbiped._checks import check_at_least, check_not_negative, check_positive
+from jaxbiped._checks import (
+    check_at_least,
+    check_not_negative,
+    check_positive,
+    holds_somewhere,
+)
 from jaxbiped._types import Parameter, Scalar, as_float
 
 
@@ -20,7 +25,8 @@ class Walker(eqx.Module):
         hip_mass: point mass at the hip [kg].
 
     Raises:
-        ArgumentError: m, J or l not above 0; d, r or hip_mass below 0; l below r.
+        ArgumentError: m or l not above 0; J, d, r or hip_mass below 0; l below r; J zero (legs
+            that are mass points) without d and hip_mass above 0.
     """
 
     m: Parameter = eqx.field(converter=as_float)
@@ -32,12 +38,15 @@ class Walker(eqx.Module):
 
     def __check_init__(self) -> None:
         check_positive("m", self.m, "kg")
-        check_positive("J", self.J, "kg m^2")
+        check_not_negative("J", self.J, "kg m^2")
         check_positive("l", self.l, "m")
         check_not_negative("d", self.d, "m")
         check_not_negative("r", self.r, "m")
         check_not_negative("hip_mass", self.hip_mass, "kg")
         check_at_least("l", self.l, "r", self.r)
+        if holds_somewhere(self.J == 0.0):
+            check_positive("d", self.d, "m")
+            check_positive("hip_mass", self.hip_mass, "kg")
 
     @property
     def hip_to_foot(self) -> Scalar:

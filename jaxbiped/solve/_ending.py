@@ -11,6 +11,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._motion import accelerations
+from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._clearance import StanceRotation
 from jaxbiped.scene._scene import Scene
@@ -134,6 +135,16 @@ def has_stumbled(scene: Scene, state: State) -> Scalar:
 
     both = touches(foot_1) & touches(foot_2)
     return both & (trips(foot_1, foot_2) | trips(foot_2, foot_1))
+
+
+def rigid_ending(state: RigidState) -> Scalar:
+    """Code of the `Ending` that has come to a rigid walker, 0 where it goes on.
+
+    Its hip comes down as a compliant one's does: when the stance leg is 1 rad from upright.
+    """
+    code = jnp.where(state.theta_2 < -_FALL_ANGLE, int(Ending.FELL_FORWARD), 0)
+    code = jnp.where(state.theta_2 > _FALL_ANGLE, int(Ending.FELL_BACK), code)
+    return jnp.where(jnp.isfinite(sum(state)), code, int(Ending.SOLVER_FAILED))
 
 
 WATCHES = ("fall", "stop", "stumble")

@@ -144,13 +144,22 @@ def arrival_at(watch: Watch, state: PyTree, args: PyTree) -> tuple[PyTree, Scala
     """The state on the section just before `state`, and how long before [s]."""
     assert watch.section is not None
     section = watch.section
-    rate = watch.field(jnp.zeros(()), state, args)
-    value, slope = jax.jvp(lambda s: section(args, s)[0], (state,), (rate,))
-    past = value / slope
-    # In second order: the overshoot is a small part of a step.
-    half = jtu.tree_map(lambda s, r: s - 0.5 * past * r, state, rate)
-    middle = watch.field(jnp.zeros(()), half, args)
-    return jtu.tree_map(lambda s, r: s - past * r, state, middle), past
+
+    def back(y: PyTree, rate: PyTree, time: Any) -> PyTree:
+        return jtu.tree_map(lambda s, r: s - time * r, y, rate)
+
+    def newton(y: PyTree) -> tuple[Scalar, PyTree]:
+        rate = watch.field(jnp.zeros(()), y, args)
+        value, slope = jax.jvp(lambda s: section(args, s)[0], (y,), (rate,))
+        return value / slope, rate
+
+    past, rate = newton(state)
+    # The overshoot is a small part of a step: a midpoint step back, and what that leaves.
+    middle = watch.field(jnp.zeros(()), back(state, rate, 0.5 * past), args)
+    near = back(state, middle, past)
+    # Without this second iteration derivatives would be wrong by a part as large as the overshoot.
+    left, rate = newton(near)
+    return back(near, rate, left), past + left
 
 
 def onto_section(

@@ -1,0 +1,76 @@
+"""Heel strike of the rigid walker: a plastic impact that exchanges support."""
+
+from typing import NamedTuple
+
+from jaxbiped._circular import sine_cosine
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._rolling import Support, inertia_of, support_of
+from jaxbiped.scene._rigid_scene import RigidScene
+
+
+class Impact(NamedTuple):
+    """What an impact does.
+
+    Attributes:
+        state: afterwards, the legs' names exchanged: leg 2 is the one that came down.
+        impulse_x, impulse_z: of the ground on the foot that came down [N·s].
+        lifting: speed at which the foot that stood leaves the ground afterwards [m/s]. One below
+            zero would have been held by the ground, and shared the impact.
+    """
+
+    state: RigidState
+    impulse_x: Scalar
+    impulse_z: Scalar
+    lifting: Scalar
+
+
+def impact(scene: RigidScene, state: RigidState) -> Impact:
+    """The plastic impact of leg 1's foot, leg 2's being released at once.
+
+    The impulse acts where the new foot touches, so motions that roll about that point do not feel
+    it: the momenta of the new support's two rates are kept. They are the angular momenta of the
+    whole walker about the new point of contact and of the leg that leaves about the hip.
+    """
+    walker = scene.walker
+    m, d = walker.m, walker.d
+    old, new = support_of(walker, state.theta_2), support_of(walker, state.theta_1)
+    hip = (old.hip_x * state.omega_2, old.hip_z * state.omega_2)
+    leaving = (old.mass_x * state.omega_2, old.mass_z * state.omega_2)
+    landing = (
+        hip[0] + d * new.cosine * state.omega_1,
+        hip[1] + d * new.sine * state.omega_1,
+    )
+
+    def along(velocity: tuple[Scalar, Scalar], x: Scalar, z: Scalar) -> Scalar:
+        return velocity[0] * x + velocity[1] * z
+
+    stance_momentum = (
+        m * along(landing, new.mass_x, new.mass_z)
+        + walker.hip_mass * along(hip, new.hip_x, new.hip_z)
+        + m * along(leaving, new.hip_x, new.hip_z)
+        + walker.J * state.omega_1
+    )
+    swing_momentum = m * d * along(leaving, old.cosine, old.sine) + walker.J * state.omega_2
+    inertia = inertia_of(walker, new, old.sine, old.cosine)
+    stance_rate, swing_rate = inertia.solved(stance_momentum, swing_momentum)
+    after = RigidState(state.hip_x, state.theta_2, state.theta_1, swing_rate, stance_rate)
+    before_x, before_z = (
+        walker.hip_mass * hip[i] + m * (leaving[i] + landing[i]) for i in range(2)
+    )
+    after_x, after_z = _momentum(scene, after, new)
+    lifting = (new.hip_z * stance_rate) + walker.hip_to_foot * old.sine * swing_rate
+    return Impact(after, after_x - before_x, after_z - before_z, lifting)
+
+
+def _momentum(scene: RigidScene, state: RigidState, stance: Support) -> tuple[Scalar, Scalar]:
+    """Momentum of the whole walker that rolls on leg 2 [kg·m/s]."""
+    walker = scene.walker
+    sine, cosine = sine_cosine(state.theta_1)
+    carried = walker.hip_mass + walker.m
+    return (
+        (carried * stance.hip_x + walker.m * stance.mass_x) * state.omega_2
+        + walker.m * walker.d * cosine * state.omega_1,
+        (carried * stance.hip_z + walker.m * stance.mass_z) * state.omega_2
+        + walker.m * walker.d * sine * state.omega_1,
+    )

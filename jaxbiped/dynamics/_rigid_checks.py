@@ -1,0 +1,81 @@
+"""Whether real feet could do what the rigid walker assumes."""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxbiped._checks import check_not_negative, check_type
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._impact import impact
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._rolling import rolling
+from jaxbiped.scene._rigid_scene import RigidScene
+
+
+class RigidChecks(NamedTuple):
+    """What a footstep asks of the ground, at n states in order of time.
+
+    Attributes:
+        normal: force that keeps the stance foot down [N], shape (n,); below zero the foot flies.
+        needed_friction: least coefficient that keeps it from slipping [–], shape (n,); infinite
+            where it flies.
+        clearance: height of the swing foot above the ground [m], shape (n,); below zero it scuffs.
+        impact_friction: the same coefficient for the impact that ends the footstep.
+        lifting: speed at which the trailing foot leaves the ground after it [m/s]; below zero the
+            ground would have held it.
+    """
+
+    normal: Scalar
+    needed_friction: Scalar
+    clearance: Scalar
+    impact_friction: Scalar
+    lifting: Scalar
+
+    @property
+    def flies(self) -> Scalar:
+        """Where the stance foot would leave the ground (booleans, shape (n,))."""
+        return self.normal <= 0.0
+
+    @property
+    def scuffs(self) -> Scalar:
+        """Where the swing foot is below the ground (booleans, shape (n,))."""
+        return self.clearance < 0.0
+
+    def slips(self, mu: float) -> Scalar:
+        """Where a foot with this coefficient of friction would slip (booleans, shape (n,)).
+
+        Raises:
+            ArgumentError: mu below 0.
+        """
+        check_not_negative("mu", mu)
+        return self.needed_friction > mu
+
+
+def rigid_checks(scene: RigidScene, states: RigidState) -> RigidChecks:
+    """Checks a footstep from a series of its states, such as `gait.orbit[1]`.
+
+    Args:
+        scene: the walker.
+        states: leaves of n states in order, of any shape that has n entries; those that are not
+            finite are left out. The last is taken for the moment of the impact.
+
+    Raises:
+        ArgumentError: an argument of the wrong type.
+    """
+    check_type("scene", scene, RigidScene)
+    check_type("states", states, RigidState)
+    known = jnp.isfinite(jnp.ravel(states.theta_2))
+    states = jtu.tree_map(lambda leaf: jnp.ravel(leaf)[known], states)
+    force = rolling(scene, states).force
+    normal, tangential = force.normal, jnp.abs(jnp.asarray(force.tangential))
+    needed = jnp.where(normal > 0.0, tangential / jnp.where(normal > 0.0, normal, 1.0), jnp.inf)
+    heights = jnp.cos(states.theta_2) - jnp.cos(states.theta_1)
+    struck = impact(scene, jtu.tree_map(lambda leaf: leaf[-1], states))
+    return RigidChecks(
+        normal=normal,
+        needed_friction=needed,
+        clearance=scene.walker.hip_to_foot * heights,
+        impact_friction=jnp.abs(struck.impulse_x) / struck.impulse_z,
+        lifting=struck.lifting,
+    )

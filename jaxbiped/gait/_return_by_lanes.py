@@ -1,0 +1,90 @@
+"""The return map by lanes: all directions of a derivative share one solve."""
+
+from typing import Any
+
+import equinox as eqx
+import equinox.internal as eqxi
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.gait._return_by_xla import NO_REVERSE, full_tangents, renewed
+from jaxbiped.gait._turn import PARAMETER_FLOOR, STATE_FLOOR, Turning
+from jaxbiped.lanes._adaptive_columns import Crossed
+from jaxbiped.lanes._crossing import cross
+from jaxbiped.solve._columns import Seeded, Tangents
+from jaxbiped.solve._passage import Precision
+
+
+@eqx.filter_custom_jvp
+def forward_by_lanes(
+    turning: Turning, precision: Precision, args: PyTree, state: PyTree
+) -> tuple[PyTree, Scalar, Scalar]:
+    found = _crossed(turning, precision, args, state, (), ())
+    return renewed(turning, args, found.state, found.t, found.code)
+
+
+@forward_by_lanes.def_jvp
+def _forward_by_lanes_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
+    turning, precision, args, state = primals
+    _, _, args_dot, state_dot = tangents
+    moved, steered = _leaves_with_none(state_dot, state), _leaves_with_none(args_dot, args)
+    places = tuple(i for i, dot in enumerate(moved) if dot is not None)
+    active = tuple(i for i, dot in enumerate(steered) if dot is not None)
+    found = _crossed(turning, precision, args, state, places, active)
+    sizes = _sizes(args, active)
+    dots = [moved[i] for i in places]
+    dots += [steered[i] / size for i, size in zip(active, sizes, strict=True)]
+    along = jnp.stack(dots) if dots else jnp.zeros(0)
+    arrived = jtu.tree_unflatten(jtu.tree_structure(state), list(along @ found.columns))
+
+    def renew(args: PyTree, y: PyTree) -> PyTree:
+        return renewed(turning, args, y, found.t, found.code)[0]
+
+    _, end_dot = jax.jvp(renew, (args, found.state), (full_tangents(args_dot, args), arrived))
+    end_dot, time_dot = eqxi.nondifferentiable_backward(
+        (end_dot, along @ found.time_columns), msg=NO_REVERSE
+    )
+    return forward_by_lanes(turning, precision, args, state), (end_dot, time_dot, None)
+
+
+def _crossed(
+    turning: Turning,
+    precision: Precision,
+    args: PyTree,
+    state: PyTree,
+    places: tuple[int, ...],
+    active: tuple[int, ...],
+) -> Crossed:
+    """Columns by these leaves of the state, then by the logarithms of these of the arguments."""
+    m, p = len(places), len(active)
+    columns = np.zeros((len(jtu.tree_leaves(state)), m + p))
+    columns[list(places), range(m)] = 1.0
+    floors = jnp.asarray([STATE_FLOOR] * m + [PARAMETER_FLOOR] * p)
+    found, _ = cross(
+        turning.watch(args, state, peak=False),
+        turning.solver,
+        Tangents(state, jnp.asarray(columns)),
+        Seeded(args, jnp.zeros((p, m + p)), floors, active),
+        jnp.stack(_sizes(args, active)) if active else jnp.zeros(0),
+        precision=precision,
+        time_limit=turning.time_limit,
+        max_solver_steps=turning.max_solver_steps,
+    )
+    return found
+
+
+def _sizes(args: PyTree, active: tuple[int, ...]) -> list[Scalar]:
+    """By how much parameters move: their own size, or one where they are zero."""
+    leaves = jtu.tree_leaves(args)
+    return [jnp.where(leaves[i] == 0.0, 1.0, leaves[i]) for i in active]
+
+
+def _leaves_with_none(tangents: PyTree, like: PyTree) -> list[Any]:
+    """Tangents of every leaf, None where JAX left them out."""
+    if tangents is None:
+        return [None] * len(jtu.tree_leaves(like))
+    return jtu.tree_leaves(tangents, is_leaf=lambda leaf: leaf is None)

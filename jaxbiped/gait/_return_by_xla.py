@@ -1,0 +1,119 @@
+"""The return map by diffrax: forward with tangents of its own, and in reverse."""
+
+from typing import Any
+
+import equinox as eqx
+import equinox.internal as eqxi
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.gait._turn import PARAMETER_FLOOR, STATE_FLOOR, Turning
+from jaxbiped.solve._columns import Seeded, Tangents
+from jaxbiped.solve._passage import Precision, passage
+
+NO_REVERSE = (
+    "gradient = Forward() carries tangents along the motion and has no reverse mode: pass "
+    "gradient=Reverse() to return_map, or differentiate by jax.jvp or jax.jacfwd."
+)
+
+
+@eqx.filter_custom_jvp
+def forward_by_xla(
+    turning: Turning, precision: Precision, args: PyTree, state: PyTree
+) -> tuple[PyTree, Scalar, Scalar]:
+    watch = turning.watch(args, state, peak=False)
+    found = passage(
+        watch,
+        turning.solver,
+        state,
+        args,
+        precision=precision,
+        time_limit=turning.time_limit,
+        max_solver_steps=turning.max_solver_steps,
+    )
+    return renewed(turning, args, found.y, found.time, found.code)
+
+
+@forward_by_xla.def_jvp
+def _by_xla_forward_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
+    turning, precision, args, state = primals
+    _, _, args_dot, state_dot = tangents
+    args_leaves = jtu.tree_leaves(args)
+    column = jnp.stack(_dense(state_dot, state))[:, None]
+    seeds = _dense(args_dot, args)
+    relative = [d / jnp.where(v == 0.0, 1.0, v) for d, v in zip(seeds, args_leaves, strict=True)]
+    floor = STATE_FLOOR * jnp.max(jnp.abs(column))
+    if relative:
+        floor = floor + PARAMETER_FLOOR * jnp.max(jnp.abs(jnp.stack(relative)))
+    seeded = Seeded(
+        args,
+        jnp.stack(seeds)[:, None] if seeds else jnp.zeros((0, 1)),
+        floor[None],
+        tuple(range(len(seeds))),
+    )
+    found = passage(
+        turning.watch(args, state, peak=False),
+        turning.solver,
+        Tangents(state, column),
+        seeded,
+        precision=precision,
+        time_limit=turning.time_limit,
+        max_solver_steps=turning.max_solver_steps,
+    )
+    structure = jtu.tree_structure(state)
+    arrived = jtu.tree_unflatten(structure, list(found.y.columns[:, 0]))
+
+    def renew(args: PyTree, y: PyTree) -> PyTree:
+        return renewed(turning, args, y, found.time, found.code)[0]
+
+    _, end_dot = jax.jvp(renew, (args, found.y.state), (full_tangents(args_dot, args), arrived))
+    end_dot, time_dot = eqxi.nondifferentiable_backward(
+        (end_dot, found.time_columns[0]), msg=NO_REVERSE
+    )
+    # The values by themselves: they must not depend on what they are differentiated along.
+    values = forward_by_xla(turning, precision, args, state)
+    return values, (end_dot, time_dot, None)
+
+
+def reverse_by_xla(
+    turning: Turning, precision: Precision, args: PyTree, state: PyTree
+) -> tuple[PyTree, Scalar, Scalar]:
+    count = len(jtu.tree_leaves(state))
+    steering = Tangents(state, jnp.eye(count))
+    seeded = Seeded(args, jnp.zeros((0, count)), jnp.full(count, STATE_FLOOR), ())
+    found = passage(
+        turning.watch(args, state, peak=False),
+        turning.solver,
+        steering,
+        seeded,
+        precision=precision,
+        time_limit=turning.time_limit,
+        max_solver_steps=turning.max_solver_steps,
+        columns_only_steer=True,
+    )
+    return renewed(turning, args, found.y.state, found.time, found.code)
+
+
+def renewed(turning: Turning, args: PyTree, state: PyTree, time: Any, code: Any) -> tuple:
+    return chosen(code == 0, turning.system.renew(args, state), state), time, code
+
+
+def chosen(condition: Any, a: PyTree, b: PyTree) -> PyTree:
+    return jtu.tree_map(lambda x, y: jnp.where(condition, x, y), a, b)
+
+
+def _dense(tangents: PyTree, like: PyTree) -> list[Scalar]:
+    """Tangents of every leaf, zeros where JAX left them out."""
+    return jtu.tree_leaves(full_tangents(tangents, like))
+
+
+def full_tangents(tangents: PyTree, like: PyTree) -> PyTree:
+    return jtu.tree_map(
+        lambda leaf, dot: jnp.zeros_like(leaf) if dot is None else dot,
+        like,
+        tangents,
+        is_leaf=lambda leaf: leaf is None,
+    )

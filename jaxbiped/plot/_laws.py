@@ -1,0 +1,202 @@
+"""Laws of contact as curves."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+
+from jaxbiped._checks import check_positive, check_type
+from jaxbiped.plot._style import (
+    GROUND_COLOUR,
+    LEG_COLOURS,
+    axes_or_new,
+    dress,
+    figure_of,
+    new_figure,
+)
+from jaxbiped.scene._law import AbstractFrictionLaw, AbstractNormalLaw
+
+_RATE_COLOURS = ("#56B4E9", GROUND_COLOUR, "#E69F00", LEG_COLOURS[1])
+"""One rate each, from the slowest; the fifth begins anew."""
+_MOST_STEPS = 16384
+_LONGEST = 2.0
+"""How long a drop is followed [s]: a strongly damped foot may creep for ever."""
+
+
+def normal_law(
+    law: AbstractNormalLaw,
+    *,
+    depth: float = 1e-3,
+    rates: Sequence[float] | None = None,
+    mass: float = 2.0,
+    approach_speed: float = 0.1,
+    figure: Figure | SubFigure | None = None,
+) -> Figure:
+    """Draws a law of the normal force: against penetration, and over a drop.
+
+    Left, the force [N] against penetration [mm] at a few rates. Right, the loop that force and
+    penetration run through while a mass that comes in at a speed, without gravity, is thrown
+    back; the loop's area is the energy lost, and the title tells the coefficient of restitution.
+
+    Args:
+        law: the law, its parameters plain numbers.
+        depth: largest penetration on the left [m].
+        rates: rates of penetration on the left [m/s]. Unless given: minus a half, none, a half
+            and one times the rate whose damping force equals the force at rest at `depth`.
+        mass: what drops [kg].
+        approach_speed: rate of penetration as it touches [m/s].
+        figure: empty figure or subfigure to draw into; a new one unless given.
+
+    Raises:
+        ArgumentError: no normal law, or a depth, mass or approach_speed not above 0.
+    """
+    check_type("law", law, AbstractNormalLaw)
+    check_positive("depth", depth, "m")
+    check_positive("mass", mass, "kg")
+    check_positive("approach_speed", approach_speed, "m/s")
+    if figure is None:
+        figure = new_figure(9.2, 3.8)
+    left, right = figure.subplots(1, 2)
+    _draw_rates(left, law, depth, _telling_rates(law, depth) if rates is None else rates)
+    _draw_drop(right, law, mass, approach_speed)
+    return figure_of(left)
+
+
+def friction_law(
+    law: AbstractFrictionLaw,
+    *,
+    fastest: float | None = None,
+    load: float = 20.0,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draws a law of friction: force over load [–] against slip speed [m/s].
+
+    The scale of speeds is linear about rest and logarithmic far from it; it passes from one to
+    the other where the rise of the force from rest slackens, which is the law's own speed.
+
+    Args:
+        law: the law, its parameters plain numbers.
+        fastest: where the scale of slip speeds ends [m/s]; unless given, at a thousand times the
+            law's own speed, at most 1 m/s.
+        load: normal force [N]; it matters only to a law that is not proportional to it.
+        ax: axes to draw into; a new figure unless given.
+
+    Raises:
+        ArgumentError: no law of friction, or a load or fastest slip not above 0.
+    """
+    check_type("law", law, AbstractFrictionLaw)
+    check_positive("load", load, "N")
+    own = _own_speed(law, load)
+    end = min(1e3 * own, 1.0) if fastest is None else fastest
+    check_positive("fastest", end, "m/s")
+    bend = min(own, end)
+    slip = bend * np.sinh(np.linspace(-1.0, 1.0, 1601) * np.arcsinh(end / bend))
+    ax = axes_or_new(ax, 6.4, 3.8)
+    ax.axhline(0.0, color=GROUND_COLOUR, linewidth=0.6)
+    ax.plot(slip, _per_load(law, load, slip), color=LEG_COLOURS[0], linewidth=1.4)
+    ax.set_xscale("asinh", linear_width=bend)
+    _mark_speeds(ax, bend, end)
+    ax.set_xlim(-end, end)
+    ax.margins(y=0.08)
+    dress(ax, _name(law), "slip speed, $V_T$ (m/s)", "friction over load, $F_T/F_N$ (–)")
+    return figure_of(ax)
+
+
+def _telling_rates(law: AbstractNormalLaw, depth: float) -> list[float]:
+    at = (jnp.asarray(depth), jnp.asarray(0.0))
+    force, damper = float(law.force(*at)), float(jax.grad(law.force, 1)(*at))
+    return [part * force / damper for part in (-0.5, 0.0, 0.5, 1.0)] if damper > 0.0 else [0.0]
+
+
+def _draw_rates(ax: Axes, law: AbstractNormalLaw, depth: float, rates: Sequence[float]) -> None:
+    # Both sides of touchdown, where a law may jump.
+    depths = np.concatenate([[-0.05 * depth, 0.0], np.linspace(1e-9 * depth, depth, 400)])
+    for k, rate in enumerate(rates):
+        force = law.force(jnp.asarray(depths), jnp.full(depths.shape, float(rate)))
+        colour = GROUND_COLOUR if len(rates) == 1 else _RATE_COLOURS[k % len(_RATE_COLOURS)]
+        ax.plot(1e3 * depths, force, color=colour, linewidth=1.4, label=f"{rate:.3g} m/s")
+    ax.margins(x=0.0)
+    dress(ax, _name(law), r"penetration, $\delta$ (mm)", "normal force, $F_N$ (N)")
+    ax.legend(title="rate of penetration", frameon=False, fontsize="small", title_fontsize="small")
+
+
+def _draw_drop(ax: Axes, law: AbstractNormalLaw, mass: float, speed: float) -> None:
+    depth, rate = _drop(law, mass, speed)
+    force = np.asarray(law.force(jnp.asarray(depth), jnp.asarray(rate)))
+    # There is no force before touchdown, and none after it has come back to zero.
+    leaving = [0.0] if force[-1] <= 0.0 else []
+    depth, force = (np.concatenate([[0.0], part, leaving]) for part in (depth, force))
+    turn = int(np.argmax(depth)) + 1
+    ax.fill(1e3 * depth, force, color=LEG_COLOURS[0], alpha=0.12, linewidth=0)
+    for part, style, label in (
+        (slice(None, turn), "-", "going in"),
+        (slice(turn - 1, None), (0, (5, 1.5)), "coming out"),
+    ):
+        look: dict[str, Any] = {"linestyle": style, "label": label}
+        ax.plot(1e3 * depth[part], force[part], color=LEG_COLOURS[0], linewidth=1.4, **look)
+    ax.margins(x=0.02)
+    restitution = max(-rate[-1], 0.0) / speed
+    title = f"Drop of {mass:g} kg at {speed:g} m/s: restitution {restitution:.3f}"
+    dress(ax, title, r"penetration, $\delta$ (mm)", "normal force, $F_N$ (N)")
+    ax.legend(frameon=False, fontsize="small")
+
+
+def _drop(law: AbstractNormalLaw, mass: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
+    """Penetration and its rate at the steps of a drop, from touchdown until the mass is out."""
+
+    def field(t: Any, y: Any, args: Any) -> Any:
+        return y[1], -law.force(*y) / mass
+
+    def out(t: Any, y: Any, args: Any, **rest: Any) -> Any:
+        return (y[0] < 0.0) | ((y[1] < 0.0) & (law.force(*y) <= 0.0))
+
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(field),
+        diffrax.Tsit5(),
+        t0=0.0,
+        t1=_LONGEST,
+        dt0=1e-7,
+        # A hair inside, on the side where the force acts.
+        y0=(jnp.asarray(1e-12), jnp.asarray(speed)),
+        stepsize_controller=diffrax.PIDController(rtol=1e-9, atol=1e-13),
+        saveat=diffrax.SaveAt(t0=True, steps=True),
+        event=diffrax.Event(out),
+        max_steps=_MOST_STEPS,
+        throw=False,
+    )
+    assert solution.ys is not None
+    depth, rate = (np.asarray(part) for part in solution.ys)
+    saved = np.isfinite(depth)
+    return np.maximum(depth[saved], 0.0), rate[saved]
+
+
+def _mark_speeds(ax: Axes, bend: float, end: float) -> None:
+    """Ticks at zero and at the powers of ten of both signs where the scale is logarithmic."""
+    first, last = math.ceil(math.log10(1.5 * bend)), math.floor(math.log10(end) + 1e-9)
+    marks = {10.0**k: f"10^{{{k}}}" for k in range(first, last + 1)} or {end: f"{end:g}"}
+    below = {-x: f"$-{text}$" for x, text in reversed(marks.items())}
+    labels = below | {0.0: "0"} | {x: f"${text}$" for x, text in marks.items()}
+    ax.set_xticks(list(labels), list(labels.values()))
+
+
+def _own_speed(law: AbstractFrictionLaw, load: float) -> float:
+    """The least slip speed up to 1 m/s from which the force grows slower than √V_T, or 1 m/s."""
+    speeds = np.geomspace(1e-9, 1.0, 2000)
+    sizes = np.abs(_per_load(law, load, speeds))
+    speeds, sizes = speeds[sizes > 0.0], sizes[sizes > 0.0]
+    slack = np.diff(np.log(sizes)) < 0.5 * np.diff(np.log(speeds))
+    return float(speeds[np.argmax(slack)]) if slack.any() else 1.0
+
+
+def _per_load(law: AbstractFrictionLaw, load: float, slip: np.ndarray) -> np.ndarray:
+    return np.asarray(law.force(jnp.full(slip.shape, load), jnp.asarray(slip))) / load
+
+
+def _name(law: Any) -> str:
+    return type(law).__name__

@@ -1,0 +1,172 @@
+"""Walks of the rigid walker."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import checked_state
+from jaxbiped.lanes._rigid import rigid_walk_by_lanes
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.solve._ending import Ending
+from jaxbiped.solve._engine import engine_for
+from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, ending_of
+
+_TOLERANCES = {"fast": 1e-4, "balanced": 1e-6, "tight": 1e-11}
+_PATIENCE = 50.0
+"""Time allowed for each footstep, in units of √(l/g)."""
+
+
+class RigidWalked(eqx.Module):
+    """A walk of the rigid walker; under `vmap` every array gains the batch's axes.
+
+    Attributes:
+        t: its duration [s].
+        state: in which it ended; after a footstep, just after the impact, leg 2 standing.
+        ending: code of an `Ending`; `outcome` names it.
+        footsteps: number of heel strikes.
+        attempts: number of attempted steps of the integrator.
+        strikes: times [s] and states just after the first heel strikes, leaves of shape
+            (most_arrivals,), infinite beyond the last.
+        engine: what computed it.
+    """
+
+    t: Scalar
+    state: RigidState
+    ending: Scalar
+    footsteps: Scalar
+    attempts: Scalar
+    strikes: tuple[Scalar, RigidState]
+    engine: str = eqx.field(static=True)
+
+    @property
+    def outcome(self) -> Ending:
+        """How the walk ended, by name; for one walk, not a batch."""
+        return Ending(int(self.ending))
+
+
+def rigid_walk(
+    scene: RigidScene,
+    state: RigidState,
+    *,
+    steps: int | None = None,
+    duration: float | None = None,
+    accuracy: str = "balanced",
+    rtol: float | None = None,
+    most_arrivals: int = 0,
+    max_solver_steps: int = 65536,
+    engine: str = "auto",
+) -> RigidWalked:
+    """Walks a rigid walker for a number of footsteps, a time, or whichever ends first.
+
+    Explicit steps of fifth order (Tsitouras) under error control, each footstep ended by Newton's
+    method on the heel strike. Works under `jit` and `vmap`; for derivatives use `return_map`.
+
+    Args:
+        scene: the walker.
+        state: start, leg 2 standing.
+        steps: heel strikes after which to end.
+        duration: simulated time [s].
+        accuracy: "fast" (1e-4), "balanced" (1e-6) or "tight" (1e-11): the relative tolerance; the
+            absolute one (SI) is a hundredth of it.
+        rtol: relative tolerance, in place of the accuracy's.
+        most_arrivals: how many heel strikes to keep.
+        max_solver_steps: cap on the attempted steps.
+        engine: "xla", "lanes" or "auto" (see `ENGINES`).
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled.
+    """
+    check_type("scene", scene, RigidScene)
+    scene = jtu.tree_map(as_float, scene)
+    state = checked_state(state, RigidState)
+    if duration is None and steps is None:
+        raise ArgumentError("duration = None and steps = None: say how long to walk.")
+    if steps is not None:
+        check_positive("steps", steps)
+    if duration is not None:
+        check_positive("duration", duration, "s")
+    if most_arrivals:
+        check_positive("most_arrivals", most_arrivals)
+    check_positive("max_solver_steps", max_solver_steps)
+    check_choice("accuracy", accuracy, _TOLERANCES)
+    tolerance = _TOLERANCES[accuracy] if rtol is None else rtol
+    check_positive("rtol", tolerance)
+    leaves = jtu.tree_leaves((scene, state))
+    narrow = any(jnp.result_type(leaf) != jnp.float64 for leaf in leaves)
+    chosen = engine_for(engine, obstacle="it computes in 64 bits" if narrow else None)
+    patience = _PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g)
+    longest = (1 if steps is None else steps) * patience if duration is None else duration
+    walk = RigidWalk(
+        scene=scene,
+        state=state,
+        duration=as_float(longest),
+        footsteps=as_float(0 if steps is None else int(steps)),
+        rtol=as_float(tolerance),
+        most_attempts=as_float(max_solver_steps),
+    )
+    run = _by_lanes if chosen == "lanes" else _by_xla
+    return run(walk, int(most_arrivals), duration is None)
+
+
+def _by_lanes(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
+    found, recorded = rigid_walk_by_lanes(walk, room=room, waits=waits)
+    times, states = _nothing(walk, room)
+    if recorded is not None:
+        reached = jnp.arange(room) < recorded.counts
+        values = jnp.where(reached[:, None], recorded.values, jnp.inf)
+        times, states = values[:, 0], RigidState(*[values[:, 1 + i] for i in range(5)])
+    return RigidWalked(
+        t=found.t,
+        state=found.state,
+        ending=found.code,
+        footsteps=found.footsteps,
+        attempts=found.attempts,
+        strikes=(times, states),
+        engine="lanes",
+    )
+
+
+def _by_xla(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
+    end, strikes = _looped(walk, room)
+    return RigidWalked(
+        t=end.t,
+        state=end.state,
+        ending=ending_of(walk, end, jnp.asarray(waits)),
+        footsteps=end.footsteps,
+        attempts=end.attempts,
+        strikes=strikes,
+        engine="xla",
+    )
+
+
+@eqx.filter_jit
+def _looped(walk: RigidWalk, room: int) -> tuple[RigidProgress, Any]:
+    def advance(
+        loop: tuple[RigidProgress, Any, Scalar],
+    ) -> tuple[RigidProgress, Any, Scalar]:
+        now, strikes, _ = loop
+        after, over = attempted(walk, now)
+        if room:
+            # Without a strike the place is past the end, and nothing is written.
+            place = jnp.where(after.struck, now.footsteps, room)
+            strikes = jtu.tree_map(
+                lambda kept, new: kept.at[place].set(new, mode="drop"),
+                strikes,
+                (after.t, after.state),
+            )
+        return after, strikes, over
+
+    begin = (begun(walk), _nothing(walk, room), jnp.asarray(False))
+    end, strikes, _ = jax.lax.while_loop(lambda loop: ~loop[2], advance, begin)
+    return end, strikes
+
+
+def _nothing(walk: RigidWalk, room: int) -> tuple[Scalar, RigidState]:
+    empty = jnp.full(room, jnp.inf, dtype=walk.state.theta_1.dtype)
+    return empty, RigidState(*[empty] * 5)

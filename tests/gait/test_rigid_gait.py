@@ -1,0 +1,148 @@
+"""Gaits of rigid walkers against what was published of them."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import jaxbiped as jb
+from tests.rigid_walkers import (
+    FIRST_DOUBLING,
+    MULTIPLIER,
+    STABLE,
+    UNSTABLE,
+    compass_gait,
+    rigid_seed,
+    simplest_state,
+    simplest_walker,
+)
+
+PLAIN = dict(parameters=(), radius_sensitivities=False)
+
+
+@pytest.mark.parametrize("published", [STABLE, UNSTABLE], ids=["stable", "unstable"])
+def test_fixed_points_of_the_simplest_walker(published):
+    theta, rate = published
+    start = simplest_state(theta + 2e-4, rate - 1e-4)
+    gait = jb.find_gait(simplest_walker(0.009), start, accuracy="tight", **PLAIN)
+    assert gait.outcome is jb.Search.FOUND
+    state = gait.measures.state
+    found = [float(state.theta_2), float(state.omega_2)]
+    np.testing.assert_allclose(found, published, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(state.theta_1, -theta, rtol=0.0, atol=1e-12)
+    assert float(gait.unit_multiplier_error) < 1e-11
+    assert bool(gait.stable) is (published is STABLE)
+    if published is STABLE:
+        # φ = θ2 − θ1 and its rate, the other two of the published numbers.
+        np.testing.assert_allclose(state.theta_2 - state.theta_1, 0.400621801088574, atol=1e-12)
+        np.testing.assert_allclose(state.omega_2 - state.omega_1, -0.015822999948318, atol=1e-12)
+        first, second, last = np.asarray(gait.multipliers)
+        assert min(abs(first - MULTIPLIER), abs(first - MULTIPLIER.conjugate())) < 1e-9
+        assert abs(second - first.conjugate()) < 1e-12
+        assert abs(last) < 1e-9
+
+
+def test_first_period_doubling_of_the_simplest_walker():
+    seen = {"state": simplest_state(*STABLE)}
+
+    def multiplier_above_minus_one(slope):
+        gait = jb.find_gait(simplest_walker(slope), seen["state"], accuracy="tight", **PLAIN)
+        assert gait.outcome is jb.Search.FOUND
+        seen["state"] = gait.measures.state
+        return float(np.min(np.asarray(gait.multipliers).real)) + 1.0
+
+    for slope in (0.0105, 0.012, 0.0135, 0.0145):
+        multiplier_above_minus_one(slope)
+    doubling = brentq(multiplier_above_minus_one, 0.0145, 0.0155, xtol=1e-12)
+    assert abs(doubling - FIRST_DOUBLING) < 1e-9
+    at = jb.find_gait(simplest_walker(doubling), seen["state"], accuracy="tight", **PLAIN)
+    assert at.critical is jb.Bifurcation.PERIOD_DOUBLING
+
+
+def test_compass_gait_converges_and_is_stable():
+    """Step period and length are those of the literature's phase portraits, to their digits."""
+    gaits = jb.find_gaits(compass_gait(), jb.rolling_starts(compass_gait(), 32, spread=0.5))
+    stable = np.asarray(gaits.gaits.stable)
+    assert stable.sum() == 1
+    k = int(np.argmax(stable))
+    assert float(gaits.gaits.measures.period[k]) == pytest.approx(0.734, abs=1e-3)
+    assert float(gaits.gaits.measures.step_length[k]) == pytest.approx(0.535, abs=1e-3)
+
+
+def test_the_seeds_walker_in_the_rigid_limit():
+    gait = jb.find_gait(rigid_seed())
+    assert gait.outcome is jb.Search.FOUND
+    assert bool(gait.stable)
+    assert float(gait.measures.period) == pytest.approx(0.44378, abs=5e-6)
+    assert float(gait.measures.step_length) == pytest.approx(0.19041, abs=5e-6)
+    # Mass alone scales nothing, and gravity only the time.
+    index = gait.parameters.index
+    elasticities = gait.elasticities
+    for measure in ("period", "step_length", "spectral_radius"):
+        values = np.asarray(getattr(elasticities, measure))
+        assert abs(values[index("m")] + values[index("J")]) < 1e-6
+    assert float(elasticities.period[index("g")]) == pytest.approx(-0.5, abs=1e-7)
+    assert abs(float(elasticities.spectral_radius[index("g")])) < 1e-6
+    checks = jb.rigid_checks(rigid_seed(), gait.orbit[1])
+    assert not bool(checks.flies.any())
+    assert not bool(checks.slips(0.4).any())
+
+
+@pytest.mark.parametrize("measure", ["period", "step_length", "spectral_radius"])
+def test_sensitivities_equal_differences(measure):
+    scene = rigid_seed()
+    gait = jb.find_gait(scene, accuracy="tight")
+    at = gait.measures.state
+
+    def value(parameter, step):
+        moved = {"slope": 0.02, "r": 0.08, "d": 0.1, "hip_mass": 0.0} | {}
+        moved[parameter] += step
+        walker = jb.seed_scene(**{k: v for k, v in moved.items() if k != "slope"}).walker
+        changed = jb.RigidScene(walker=walker, ground=jb.Ground(slope=moved["slope"]))
+        found = jb.find_gait(changed, at, accuracy="tight", **PLAIN)
+        return float(getattr(found.measures, measure))
+
+    for parameter in ("slope", "r", "d", "hip_mass"):
+        if parameter == "hip_mass":
+            one, two, zero = value(parameter, 1e-4), value(parameter, 2e-4), value(parameter, 0.0)
+            expected = (4.0 * one - two - 3.0 * zero) / 2e-4
+        else:
+            expected = (value(parameter, 1e-5) - value(parameter, -1e-5)) / 2e-5
+        place = gait.parameters.index(parameter)
+        got = float(getattr(gait.sensitivities, measure)[place])
+        assert got == pytest.approx(expected, rel=1e-5, abs=1e-6)
+
+
+def test_return_map_and_measures_differentiate():
+    scene = rigid_seed()
+    state = jb.find_gait(scene, **PLAIN).measures.state
+    turn = lambda y, **options: jb.return_map(scene, y, **options)
+    by_lanes = jax.jacfwd(lambda y: turn(y, engine="lanes").state)(state)
+    moved = lambda h: turn(state._replace(omega_2=state.omega_2 + h), accuracy="tight").state
+    difference = (moved(1e-6).omega_1 - moved(-1e-6).omega_1) / 2e-6
+    assert float(by_lanes.omega_1.omega_2) == pytest.approx(float(difference), rel=1e-5)
+    slope = jax.grad(lambda s: jb.gait_measures(s).period)(scene).ground.slope
+    gait = jb.find_gait(scene)
+    expected = gait.sensitivities.period[gait.parameters.index("slope")]
+    assert float(slope) == pytest.approx(float(expected), rel=1e-9)
+
+
+def test_other_sections_are_refused():
+    with pytest.raises(jb.ArgumentError, match="HeelStrike"):
+        jb.find_gait(rigid_seed(), section=jb.MidStance())
+    with pytest.raises(jb.ArgumentError, match="must be a RigidState"):
+        jb.find_gait(rigid_seed(), jb.seed_state())
+
+
+def test_gaits_over_many_slopes_at_once():
+    start = jb.find_gait(rigid_seed(), **PLAIN).measures.state
+    slopes = jnp.linspace(0.015, 0.03, 8)
+    many = jax.vmap(lambda slope: jb.find_gait(rigid_seed_at(slope), start, **PLAIN))(slopes)
+    assert np.all(np.asarray(many.ending) == 0)
+    speeds = np.asarray(many.measures.speed)
+    assert np.all(np.diff(speeds) > 0.0)
+
+
+def rigid_seed_at(slope):
+    return jb.RigidScene(walker=jb.seed_scene().walker, ground=jb.Ground(slope=slope))

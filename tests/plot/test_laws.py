@@ -1,0 +1,94 @@
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import jaxbiped as jb
+from jaxbiped import plot
+from tests.scene.drop import restitutions
+
+SEED = dict(K=1e6, c=2e5, n=1.5, mass=2.0)
+FRICTION = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
+
+
+def _curves(ax):
+    return [np.asarray(line.get_xydata(), float).T for line in ax.lines]
+
+
+def test_forces_at_each_rate():
+    law = jb.HuntCrossley(K=1e6, hysteresis=3.0)
+    figure = plot.normal_law(law, depth=5e-4, rates=(-0.1, 0.2))
+    left, right = figure.axes
+    (depth, slow), (_, fast) = _curves(left)
+    assert depth.max() == pytest.approx(0.5)
+    np.testing.assert_allclose(slow[-1], 1e6 * 5e-4**1.5 * 0.7)
+    np.testing.assert_allclose(fast[-1], 1e6 * 5e-4**1.5 * 1.6)
+    assert [text.get_text() for text in left.get_legend().texts] == ["-0.1 m/s", "0.2 m/s"]
+    for ax in (left, right):
+        assert "(mm)" in ax.get_xlabel()
+        assert "(N)" in ax.get_ylabel()
+
+
+@pytest.mark.parametrize("name", ["kelvin-voigt", "tsuji"])
+def test_the_loop_has_the_area_of_the_energy_lost(name, tmp_path):
+    law, mass, speed = jb.normal_law_like(name, **SEED), 2.0, 0.1
+    figure = plot.normal_law(law, mass=mass, approach_speed=speed)
+    right = figure.axes[1]
+    (expected,) = restitutions(law, [speed], mass=mass)
+    assert f"restitution {expected:.3f}" in right.get_title(loc="left")
+    (depth_in, force_in), (depth_out, force_out) = _curves(right)
+    assert depth_in[-1] == depth_out[0] == pytest.approx(max(depth_in))
+    assert (depth_out[-1], force_out[-1]) == (0.0, 0.0)
+    work = np.trapezoid(force_in, 1e-3 * depth_in) + np.trapezoid(force_out, 1e-3 * depth_out)
+    assert work == pytest.approx(0.5 * mass * speed**2 * (1 - expected**2), rel=1e-2)
+    figure.savefig(tmp_path / "law.png")
+    assert (tmp_path / "law.png").stat().st_size > 5000
+
+
+def test_an_elastic_law_has_one_curve_and_gives_all_back():
+    left, right = plot.normal_law(jb.Hertz(K=1e6)).axes
+    assert len(left.lines) == 1
+    assert right.get_title(loc="left").endswith("restitution 1.000")
+
+
+@pytest.mark.parametrize("name", jb.FRICTION_LAWS)
+def test_friction_over_load_against_slip(name, tmp_path):
+    law = jb.friction_law_like(name, **FRICTION)
+    figure = plot.friction_law(law)
+    (ax,) = figure.axes
+    _, (slip, ratio) = _curves(ax)
+    np.testing.assert_allclose(ratio, law.force(np.full(slip.shape, 20.0), slip) / 20.0, atol=1e-15)
+    np.testing.assert_allclose(slip, -slip[::-1], atol=1e-15)
+    if name not in ("viscous", "frictionless"):
+        # The law's own speed and what lies far beyond are both seen.
+        assert 5e-3 < slip[-1] < 1.0
+        assert 0.05 < np.mean(np.abs(slip) < 1e-4) < 0.5
+    assert "(m/s)" in ax.get_xlabel()
+    assert "(–)" in ax.get_ylabel()
+    figure.savefig(tmp_path / "law.png")
+
+
+def test_a_range_and_axes_may_be_given():
+    figure = plot.friction_law(jb.Viscous(k=3.0))
+    (ax,) = figure.axes
+    assert plot.friction_law(jb.Viscous(k=2.0), fastest=0.3, ax=ax) is figure
+    assert ax.get_xlim() == (-0.3, 0.3)
+    whole = Figure()
+    half, _ = whole.subfigures(1, 2)
+    assert plot.normal_law(jb.Hertz(K=1e6), figure=half) is whole
+
+
+@pytest.mark.parametrize(
+    ("draw", "match"),
+    [
+        (lambda: plot.normal_law(jb.Viscous(k=1.0)), "law = "),
+        (lambda: plot.friction_law(jb.Hertz(K=1.0)), "law = "),
+        (lambda: plot.normal_law(jb.Hertz(K=1.0), depth=0.0), "depth = 0"),
+        (lambda: plot.normal_law(jb.Hertz(K=1.0), mass=-1.0), "mass = -1"),
+        (lambda: plot.normal_law(jb.Hertz(K=1.0), approach_speed=0.0), "approach_speed = 0"),
+        (lambda: plot.friction_law(jb.Viscous(k=1.0), load=0.0), "load = 0"),
+        (lambda: plot.friction_law(jb.Viscous(k=1.0), fastest=-1.0), "fastest = -1"),
+    ],
+)
+def test_bad_arguments_are_named(draw, match):
+    with pytest.raises(jb.ArgumentError, match=f"^{match}"):
+        draw()

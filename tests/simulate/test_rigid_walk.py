@@ -1,0 +1,126 @@
+"""Walks of the rigid walker by both engines."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import jaxbiped as jb
+from tests.rigid_walkers import STABLE, UNSTABLE, rigid_seed, simplest_state, simplest_walker
+
+GAIT = jb.RigidState(
+    *map(jnp.asarray, (0.0, -0.23985297893, 0.23985297893, -1.08917987007, -1.64274847822))
+)
+
+
+@pytest.mark.parametrize("engine", ["lanes", "xla"])
+def test_the_gait_goes_on(engine):
+    walk = jb.rigid_walk(
+        rigid_seed(), GAIT, steps=5, most_arrivals=6, accuracy="tight", engine=engine
+    )
+    assert walk.outcome is jb.Ending.WALKING
+    assert walk.engine == engine
+    times, states = walk.strikes
+    np.testing.assert_allclose(np.diff(np.asarray(times)[:5]), 0.443780329, atol=1e-8)
+    np.testing.assert_allclose(np.diff(np.asarray(states.hip_x)[:5]), 0.190414759, atol=1e-8)
+    np.testing.assert_allclose(np.asarray(states.theta_2)[:5], GAIT.theta_2, atol=1e-8)
+    assert np.isinf(np.asarray(times)[5])
+    assert float(walk.t) == float(times[4])
+
+
+@pytest.mark.parametrize("engine", ["lanes", "xla"])
+def test_endings(engine):
+    def walk(omega, slope=0.02, **options):
+        state = GAIT._replace(omega_2=jnp.asarray(omega))
+        return jb.rigid_walk(rigid_seed(slope), state, engine=engine, **options)
+
+    assert walk(-6.0, steps=5).outcome is jb.Ending.FELL_FORWARD
+    assert walk(0.6, steps=5).outcome is jb.Ending.FELL_BACK
+    assert walk(-0.6, 0.0, steps=5).outcome is jb.Ending.FELL_BACK
+    assert walk(-1.6, steps=5, max_solver_steps=20).outcome is jb.Ending.OUT_OF_STEPS
+    bounded = walk(-1.64274847822, duration=1.0)
+    assert bounded.outcome is jb.Ending.WALKING
+    assert (float(bounded.t), int(bounded.footsteps)) == (1.0, 2)
+
+
+def test_a_walker_that_rests_waits_in_vain():
+    """Feet with a radius above the centre of mass rock for ever: no footstep comes."""
+    walker = jb.Walker(m=1.0, J=0.01, l=0.4, d=0.3, r=0.35)
+    scene = jb.RigidScene(walker=walker, ground=jb.Ground(slope=0.0))
+    state = jb.RigidState(*map(jnp.asarray, (0.0, -0.02, 0.02, 0.0, 0.0)))
+    for engine in ("lanes", "xla"):
+        walk = jb.rigid_walk(scene, state, steps=1, accuracy="fast", engine=engine)
+        assert walk.outcome in (jb.Ending.OUT_OF_STEPS, jb.Ending.WALKING)
+        assert int(walk.footsteps) == 1 or walk.outcome is jb.Ending.OUT_OF_STEPS
+
+
+@settings(deadline=None, max_examples=8)
+@given(st.lists(st.floats(-0.3, 0.3, allow_subnormal=False), min_size=4, max_size=4))
+def test_engines_agree(moves):
+    state = jb.RigidState(GAIT.hip_x, *[leaf + d for leaf, d in zip(GAIT[1:], moves, strict=True)])
+    first, second = (
+        jb.rigid_walk(rigid_seed(), state, steps=2, accuracy="tight", engine=engine)
+        for engine in ("lanes", "xla")
+    )
+    assert first.outcome is second.outcome
+    # A fall is seen at the end of a step, and the steps differ by rounding.
+    atol = 1e-7 if first.outcome is jb.Ending.WALKING else 1e-4
+    np.testing.assert_allclose(np.array(first.state), np.array(second.state), atol=atol)
+
+
+def test_error_follows_the_tolerance():
+    exact = jb.rigid_walk(rigid_seed(), GAIT, steps=4, rtol=1e-12)
+    errors = []
+    for rtol in (1e-4, 1e-6, 1e-8):
+        walk = jb.rigid_walk(rigid_seed(), GAIT, steps=4, rtol=rtol)
+        errors.append(float(np.abs(np.array(walk.state) - np.array(exact.state)).max()))
+    assert errors[0] < 1e-4
+    assert errors[1] < 1e-6
+    assert errors[2] < 1e-8
+    assert errors[2] < errors[1] < errors[0]
+
+
+def test_batches_and_bad_lanes():
+    """A lane that is no number fails alone; the others' bits are those of a single walk."""
+    count = 37
+    omega = GAIT.omega_2 + jnp.linspace(-0.1, 0.1, count)
+    omega = omega.at[5].set(jnp.nan)
+    walk = jax.jit(
+        jax.vmap(
+            lambda w: jb.rigid_walk(rigid_seed(), GAIT._replace(omega_2=w), steps=3, engine="lanes")
+        )
+    )
+    many = walk(omega)
+    codes = np.asarray(many.ending)
+    assert codes[5] == int(jb.Ending.SOLVER_FAILED)
+    assert np.all(np.delete(codes, 5) == 0)
+    alone = jb.rigid_walk(rigid_seed(), GAIT._replace(omega_2=omega[9]), steps=3, engine="lanes")
+    assert float(many.t[9]) == float(alone.t)
+
+
+def test_the_simplest_walkers_gaits_attract_and_repel():
+    scene = simplest_walker(0.009)
+    near = lambda published, d: simplest_state(published[0] + d, published[1])
+    settled = jb.rigid_walk(scene, near(STABLE, 1e-3), steps=60)
+    assert float(settled.state.theta_2) == pytest.approx(STABLE[0], abs=1e-7)
+    left = jb.rigid_walk(scene, near(UNSTABLE, 1e-6), steps=30)
+    assert abs(float(left.state.theta_2) - UNSTABLE[0]) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (dict(), "say how long"),
+        (dict(steps=0), "steps = 0"),
+        (dict(duration=-1.0), "duration = -1"),
+        (dict(steps=1, accuracy="best"), "accuracy = 'best'"),
+        (dict(steps=1, rtol=0.0), "rtol = 0"),
+        (dict(steps=1, engine="gpu"), "engine = 'gpu'"),
+        (dict(steps=1, max_solver_steps=0), "max_solver_steps = 0"),
+    ],
+)
+def test_bad_arguments(options, said):
+    with pytest.raises(jb.ArgumentError, match=said):
+        jb.rigid_walk(rigid_seed(), GAIT, **options)
