@@ -13,6 +13,7 @@ import jax as _jax
 _jax.config.update("jax_enable_x64", True)
 
 from jaxbiped._checks import ArgumentError as ArgumentError
+from jaxbiped.dynamics._bristles import BristleState as BristleState
 from jaxbiped.dynamics._energy import Energies as Energies
 from jaxbiped.dynamics._energy import Powers as Powers
 from jaxbiped.dynamics._energy import energies as energies
@@ -81,10 +82,12 @@ from jaxbiped.scene._catalogue import FRICTION_LAWS as FRICTION_LAWS
 from jaxbiped.scene._catalogue import NORMAL_LAWS as NORMAL_LAWS
 from jaxbiped.scene._catalogue import friction_law_like as friction_law_like
 from jaxbiped.scene._catalogue import normal_law_like as normal_law_like
+from jaxbiped.scene._bristle_law import AbstractBristleLaw as AbstractBristleLaw
 from jaxbiped.scene._clearance import AbstractClearance as AbstractClearance
 from jaxbiped.scene._clearance import AlwaysTouching as AlwaysTouching
 from jaxbiped.scene._clearance import StanceRotation as StanceRotation
 from jaxbiped.scene._coulomb import RegularisedCoulomb as RegularisedCoulomb
+from jaxbiped.scene._dahl import Dahl as Dahl
 from jaxbiped.scene._frictionless import Frictionless as Frictionless
 from jaxbiped.scene._ground import Ground as Ground
 from jaxbiped.scene._hertz import Hertz as Hertz
@@ -96,6 +99,7 @@ from jaxbiped.scene._law import AbstractFrictionLaw as AbstractFrictionLaw
 from jaxbiped.scene._law import AbstractNormalLaw as AbstractNormalLaw
 from jaxbiped.scene._restitution import RESTITUTION_FORMULAS as RESTITUTION_FORMULAS
 from jaxbiped.scene._rigid_scene import RigidScene as RigidScene
+from jaxbiped.scene._lugre import LuGre as LuGre
 from jaxbiped.scene._ristow_schafer import RistowSchafer as RistowSchafer
 from jaxbiped.scene._scene import Scene as Scene
 from jaxbiped.scene._seed import seed_scene as seed_scene

@@ -15,7 +15,6 @@ from jaxbiped._checks import check_choice
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
-from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._search import Search
@@ -137,7 +136,9 @@ def _parts(value: complex) -> list[float]:
 
 def _by_parameter(parameters: tuple[str, ...], values: Measures) -> dict[str, dict[str, float]]:
     columns = {name: np.asarray(getattr(values, field)) for field, name in _UNITS.items()}
-    columns |= {f"state.{name}": np.asarray(getattr(values.state, name)) for name in State._fields}
+    columns |= {
+        f"state.{name}": np.asarray(getattr(values.state, name)) for name in values.state._fields
+    }
     return {
         parameter: {name: float(column[k]) for name, column in columns.items()}
         for k, parameter in enumerate(parameters)

@@ -20,6 +20,7 @@ class Foot(NamedTuple):
         penetration_rate: δ̇ = −vz [m/s].
         slip_speed: V_T = vx + r θ̇, tangential velocity of the material point in contact [m/s].
         admitted: whether the clearance rule lets the foot touch (boolean), None for "always".
+        bristle: see `AbstractBristleLaw` [–]; None where friction has no memory.
     """
 
     x: Scalar
@@ -30,6 +31,7 @@ class Foot(NamedTuple):
     penetration_rate: Scalar
     slip_speed: Scalar
     admitted: Scalar | None
+    bristle: Scalar | None
 
 
 class Feet(NamedTuple):
@@ -42,12 +44,12 @@ class Feet(NamedTuple):
 def feet(scene: Scene, state: State) -> Feet:
     """Both feet's kinematics (model: foot centre O = S + (l − r)(sin θ, −cos θ))."""
     return Feet(
-        _foot(scene, state, state.theta_1, state.omega_1),
-        _foot(scene, state, state.theta_2, state.omega_2),
+        _foot(scene, state, state.theta_1, state.omega_1, getattr(state, "bristle_1", None)),
+        _foot(scene, state, state.theta_2, state.omega_2, getattr(state, "bristle_2", None)),
     )
 
 
-def _foot(scene: Scene, state: State, angle: Scalar, rate: Scalar) -> Foot:
+def _foot(scene: Scene, state: State, angle: Scalar, rate: Scalar, bristle: Scalar | None) -> Foot:
     length, radius = scene.walker.hip_to_foot, scene.walker.r
     sine, cosine = sine_cosine(angle)
     x = state.hip_x + length * sine
@@ -63,6 +65,7 @@ def _foot(scene: Scene, state: State, angle: Scalar, rate: Scalar) -> Foot:
         penetration_rate=-vz,
         slip_speed=vx + radius * rate,
         admitted=scene.clearance.admits(rate),
+        bristle=bristle,
     )
 
 

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._state import State
+from jaxbiped.scene._bristle_law import AbstractBristleLaw
 from jaxbiped.scene._frictionless import Frictionless
 from jaxbiped.scene._scene import Scene
 
@@ -30,6 +31,9 @@ def foot_force(scene: Scene, foot: Foot) -> FootForce:
         normal = jnp.where(foot.admitted, normal, 0.0)
     if isinstance(scene.friction, Frictionless):
         return FootForce(normal, None)
+    if isinstance(scene.friction, AbstractBristleLaw):
+        assert foot.bristle is not None
+        return FootForce(normal, scene.friction.force(normal, foot.slip_speed, foot.bristle))
     return FootForce(normal, scene.friction.force(normal, foot.slip_speed))
 
 

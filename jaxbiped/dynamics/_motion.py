@@ -9,6 +9,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._forces import foot_force
 from jaxbiped.dynamics._state import State
+from jaxbiped.scene._bristle_law import AbstractBristleLaw
 from jaxbiped.scene._scene import Scene
 
 
@@ -95,10 +96,23 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
     )
 
 
+def _bristle_rates(law: AbstractBristleLaw, scene: Scene, state: State) -> dict[str, Scalar]:
+    rates = {}
+    for name, foot in zip(("bristle_1", "bristle_2"), feet(scene, state), strict=True):
+        assert foot.bristle is not None
+        load = foot_force(scene, foot).normal
+        rates[name] = law.bristle_rate(load, foot.slip_speed, foot.bristle)
+    return rates
+
+
 def vector_field(t: Any, state: State, scene: Scene) -> State:
     """Time derivative of the state, in the form that `diffrax.ODETerm` takes."""
     second = accelerations(scene, state)
-    return State(
+    memory = {}
+    if isinstance(scene.friction, AbstractBristleLaw):
+        memory = _bristle_rates(scene.friction, scene, state)
+    return type(state)(
+        **memory,
         hip_x=state.hip_vx,
         hip_z=state.hip_vz,
         theta_1=state.omega_1,

@@ -51,29 +51,28 @@ def seed_state() -> State:
     )
 
 
-def exchange_legs(state: State) -> State:
-    """The same motion with the names of the two legs exchanged."""
-    return state._replace(
-        theta_1=state.theta_2,
-        theta_2=state.theta_1,
-        omega_1=state.omega_2,
-        omega_2=state.omega_1,
-    )
+def exchange_legs(state: Any) -> Any:
+    """The same motion with the names of the two legs exchanged; of a state of any kind."""
+    swapped = {}
+    for name in state._fields:
+        twin = name[:-1] + {"1": "2", "2": "1"}.get(name[-1], name[-1])
+        swapped[name] = getattr(state, twin)
+    return state._replace(**swapped)
 
 
-def checked_state(state: Any, kind: type = State) -> Any:
+def checked_state(state: Any, kind: type = State, name: str = "state") -> Any:
     """`state` with every leaf a floating-point array of one shape.
 
     Raises:
         ArgumentError: not a `kind`, an entry that is not finite, or leaves of different shapes.
     """
-    check_type("state", state, kind)
-    for name, value in state._asdict().items():
-        check_finite(f"state.{name}", value)
+    check_type(name, state, kind)
+    for field, value in state._asdict().items():
+        check_finite(f"{name}.{field}", value)
     leaves = [as_float(value) for value in state]
     shapes = {leaf.shape for leaf in leaves}
     if len(shapes) > 1:
         raise ArgumentError(
-            f"state has leaves of shapes {sorted(shapes)}: all of them must have the same shape."
+            f"{name} has leaves of shapes {sorted(shapes)}: all of them must have the same shape."
         )
     return kind(*leaves)

@@ -14,6 +14,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._types import as_float
+from jaxbiped.dynamics._bristles import state_for
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State, checked_state
@@ -89,8 +90,7 @@ def find_gait(
     if int(period) != period:
         raise ArgumentError(f"period = {period} is not allowed: it must be a whole number.")
     rigid = isinstance(scene, RigidScene)
-    own = RigidState if rigid else State
-    start = checked_state(seed_start(scene) if guess is None else guess, own)
+    start = _checked_start(scene, seed_start(scene) if guess is None else guess)
     if jnp.ndim(start.hip_x) != 0:
         raise ArgumentError(
             f"guess has leaves of shape {jnp.shape(start.hip_x)}: give one state, and use jax.vmap "
@@ -120,6 +120,12 @@ def find_gait(
         residual=_RESIDUAL_SHARE * precision.rtol,
     )
     return _find(turning, scene, start, precision, how, names, active, radius_sensitivities)
+
+
+def _checked_start(scene: Scene | RigidScene, start: Any) -> Any:
+    if isinstance(scene, RigidScene):
+        return checked_state(start, RigidState, "guess")
+    return state_for(scene, start, "guess")
 
 
 @functools.cache  # the same object each time, so that nothing is compiled again

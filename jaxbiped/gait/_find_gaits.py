@@ -10,6 +10,7 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_positive, check_type
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._bristles import state_for
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
@@ -127,7 +128,7 @@ def rolling_starts(
         return RigidState(jnp.zeros_like(theta_1), theta_1, theta_2, omega_1, omega_2)
     depth = standing_height(scene, middle.theta_2) - middle.hip_z
     reach = scene.walker.hip_to_foot
-    return State(
+    plain = State(
         hip_x=jnp.zeros_like(theta_1),
         hip_z=standing_height(scene, theta_2, depth),
         theta_1=theta_1,
@@ -137,3 +138,4 @@ def rolling_starts(
         omega_1=omega_1,
         omega_2=omega_2,
     )
+    return state_for(scene, plain)

@@ -71,7 +71,7 @@ def at_steps(
 def applied(scene: Scene, state: State, function: Callable[[Scene, State], PyTree]) -> PyTree:
     """`function(scene, state)` at states with leaves of shape (n,), as NumPy arrays."""
     size = len(state.hip_x)
-    states = State(*[jnp.asarray(_padded(np.asarray(leaf))) for leaf in state])
+    states = type(state)(*[jnp.asarray(_padded(np.asarray(leaf))) for leaf in state])
     values = _apply(function, _as_arrays(scene), states)
     return jax.tree_util.tree_map(lambda leaf: np.asarray(leaf)[:size], values)
 

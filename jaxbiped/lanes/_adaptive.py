@@ -10,6 +10,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._bristles import state_type
 from jaxbiped.dynamics._motion import vector_field
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State, exchange_legs
@@ -282,8 +283,9 @@ def _numbers(values: PyTree) -> PyTree:
     return jtu.tree_map(lambda x: jnp.asarray(x, dtype=jnp.float64), values)
 
 
-def shapes_of(scene: PyTree) -> Solve:
+def shapes_of(scene: Scene) -> Solve:
     """The shapes of one simulation's inputs, for a scene of these laws."""
     number: Any = jax.ShapeDtypeStruct((), jnp.float64)
     scene = jtu.tree_map(lambda _: number, scene)
-    return Solve(scene, State(*[number] * 8), *[number] * 7)
+    kind = state_type(scene)
+    return Solve(scene, kind(*[number] * len(kind._fields)), *[number] * 7)

@@ -63,7 +63,7 @@ def solved(solve: Solve, setting: Setting) -> Solved:
     if not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
         compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
         return call(compiled, solve, quick=setting.quick)[0]
-    return Solved(*_unflat(_differentiable(setting, structure)(*leaves)))
+    return Solved(*_unflat(solve.state, _differentiable(setting, structure)(*leaves)))
 
 
 def solved_and_saved(
@@ -102,7 +102,7 @@ def _differentiable(setting: Setting, structure: Any) -> Callable[..., list[Scal
         found = run(*primals)
         solve = jtu.tree_unflatten(structure, primals)
         moved = jtu.tree_unflatten(structure, tangents)
-        t, state, *counts = _unflat(found)
+        t, state, *counts = _unflat(solve.state, found)
         t_dot, state_dot = _tangents(setting, solve, moved, t, state)
         none = [np.zeros(jnp.shape(count), dtype=jax.dtypes.float0) for count in counts]
         return found, [t_dot, *state_dot, *none]
@@ -111,10 +111,10 @@ def _differentiable(setting: Setting, structure: Any) -> Callable[..., list[Scal
     return run
 
 
-def _unflat(found: Sequence[Scalar]) -> tuple[Any, ...]:
+def _unflat(like: Any, found: Sequence[Scalar]) -> tuple[Any, ...]:
     t, *rest = found
-    size = len(State._fields)
-    return t, State(*rest[:size]), *rest[size:]
+    size = len(like)
+    return t, type(like)(*rest[:size]), *rest[size:]
 
 
 def _tangents(

@@ -109,7 +109,7 @@ def friction_law(
 
 
 def _telling_rates(law: AbstractNormalLaw, depth: float) -> list[float]:
-    at = (jnp.asarray(depth), jnp.asarray(0.0))
+    at = (jnp.asarray(float(depth)), jnp.asarray(0.0))
     force, damper = float(law.force(*at)), float(jax.grad(law.force, 1)(*at))
     return [part * force / damper for part in (-0.5, 0.0, 0.5, 1.0)] if damper > 0.0 else [0.0]
 
@@ -149,24 +149,18 @@ def _draw_drop(ax: Axes, law: AbstractNormalLaw, mass: float, speed: float) -> N
 
 def _drop(law: AbstractNormalLaw, mass: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
     """Penetration and its rate at the steps of a drop, from touchdown until the mass is out."""
-
-    def field(t: Any, y: Any, args: Any) -> Any:
-        return y[1], -law.force(*y) / mass
-
-    def out(t: Any, y: Any, args: Any, **rest: Any) -> Any:
-        return (y[0] < 0.0) | ((y[1] < 0.0) & (law.force(*y) <= 0.0))
-
     solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(field),
+        diffrax.ODETerm(_fall),
         diffrax.Tsit5(),
         t0=0.0,
         t1=_LONGEST,
         dt0=1e-7,
         # A hair inside, on the side where the force acts.
-        y0=(jnp.asarray(1e-12), jnp.asarray(speed)),
+        y0=(jnp.asarray(1e-12), jnp.asarray(float(speed))),
+        args=(law, jnp.asarray(float(mass))),
         stepsize_controller=diffrax.PIDController(rtol=1e-9, atol=1e-13),
         saveat=diffrax.SaveAt(t0=True, steps=True),
-        event=diffrax.Event(out),
+        event=diffrax.Event(_is_out),
         max_steps=_MOST_STEPS,
         throw=False,
     )
@@ -174,6 +168,15 @@ def _drop(law: AbstractNormalLaw, mass: float, speed: float) -> tuple[np.ndarray
     depth, rate = (np.asarray(part) for part in solution.ys)
     saved = np.isfinite(depth)
     return np.maximum(depth[saved], 0.0), rate[saved]
+
+
+def _fall(t: Any, y: Any, args: Any) -> Any:
+    law, mass = args
+    return y[1], -law.force(*y) / mass
+
+
+def _is_out(t: Any, y: Any, args: Any, **rest: Any) -> Any:
+    return (y[0] < 0.0) | ((y[1] < 0.0) & (args[0].force(*y) <= 0.0))
 
 
 def _mark_speeds(ax: Axes, bend: float, end: float) -> None:
@@ -195,7 +198,7 @@ def _own_speed(law: AbstractFrictionLaw, load: float) -> float:
 
 
 def _per_load(law: AbstractFrictionLaw, load: float, slip: np.ndarray) -> np.ndarray:
-    return np.asarray(law.force(jnp.full(slip.shape, load), jnp.asarray(slip))) / load
+    return np.asarray(law.force(jnp.full(slip.shape, float(load)), jnp.asarray(slip))) / load
 
 
 def _name(law: Any) -> str:

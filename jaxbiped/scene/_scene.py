@@ -3,6 +3,7 @@
 import equinox as eqx
 
 from jaxbiped._checks import check_type
+from jaxbiped.scene._bristle_law import AbstractBristleLaw
 from jaxbiped.scene._clearance import AbstractClearance, StanceRotation
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._law import AbstractFrictionLaw, AbstractNormalLaw
@@ -20,7 +21,7 @@ class Scene(eqx.Module):
         walker: masses and lengths.
         ground: slope and gravity.
         normal: law of the normal force.
-        friction: law of the tangential force.
+        friction: law of the tangential force; with bristles, states are `BristleState`s.
         clearance: which foot may touch.
 
     Raises:
@@ -30,12 +31,12 @@ class Scene(eqx.Module):
     walker: Walker
     ground: Ground
     normal: AbstractNormalLaw
-    friction: AbstractFrictionLaw
+    friction: AbstractFrictionLaw | AbstractBristleLaw
     clearance: AbstractClearance = StanceRotation()
 
     def __check_init__(self) -> None:
         check_type("walker", self.walker, Walker)
         check_type("ground", self.ground, Ground)
         check_type("normal", self.normal, AbstractNormalLaw)
-        check_type("friction", self.friction, AbstractFrictionLaw)
+        check_type("friction", self.friction, AbstractFrictionLaw, AbstractBristleLaw)
         check_type("clearance", self.clearance, AbstractClearance)

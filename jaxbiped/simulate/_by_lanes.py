@@ -9,7 +9,6 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._state import State
 from jaxbiped.lanes._adaptive import Saved, Solve
 from jaxbiped.lanes._end_of_solve import almost
 from jaxbiped.lanes._solve import Setting, compiled_solve, solved, solved_and_saved
@@ -42,7 +41,8 @@ def by_lanes(run: "Simulation") -> Trajectory:
         # As diffrax has it: infinite where the solve ended before.
         reached = jnp.arange(recorded.values.shape[0]) < recorded.counts
         values = jnp.where(reached[:, None], recorded.values, jnp.inf)
-        t, state = values[:, 0], State(*[values[:, 1 + i] for i in range(len(State._fields))])
+        t = values[:, 0]
+        state = type(run.state)(*[values[:, 1 + i] for i in range(len(run.state))])
     return Trajectory(
         t=t,
         state=state,

@@ -12,9 +12,10 @@ from jaxtyping import Array, PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._bristles import state_for
 from jaxbiped.dynamics._motion import vector_field
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import State, checked_state
+from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._by_lanes import by_lanes, prepared_lanes
 from jaxbiped.simulate._engine import chosen_engine
@@ -53,7 +54,8 @@ def simulate(
 
     Args:
         scene: what to simulate.
-        state: start, eight scalar leaves. Their dtype is the precision of the solve: 64 bits
+        state: start, a `State`; where friction has bristles also a `BristleState`, for their
+            part (zero unless given). Its dtype is the precision of the solve: 64 bits
             unless the user says otherwise.
         duration: simulated time [s].
         steps: footsteps (heel strikes) after which to end.
@@ -142,7 +144,7 @@ class Simulation(eqx.Module):
     ) -> "Simulation":
         """Checks the arguments, which are those of `simulate`."""
         check_type("scene", scene, Scene)
-        state = checked_state(state)
+        state = state_for(scene, state)
         if duration is None and steps is None:
             raise ArgumentError("duration = None and steps = None: say how long to simulate.")
         if steps is not None:

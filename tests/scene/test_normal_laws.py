@@ -172,7 +172,7 @@ def _from_weight(kind, ratio, n, **standing):
 
 @pytest.mark.parametrize("kind", SOME)
 def test_from_weight_realises_penetration_and_damping_ratio(kind):
-    @settings(deadline=None, max_examples=25)
+    @settings(deadline=None, max_examples=15)
     @given(
         numbers(0.1, 100.0), numbers(1e-6, 1e-2), numbers(0.0, 30.0), numbers(1.0, 2.0), st.data()
     )
