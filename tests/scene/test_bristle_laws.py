@@ -123,13 +123,13 @@ def test_exchanging_legs_exchanges_bristles():
 def test_engines_agree_and_bristles_straighten_in_the_swing():
     scene = with_law(LUGRE)
     lanes, xla = (
-        jb.simulate(scene, jb.seed_state(), duration=0.4, rtol=1e-8, save="end", engine=engine)
+        jb.simulate(scene, jb.seed_state(), duration=0.7, rtol=1e-8, save="end", engine=engine)
         for engine in ("lanes", "xla")
     )
     np.testing.assert_allclose(np.array(lanes.state), np.array(xla.state), atol=2e-6)
-    # Leg 1 has come down by then.
+    # Leg 1 came down, and leg 2 has swung for a third of a second.
     assert abs(float(lanes.state.bristle_1[0])) > 1e-2
-    assert abs(float(lanes.state.bristle_2[0])) < 1e-3
+    assert abs(float(lanes.state.bristle_2[0])) < 1e-5
 
 
 def test_the_gait_on_bristles_is_the_seeds_but_for_their_give():
