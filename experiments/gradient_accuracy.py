@@ -15,7 +15,7 @@ from _options import Options, parse
 
 import jaxbiped as jb
 from jaxbiped.gait._orbit import slopes_of
-from jaxbiped.gait._parameters import chosen_parameters
+from jaxbiped.scene._parameters import chosen_parameters
 from jaxbiped.gait._stability import stability_of
 from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with, turn
 from jaxbiped.solve._passage import Precision

@@ -52,7 +52,8 @@ from jaxbiped.gait._gradient import Implicit as Implicit
 from jaxbiped.gait._gradient import Reverse as Reverse
 from jaxbiped.gait._ledger import EnergyLedger as EnergyLedger
 from jaxbiped.gait._ledger import energy_ledger as energy_ledger
-from jaxbiped.gait._parameters import parameter_names as parameter_names
+from jaxbiped.scene._parameters import parameter_names as parameter_names
+from jaxbiped.scene._parameters import with_parameters as with_parameters
 from jaxbiped.gait._return_map import Return as Return
 from jaxbiped.gait._return_map import return_map as return_map
 from jaxbiped.gait._search import Search as Search
@@ -76,6 +77,7 @@ from jaxbiped.gait._system import Rolling as Rolling
 from jaxbiped.gait._system import Walking as Walking
 from jaxbiped.scene._ambrosio import Ambrosio as Ambrosio
 from jaxbiped.scene._andersson import Andersson as Andersson
+from jaxbiped.lanes._count import operation_counts as operation_counts
 from jaxbiped.scene._bengisu_akay import BengisuAkay as BengisuAkay
 from jaxbiped.scene._brown_mcphee import BrownMcPhee as BrownMcPhee
 from jaxbiped.scene._catalogue import FRICTION_LAWS as FRICTION_LAWS
@@ -85,6 +87,7 @@ from jaxbiped.scene._catalogue import normal_law_like as normal_law_like
 from jaxbiped.scene._bristle_law import AbstractBristleLaw as AbstractBristleLaw
 from jaxbiped.scene._clearance import AbstractClearance as AbstractClearance
 from jaxbiped.scene._clearance import AlwaysTouching as AlwaysTouching
+from jaxbiped.scene._clearance import OneFoot as OneFoot
 from jaxbiped.scene._clearance import StanceRotation as StanceRotation
 from jaxbiped.scene._coulomb import RegularisedCoulomb as RegularisedCoulomb
 from jaxbiped.scene._dahl import Dahl as Dahl
@@ -95,6 +98,7 @@ from jaxbiped.scene._hertz import hertz_stiffness as hertz_stiffness
 from jaxbiped.scene._hunt_crossley import HuntCrossley as HuntCrossley
 from jaxbiped.scene._kelvin_voigt import KelvinVoigt as KelvinVoigt
 from jaxbiped.scene._kuwabara_kono import KuwabaraKono as KuwabaraKono
+from jaxbiped.scene._ladder import ladder as ladder
 from jaxbiped.scene._law import AbstractFrictionLaw as AbstractFrictionLaw
 from jaxbiped.scene._law import AbstractNormalLaw as AbstractNormalLaw
 from jaxbiped.scene._restitution import RESTITUTION_FORMULAS as RESTITUTION_FORMULAS

@@ -90,11 +90,13 @@ def check_within(
     )
 
 
-def check_choice(name: str, value: Any, allowed: Iterable[str]) -> None:
-    """Raises `ArgumentError` unless `value` is one of the `allowed` names."""
+def check_choice(name: str, value: Any, allowed: Iterable[Any]) -> None:
+    """Raises `ArgumentError` unless `value` is one of the `allowed` names or numbers."""
     names = list(allowed)
     if value not in names:
-        raise ArgumentError(f"{name} = {value!r} is not known: choose one of {', '.join(names)}.")
+        raise ArgumentError(
+            f"{name} = {value!r} is not known: choose one of {', '.join(map(str, names))}."
+        )
 
 
 def check_type(name: str, value: Any, *kinds: type) -> None:

@@ -8,11 +8,13 @@ from tyro.conf import subcommand
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.cli._gait import FindGait
+from jaxbiped.cli._models import Models
 from jaxbiped.cli._walk import Walk
 
 _Command = (
     Annotated[Walk, subcommand("walk")]
     | Annotated[FindGait, subcommand("gait")]
+    | Annotated[Models, subcommand("models")]
     | Annotated[None, subcommand("version")]
 )
 

@@ -14,11 +14,13 @@ from jaxbiped import _clock
 from jaxbiped._checks import check_choice
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
+from jaxbiped.dynamics._rigid_checks import rigid_checks
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._search import Search
 from jaxbiped.gait._stability import Bifurcation
+from jaxbiped.scene._rigid_scene import RigidScene
 
 _SECTIONS: dict[str, type[AbstractSection]] = {"mid-stance": MidStance, "heel-strike": HeelStrike}
 _UNITS = {
@@ -49,18 +51,20 @@ class FindGait:
     """How accurately to solve: balanced or tight."""
     period: int = 1
     """Footsteps in a cycle."""
-    section: str = "mid-stance"
-    """Where a cycle begins: mid-stance or heel-strike."""
+    section: str | None = None
+    """Where a cycle begins: mid-stance (the usual one) or heel-strike (a rigid walker's)."""
     engine: str = "auto"
     """What computes: xla, lanes, or auto for the faster one that can."""
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
         imported = time.perf_counter()
-        scene, state = self.scene.scene(), self.start.state()
-        check_choice("section", self.section, _SECTIONS)
+        scene = self.scene.scene()
+        state = self.start.state(scene)
+        if self.section is not None:
+            check_choice("section", self.section, _SECTIONS)
         self.output.check()
-        section = _SECTIONS[self.section]()
+        section = None if self.section is None else _SECTIONS[self.section]()
         gait = find_gait(
             scene,
             state,
@@ -75,9 +79,12 @@ class FindGait:
             "total": time.perf_counter() - _clock.IMPORT_BEGAN,
         }
         numbers = gait_numbers(gait) | {"wall_s": wall}
+        if found and isinstance(scene, RigidScene):
+            numbers["assumptions"] = _assumptions(scene, gait)
         report = Report(self.output.json)
         if found:
             _print(report, numbers, gait)
+            report.say(_assumed(numbers.get("assumptions")))
         else:
             report.say(_failure(numbers, gait))
         if found and self.output.out is not None:
@@ -152,6 +159,31 @@ def _finite(thing: Any) -> Any:
     if isinstance(thing, list):
         return [_finite(value) for value in thing]
     return None if isinstance(thing, float) and not math.isfinite(thing) else thing
+
+
+def _assumptions(scene: RigidScene, gait: Gait) -> dict[str, float]:
+    """What the gait asks of real feet: where it would slip, fly or scuff."""
+    checks = rigid_checks(scene, gait.orbit[1])
+    return {
+        "needed_friction": float(checks.needed_friction.max()),
+        "impact_friction": float(checks.impact_friction),
+        "least_normal_N": float(checks.normal.min()),
+        "lowest_clearance_m": float(checks.clearance.min()),
+        "lifting_m_s": float(checks.lifting),
+    }
+
+
+def _assumed(known: dict[str, float] | None) -> str:
+    if known is None:
+        return ""
+    flies = "would fly" if known["least_normal_N"] <= 0.0 else "stays down"
+    held = "leaves the ground" if known["lifting_m_s"] >= 0.0 else "would be held by the ground"
+    return (
+        f"a real foot needs a friction coefficient of {known['needed_friction']:.3f} to roll and "
+        f"{known['impact_friction']:.3f} at the impact; it {flies} (least force "
+        f"{known['least_normal_N']:.2f} N); the trailing foot {held}; the swing foot's lowest "
+        f"clearance is {1e3 * known['lowest_clearance_m']:.3f} mm"
+    )
 
 
 def _failure(numbers: dict[str, Any], gait: Gait) -> str:

@@ -11,9 +11,13 @@ from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
 from jaxbiped.cli._report import Report, table
+from jaxbiped.cli._rigid_walk import run_rigid_walk
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, SolveOptions, StartOptions
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import State
 from jaxbiped.gait._footsteps import Footsteps, footsteps
 from jaxbiped.gait._ledger import energy_ledger
+from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import Simulation
 from jaxbiped.solve._ending import Ending
@@ -44,7 +48,12 @@ class Walk:
     def run(self) -> int:
         """Runs the command; returns the exit code."""
         imported = time.perf_counter()
-        scene, state = self.scene.scene(), self.start.state()
+        scene = self.scene.scene()
+        state = self.start.state(scene)
+        if isinstance(scene, RigidScene):
+            assert isinstance(state, RigidState)
+            return run_rigid_walk(scene, state, self.solve, self.output)
+        assert isinstance(state, State)
         request = Simulation.prepare(
             scene,
             state,

@@ -1,13 +1,30 @@
-"""Options of `jaxbiped walk`: every parameter of the seed's scene by its paper name."""
+"""Options of `jaxbiped walk` and `gait`: the model, its laws and their parameters."""
 
 import dataclasses
+from collections.abc import Iterable
 from inspect import signature
 from pathlib import Path
 
-from jaxbiped._checks import check_writable_directory, check_writable_file
+from jaxbiped._checks import (
+    ArgumentError,
+    check_choice,
+    check_writable_directory,
+    check_writable_file,
+)
+from jaxbiped.dynamics._rigid_state import RigidState, rigid_state
 from jaxbiped.dynamics._state import State, checked_state, seed_state
+from jaxbiped.scene._catalogue import (
+    FRICTION_LAWS,
+    NORMAL_LAWS,
+    friction_law_like,
+    normal_law_like,
+)
+from jaxbiped.scene._ground import Ground
+from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene._walker import Walker
 
 _SEED = {
     parameter.name: parameter.default for parameter in signature(seed_scene).parameters.values()
@@ -15,9 +32,22 @@ _SEED = {
 _START = {name: float(value) for name, value in seed_state()._asdict().items()}
 
 
+MODELS = ("compliant", "rigid")
+_OF_CONTACT = ("n", "K", "c", "mu_static", "mu_kinetic", "v0", "xi")
+
+
 @dataclasses.dataclass(frozen=True)
 class SceneOptions:
-    """Parameters of the seed's scene (SI units)."""
+    """What is modelled: the seed's scene with its parameters by their paper names (SI units)."""
+
+    model: str = "compliant"
+    """compliant, or rigid: feet that roll without slip and strike without rebound."""
+    normal: str = "ristow-schafer"
+    """Law of the normal force (see jaxbiped models), matched to K, c and n under the weight."""
+    friction: str = "bengisu-akay"
+    """Law of friction, matched to mu-static, mu-kinetic, v0 and xi."""
+    set: tuple[str, ...] = ()
+    """Any parameters by name, as name=value, after the laws were matched."""
 
     slope: float = _SEED["slope"]
     """Angle of the slope, downhill positive [rad]."""
@@ -50,9 +80,55 @@ class SceneOptions:
     xi: float = _SEED["xi"]
     """Stribeck rate [s/m]."""
 
-    def scene(self) -> Scene:
-        """The scene that these parameters describe; raises `ArgumentError`."""
-        return seed_scene(**dataclasses.asdict(self))
+    def scene(self) -> Scene | RigidScene:
+        """The scene that these options describe; raises `ArgumentError`."""
+        check_choice("model", self.model, MODELS)
+        scene = self._rigid() if self.model == "rigid" else self._compliant()
+        return with_parameters(scene, dict(_named_value(text) for text in self.set))
+
+    def _compliant(self) -> Scene:
+        own = seed_scene(**{name: getattr(self, name) for name in _SEED})
+        normal = normal_law_like(
+            _known("normal", self.normal, NORMAL_LAWS),
+            K=self.K,
+            c=self.c,
+            n=self.n,
+            mass=own.walker.total_mass,
+            g=self.g,
+        )
+        friction = friction_law_like(
+            _known("friction", self.friction, FRICTION_LAWS),
+            mu_static=self.mu_static,
+            mu_kinetic=self.mu_kinetic,
+            v0=self.v0,
+            xi=self.xi,
+        )
+        return dataclasses.replace(own, normal=normal, friction=friction)
+
+    def _rigid(self) -> RigidScene:
+        usual = SceneOptions()
+        for name in ("normal", "friction", *_OF_CONTACT):
+            value = getattr(self, name)
+            if value != getattr(usual, name):
+                raise ArgumentError(
+                    f'{name} = {value} is not allowed with model = "rigid": its feet have no laws '
+                    "of contact."
+                )
+        body = {name: getattr(self, name) for name in ("m", "J", "l", "d", "r", "hip_mass")}
+        return RigidScene(walker=Walker(**body), ground=Ground(slope=self.slope, g=self.g))
+
+
+def _known(name: str, value: str, known: Iterable[str]) -> str:
+    check_choice(name, value, known)
+    return value
+
+
+def _named_value(text: str) -> tuple[str, float]:
+    name, _, value = text.partition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise ArgumentError(f"set = {text!r} is not allowed: write name=value.") from None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,9 +152,13 @@ class StartOptions:
     omega_2: float = _START["omega_2"]
     """Rate of leg 2 [rad/s]."""
 
-    def state(self) -> State:
-        """The start; raises `ArgumentError`."""
-        return checked_state(State(**dataclasses.asdict(self)))
+    def state(self, scene: Scene | RigidScene) -> State | RigidState:
+        """The start, of the kind that the scene needs; raises `ArgumentError`.
+
+        A rigid walker takes the place and the legs' angles and rates.
+        """
+        whole = checked_state(State(**dataclasses.asdict(self)))
+        return rigid_state(whole) if isinstance(scene, RigidScene) else whole
 
 
 @dataclasses.dataclass(frozen=True)

@@ -19,7 +19,8 @@ class Foot(NamedTuple):
         penetration: δ = r − z, positive when indented [m].
         penetration_rate: δ̇ = −vz [m/s].
         slip_speed: V_T = vx + r θ̇, tangential velocity of the material point in contact [m/s].
-        admitted: whether the clearance rule lets the foot touch (boolean), None for "always".
+        admitted: whether the clearance rule lets the foot touch (boolean), None for "always",
+            Python's False for "never".
         bristle: see `AbstractBristleLaw` [–]; None where friction has no memory.
     """
 
@@ -30,7 +31,7 @@ class Foot(NamedTuple):
     penetration: Scalar
     penetration_rate: Scalar
     slip_speed: Scalar
-    admitted: Scalar | None
+    admitted: Scalar | bool | None
     bristle: Scalar | None
 
 
@@ -44,12 +45,14 @@ class Feet(NamedTuple):
 def feet(scene: Scene, state: State) -> Feet:
     """Both feet's kinematics (model: foot centre O = S + (l − r)(sin θ, −cos θ))."""
     return Feet(
-        _foot(scene, state, state.theta_1, state.omega_1, getattr(state, "bristle_1", None)),
-        _foot(scene, state, state.theta_2, state.omega_2, getattr(state, "bristle_2", None)),
+        _foot(scene, state, 1, state.theta_1, state.omega_1, getattr(state, "bristle_1", None)),
+        _foot(scene, state, 2, state.theta_2, state.omega_2, getattr(state, "bristle_2", None)),
     )
 
 
-def _foot(scene: Scene, state: State, angle: Scalar, rate: Scalar, bristle: Scalar | None) -> Foot:
+def _foot(
+    scene: Scene, state: State, leg: int, angle: Scalar, rate: Scalar, bristle: Scalar | None
+) -> Foot:
     length, radius = scene.walker.hip_to_foot, scene.walker.r
     sine, cosine = sine_cosine(angle)
     x = state.hip_x + length * sine
@@ -64,7 +67,7 @@ def _foot(scene: Scene, state: State, angle: Scalar, rate: Scalar, bristle: Scal
         penetration=radius - z,
         penetration_rate=-vz,
         slip_speed=vx + radius * rate,
-        admitted=scene.clearance.admits(rate),
+        admitted=scene.clearance.admits(leg, rate),
         bristle=bristle,
     )
 

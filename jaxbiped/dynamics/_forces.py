@@ -26,6 +26,9 @@ class FootForce(NamedTuple):
 
 def foot_force(scene: Scene, foot: Foot) -> FootForce:
     """Force on a foot whose kinematics are known."""
+    if foot.admitted is False:
+        nothing = jnp.zeros_like(foot.penetration)
+        return FootForce(nothing, None if isinstance(scene.friction, Frictionless) else nothing)
     normal = scene.normal.force(foot.penetration, foot.penetration_rate)
     if foot.admitted is not None:
         normal = jnp.where(foot.admitted, normal, 0.0)

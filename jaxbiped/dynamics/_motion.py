@@ -47,14 +47,16 @@ def leg_load(scene: Scene, angle: Scalar, rate: Scalar, foot: Foot) -> LegLoad:
     moment = walker.m * walker.d
     coupling_x, coupling_z = moment * cosine, moment * sine
     downhill, weight = ground.g * jnp.sin(ground.slope), ground.g * jnp.cos(ground.slope)
-    reaction = foot_force(scene, foot)
-    force_x = coupling_z * rate * rate
-    force_z = reaction.normal - coupling_x * rate * rate
+    force_x, force_z = coupling_z * rate * rate, -coupling_x * rate * rate
     torque = coupling_x * downhill - coupling_z * weight
-    torque = torque + reaction.normal * (walker.hip_to_foot * sine)
-    if reaction.tangential is not None:
-        force_x = force_x + reaction.tangential
-        torque = torque + reaction.tangential * (walker.hip_to_foot * cosine + walker.r)
+    # Where it is known that a foot never touches, nothing of its contact is in the program.
+    if foot.admitted is not False:
+        reaction = foot_force(scene, foot)
+        force_z = force_z + reaction.normal
+        torque = torque + reaction.normal * (walker.hip_to_foot * sine)
+        if reaction.tangential is not None:
+            force_x = force_x + reaction.tangential
+            torque = torque + reaction.tangential * (walker.hip_to_foot * cosine + walker.r)
     inertia = walker.J + moment * walker.d
     return LegLoad(force_x, force_z, torque, coupling_x, coupling_z, inertia)
 

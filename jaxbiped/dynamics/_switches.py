@@ -40,6 +40,8 @@ def switches(scene: Scene, state: State) -> tuple[Switch, ...]:
 
 
 def _foot_switches(scene: Scene, foot: Foot, rate: Scalar) -> list[Switch]:
+    if foot.admitted is False:
+        return []
     below, touching = foot.penetration > 0.0, touches(foot)
     admitted = True if foot.admitted is None else foot.admitted
     carries = foot_force(scene, foot).normal > 0.0

@@ -20,12 +20,12 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State, checked_state
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gait import Gait, described
-from jaxbiped.gait._parameters import chosen_parameters
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._search import Found, Method, search
 from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.gait._system import checked_section, system_of
 from jaxbiped.gait._turn import Turning
+from jaxbiped.scene._parameters import chosen_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._passage import Precision

@@ -17,8 +17,8 @@ from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gradient import AbstractGradient, Implicit, Reverse
-from jaxbiped.gait._parameters import chosen_parameters
 from jaxbiped.gait._return_map import Return, return_map
+from jaxbiped.scene._parameters import chosen_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._elimination import solution

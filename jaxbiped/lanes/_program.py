@@ -82,25 +82,25 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
     prepare = Block(invariant=True)
     begin, body, end = Block(prepare), Block(prepare), Block(prepare)
     notes = Block(prepare)
-    given = [_inputs(prepare, leaf) for leaf in jtu.tree_leaves(inputs)]
+    given = [inputs_of(prepare, leaf) for leaf in jtu.tree_leaves(inputs)]
     carried_shape = jax.eval_shape(program.start, inputs)
-    carried = [_inputs(body, leaf) for leaf in jtu.tree_leaves(carried_shape)]
-    first, _ = _emitted(begin, program.start, (inputs,), given)
+    carried = [inputs_of(body, leaf) for leaf in jtu.tree_leaves(carried_shape)]
+    first, _ = emitted(begin, program.start, (inputs,), given)
     shapes: tuple[Any, ...] = (inputs, carried_shape)
     arguments = [*given, *carried]
     row: list[Value] = []
     if program.tape:
         shape = jax.ShapeDtypeStruct((program.tape,), jnp.float64)
-        shapes, arguments = (*shapes, shape), [*arguments, _inputs(body, shape)]
+        shapes, arguments = (*shapes, shape), [*arguments, inputs_of(body, shape)]
         row = list(arguments[-1])
-    following, _ = _emitted(body, program.attempt, shapes, arguments)
-    finals, structure = _emitted(end, program.finish, (inputs, carried_shape), [*given, *carried])
+    following, _ = emitted(body, program.attempt, shapes, arguments)
+    finals, structure = emitted(end, program.finish, (inputs, carried_shape), [*given, *carried])
     next_time = Value("input", (), Kind.F64, notes)
     recording, recorded = None, []
     if program.record is not None:
         time = jax.ShapeDtypeStruct((), jnp.float64)
         arguments = [*given, *carried, array_of([next_time], ())]
-        mask, *values = _emitted(notes, program.record, (inputs, carried_shape, time), arguments)[0]
+        mask, *values = emitted(notes, program.record, (inputs, carried_shape, time), arguments)[0]
         recording = mask.item()
         recorded = [converted(notes, v, Kind.F64) for a in values for v in a.ravel()]
     *following, done = following
@@ -137,15 +137,17 @@ def leaves_of(structure: PyTree, table: Any) -> list[Any]:
     return leaves
 
 
-def _inputs(block: Block, leaf: Any) -> Array:
+def inputs_of(block: Block, leaf: Any) -> Array:
+    """What is read of one leaf, as values of a block."""
     kind = KINDS[np.dtype(leaf.dtype)]
     shape = np.shape(leaf)
     return array_of([Value("input", (), kind, block) for _ in range(int(np.prod(shape)))], shape)
 
 
-def _emitted(
+def emitted(
     block: Block, function: Callable[..., Any], shapes: tuple[Any, ...], arrays: list[Array]
 ) -> tuple[list[Array], PyTree]:
+    """A function's operations added to a block: its results, and their structure."""
     closed, structure = jax.make_jaxpr(function, return_shape=True)(*shapes)
     return emit(block, closed.jaxpr, closed.consts, arrays), structure
 

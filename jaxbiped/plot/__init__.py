@@ -17,5 +17,6 @@ from jaxbiped.plot._multipliers import multipliers as multipliers
 from jaxbiped.plot._orbit import gait_orbit as gait_orbit
 from jaxbiped.plot._penetration import penetrations as penetrations
 from jaxbiped.plot._phase_portrait import phase_portrait as phase_portrait
+from jaxbiped.plot._rigid_leg_angle import rigid_leg_angles as rigid_leg_angles
 from jaxbiped.plot._strobe import gait_strobe as gait_strobe
 from jaxbiped.plot._tornado import elasticities as elasticities

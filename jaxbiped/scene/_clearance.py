@@ -5,17 +5,19 @@ import abc
 import equinox as eqx
 import jax.numpy as jnp
 
+from jaxbiped._checks import check_choice
 from jaxbiped._types import Scalar
 
 
 class AbstractClearance(eqx.Module):
-    """Decides from a leg's rotation whether its foot may touch."""
+    """Decides from a leg and its rotation whether its foot may touch."""
 
     @abc.abstractmethod
-    def admits(self, leg_rate: Scalar) -> Scalar | None:
-        """Whether the foot of a leg that turns at `leg_rate` [rad/s] may touch: a boolean.
+    def admits(self, leg: int, leg_rate: Scalar) -> Scalar | bool | None:
+        """Whether the foot of `leg` (1 or 2), which turns at `leg_rate` [rad/s], may touch.
 
-        None stands for "always", so that nothing of the rule is left in the compiled program.
+        None stands for "always" and False for "never", known before anything runs: nothing of the
+        rule, or of the contact, is then left in the compiled program.
         """
 
 
@@ -27,12 +29,31 @@ class StanceRotation(AbstractClearance):
     such a walk as stopped.
     """
 
-    def admits(self, leg_rate: Scalar) -> Scalar:
+    def admits(self, leg: int, leg_rate: Scalar) -> Scalar:
         return jnp.asarray(leg_rate < 0.0)
 
 
 class AlwaysTouching(AbstractClearance):
     """Every foot that reaches the ground touches it; a swinging foot scuffs."""
 
-    def admits(self, leg_rate: Scalar) -> None:
+    def admits(self, leg: int, leg_rate: Scalar) -> None:
         return None
+
+
+class OneFoot(AbstractClearance):
+    """Only one leg's foot ever touches: a walker in single support, or a leg that is dropped.
+
+    Attributes:
+        leg: the leg, 1 or 2.
+
+    Raises:
+        ArgumentError: another leg.
+    """
+
+    leg: int = eqx.field(static=True)
+
+    def __check_init__(self) -> None:
+        check_choice("leg", self.leg, (1, 2))
+
+    def admits(self, leg: int, leg_rate: Scalar) -> bool | None:
+        return None if leg == self.leg else False

@@ -71,7 +71,7 @@ def test_frictionless_forces_have_no_tangential_part():
 
 @pytest.mark.parametrize("rule", [jb.StanceRotation(), jb.AlwaysTouching()])
 def test_clearance_rules(rule):
-    forward, backward = rule.admits(jnp.asarray(1.0)), rule.admits(jnp.asarray(-1.0))
+    forward, backward = rule.admits(1, jnp.asarray(1.0)), rule.admits(1, jnp.asarray(-1.0))
     if isinstance(rule, jb.AlwaysTouching):
         assert forward is None
     else:

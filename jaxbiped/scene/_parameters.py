@@ -1,12 +1,16 @@
 """A scene's parameters by name."""
 
-from typing import Any
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, TypeVar
 
 import jax.tree_util as jtu
 
 from jaxbiped._checks import check_choice
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+
+SomeScene = TypeVar("SomeScene", bound=Scene | RigidScene)
 
 _FIRST = ("K", "c", "xi")
 """The parameters that sensitivities are first asked for."""
@@ -35,6 +39,22 @@ def chosen_parameters(
     for name in names:
         check_choice("parameters", name, by_leaf)
     return names, tuple(by_leaf.index(name) for name in names)
+
+
+def with_parameters(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
+    """The scene with other values of these parameters (see `parameter_names`), checked anew.
+
+    Raises:
+        ArgumentError: a name that the scene does not have, or a value that is not allowed.
+    """
+    names = _names_by_leaf(scene)
+    paths = [path for path, _ in jtu.tree_flatten_with_path(scene)[0]]
+    for name, value in values.items():
+        check_choice("parameter", name, names)
+        part, field = (key.name for key in paths[names.index(name)])
+        changed = dataclasses.replace(getattr(scene, part), **{field: value})
+        scene = dataclasses.replace(scene, **{part: changed})
+    return scene
 
 
 def _names_by_leaf(scene: Scene | RigidScene) -> list[str]:

@@ -1,0 +1,113 @@
+"""`jaxbiped models`: what can be modelled, and what it costs."""
+
+import dataclasses
+import inspect
+import re
+from pathlib import Path
+from typing import Any
+
+from jaxbiped._checks import check_writable_file
+from jaxbiped.cli._report import Report, table
+from jaxbiped.dynamics._bristles import state_type
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.lanes._count import operation_counts
+from jaxbiped.scene._catalogue import (
+    FRICTION_LAWS,
+    NORMAL_LAWS,
+    friction_law_like,
+    normal_law_like,
+)
+from jaxbiped.scene._ladder import ladder
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._seed import seed_scene
+
+_SEED_NORMAL = dict(K=1e6, c=1e7, n=1.5, mass=2.0)
+_SEED_FRICTION = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Models:
+    """List the laws of contact and the ladder of models, with parameters, units and cost."""
+
+    json: Path | None = None
+    """File for the same in JSON; - prints only that."""
+
+    def run(self) -> int:
+        """Runs the command; returns the exit code."""
+        if self.json is not None and str(self.json) != "-":
+            check_writable_file("--json", self.json)
+        seed = seed_scene()
+        numbers = {
+            "normal": [
+                _law(name, dataclasses.replace(seed, normal=law), law)
+                for name in NORMAL_LAWS
+                for law in [normal_law_like(name, **_SEED_NORMAL)]
+            ],
+            "friction": [
+                _law(name, dataclasses.replace(seed, friction=law), law)
+                for name in FRICTION_LAWS
+                for law in [friction_law_like(name, **_SEED_FRICTION)]
+            ],
+            "rungs": [_rung(name, scene) for name, scene in ladder(seed).items()],
+        }
+        report = Report(self.json)
+        _print(report, numbers)
+        report.finish(numbers)
+        return 0
+
+
+def _law(name: str, scene: Scene, law: Any) -> dict[str, Any]:
+    """A law that stands in the seed's scene, with the value of each parameter there."""
+    units = _units(type(law))
+    return {
+        "name": name,
+        "class": type(law).__name__,
+        "parameters": {
+            field.name: {"value": float(getattr(law, field.name)), "unit": units[field.name]}
+            for field in dataclasses.fields(law)
+            if getattr(law, field.name) is not None
+        },
+        "operations": sum(operation_counts(scene).values()),
+    }
+
+
+def _rung(name: str, scene: Scene | RigidScene) -> dict[str, Any]:
+    kind = RigidState if isinstance(scene, RigidScene) else state_type(scene)
+    return {
+        "name": name,
+        "states": len(kind._fields),
+        "operations": sum(operation_counts(scene).values()),
+    }
+
+
+def _units(law: type) -> dict[str, str]:
+    """Units of a law's parameters, from its docstring."""
+    text = inspect.getdoc(law) or ""
+    found = re.findall(r"^    (\w+): (?:[^\[]|\n)*?\[([^\]]+)\]", text, flags=re.MULTILINE)
+    return dict(found)
+
+
+def _print(report: Report, numbers: dict[str, Any]) -> None:
+    for kind in ("normal", "friction"):
+        rows = [
+            (law["name"], str(law["operations"]), _shown(law["parameters"]))
+            for law in numbers[kind]
+        ]
+        width = max(len(row[0]) for row in rows)
+        report.say(f"{'--' + kind:<{width}}  operations  parameters that resemble the seed's law")
+        for name, operations, parameters in rows:
+            report.say(f"{name:<{width}}  {operations:>10}  {parameters}")
+        report.say()
+    rungs = [(r["name"], str(r["states"]), str(r["operations"])) for r in numbers["rungs"]]
+    report.say(table(("rung", "states", "operations"), rows=rungs, most=len(rungs)))
+    report.say("operations: of one evaluation of the vector field, equal ones shared")
+
+
+def _shown(parameters: dict[str, Any]) -> str:
+    if not parameters:
+        return "none"
+    return ", ".join(
+        f"{name} {entry['value']:.4g}" + (f" {entry['unit']}" if entry["unit"] != "–" else "")
+        for name, entry in parameters.items()
+    )

@@ -1,0 +1,116 @@
+"""`jaxbiped walk --model rigid`: footsteps of the rigid walker."""
+
+import time
+from typing import Any
+
+import numpy as np
+
+from jaxbiped import _clock
+from jaxbiped._checks import ArgumentError
+from jaxbiped.cli._report import Report, table
+from jaxbiped.cli._walk_options import OutputOptions, SolveOptions
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.simulate._rigid_walk import RigidWalked, rigid_walk
+from jaxbiped.solve._ending import Ending
+
+_MOST_ROWS = 24
+_MOST_STRIKES = 4096
+
+
+def run_rigid_walk(
+    scene: RigidScene, state: RigidState, solve: SolveOptions, output: OutputOptions
+) -> int:
+    """Walks for the time asked for and prints the footsteps; returns the exit code.
+
+    Raises:
+        ArgumentError: an argument that is not allowed.
+    """
+    output.check()
+    usual = SolveOptions()
+    for name in ("solver", "atol"):
+        if getattr(solve, name) != getattr(usual, name):
+            raise ArgumentError(
+                f'{name} = {getattr(solve, name)} is not allowed with model = "rigid": its steps '
+                "are Tsitouras's, with an absolute tolerance of a hundredth of the relative one."
+            )
+    prepared = time.perf_counter()
+    options: dict[str, Any] = dict(
+        duration=solve.duration,
+        rtol=solve.rtol,
+        engine=solve.engine,
+        most_arrivals=_MOST_STRIKES,
+    )
+    rigid_walk(scene, state, **options).t.block_until_ready()
+    compiled = time.perf_counter()
+    walk = rigid_walk(scene, state, **options)
+    walk.t.block_until_ready()
+    finished = time.perf_counter()
+    # The first run compiles; what a run takes by itself is the second one's.
+    wall = {
+        "import": prepared - _clock.IMPORT_BEGAN,
+        "compile": 2.0 * compiled - prepared - finished,
+        "run": finished - compiled,
+    }
+    numbers = {
+        "model": "rigid",
+        "ending": str(walk.outcome),
+        "slope_rad": float(scene.ground.slope),
+        "duration_s": float(walk.t),
+        "steps": _footsteps(scene, walk),
+        "solver": {
+            "name": "tsit5",
+            "rtol": solve.rtol,
+            "engine": walk.engine,
+            "attempted": int(walk.attempts),
+        },
+        "wall_s": wall,
+    }
+    report = Report(output.json)
+    _print(report, numbers)
+    if output.out is not None:
+        from jaxbiped import plot
+
+        path = output.out / "leg_angles.png"
+        plot.rigid_leg_angles(scene, state, duration=float(walk.t)).savefig(path)
+        report.say(f"wrote {path}")
+    report.finish(numbers)
+    return 1 if walk.outcome is Ending.SOLVER_FAILED else 0
+
+
+def _footsteps(scene: RigidScene, walk: RigidWalked) -> list[dict[str, float]]:
+    """Each footstep from one heel strike to the next."""
+    times, states = walk.strikes
+    count = min(int(walk.footsteps), _MOST_STRIKES)
+    at = np.asarray(times)[:count]
+    # Where the new stance foot comes down: under its centre, which lies on the leg's axis.
+    reach = float(scene.walker.hip_to_foot)
+    places = np.asarray(states.hip_x)[:count] + reach * np.sin(np.asarray(states.theta_2)[:count])
+    return [
+        {
+            "time_s": float(at[k]),
+            "period_s": float(at[k] - at[k - 1]),
+            "length_m": float(places[k] - places[k - 1]),
+            "speed_m_s": float((places[k] - places[k - 1]) / (at[k] - at[k - 1])),
+        }
+        for k in range(1, count)
+    ]
+
+
+def _print(report: Report, numbers: dict[str, Any]) -> None:
+    names = ("time_s", "period_s", "length_m", "speed_m_s")
+    rows = [
+        (str(k + 1), *(f"{row[name]:.4f}" for name in names))
+        for k, row in enumerate(numbers["steps"])
+    ]
+    head = ("step", "time s", "period s", "length m", "speed m/s")
+    report.say(table(head, rows, most=_MOST_ROWS))
+    solver, wall = numbers["solver"], numbers["wall_s"]
+    report.say(
+        f"{numbers['ending']} after {numbers['duration_s']:.4g} s and {len(rows)} whole footsteps "
+        f"on rigid feet on a slope of {numbers['slope_rad']:g} rad"
+    )
+    report.say(
+        f"{solver['name']} ({solver['engine']}): {solver['attempted']} steps attempted; "
+        f"import {wall['import']:.1f} s, compile {wall['compile']:.1f} s, run {wall['run']:.4f} s"
+    )

@@ -1,0 +1,98 @@
+"""`jaxbiped models`, and the flags that choose a model."""
+
+import json
+
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.cli import main
+from jaxbiped.cli._walk_options import SceneOptions
+
+
+def _run(*arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main(list(arguments))
+    return stopped.value.code
+
+
+def test_lists_every_law_with_units_and_cost(capsys):
+    assert _run("models", "--json", "-") == 0
+    listed = json.loads(capsys.readouterr().out)
+    assert {law["name"] for law in listed["normal"]} == set(jb.NORMAL_LAWS)
+    assert {law["name"] for law in listed["friction"]} == set(jb.FRICTION_LAWS)
+    assert [rung["name"] for rung in listed["rungs"]] == list(jb.ladder())
+    for law in listed["normal"] + listed["friction"]:
+        assert law["operations"] > 0
+        assert all(entry["unit"] for entry in law["parameters"].values())
+    by_name = {rung["name"]: rung for rung in listed["rungs"]}
+    assert by_name["rigid"]["states"] == 5
+    assert by_name["bristles"]["states"] == 10
+    assert by_name["rigid"]["operations"] < 0.5 * by_name["stribeck"]["operations"]
+
+
+def test_prints_a_table(capsys):
+    assert _run("models") == 0
+    out = capsys.readouterr().out
+    assert "hunt-crossley" in out
+    assert "N·s/m²" in out
+
+
+def test_flags_build_the_scene():
+    scene = SceneOptions(
+        normal="hunt-crossley", friction="coulomb", set=("hysteresis=2.5",)
+    ).scene()
+    assert isinstance(scene.normal, jb.HuntCrossley)
+    assert isinstance(scene.friction, jb.RegularisedCoulomb)
+    assert float(scene.normal.hysteresis) == 2.5
+    rigid = SceneOptions(model="rigid", slope=0.03, hip_mass=1.0).scene()
+    assert isinstance(rigid, jb.RigidScene)
+    assert float(rigid.ground.slope) == 0.03
+    seed = SceneOptions().scene()
+    assert seed == jb.seed_scene() or repr(seed) == repr(jb.seed_scene())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("walk", "--model", "soft"), "model = 'soft'"),
+        (("walk", "--normal", "hertzz"), "normal = 'hertzz'"),
+        (("gait", "--friction", "glue"), "friction = 'glue'"),
+        (("walk", "--model", "rigid", "--K", "5"), "K = 5.0 is not allowed with model"),
+        (("walk", "--model", "rigid", "--solver", "rodas5p"), "solver = rodas5p"),
+        (("gait", "--model", "rigid", "--section", "mid-stance"), "HeelStrike"),
+        (("walk", "--set", "foo=3"), "parameter = 'foo'"),
+        (("walk", "--set", "xi"), "set = 'xi'"),
+        (("walk", "--set", "v0=-1"), "v0 = -1"),
+    ],
+)
+def test_bad_flags_are_one_sentence(arguments, said, capsys):
+    assert _run(*arguments) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_rigid_walk_and_gait(tmp_path, capsys):
+    walk = tmp_path / "walk.json"
+    flags = ("--model", "rigid", "--duration", "4")
+    assert _run("walk", *flags, "--json", str(walk), "--out", str(tmp_path)) == 0
+    numbers = json.loads(walk.read_text())
+    assert numbers["ending"] == "walking"
+    assert numbers["model"] == "rigid"
+    assert numbers["steps"][-1]["period_s"] == pytest.approx(0.4438, abs=2e-4)
+    assert numbers["steps"][-1]["length_m"] == pytest.approx(0.1904, abs=2e-4)
+    assert (tmp_path / "leg_angles.png").exists()
+    gait = tmp_path / "gait.json"
+    assert _run("gait", "--model", "rigid", "--json", str(gait)) == 0
+    numbers = json.loads(gait.read_text())
+    assert numbers["period_s"] == pytest.approx(0.44378, abs=5e-6)
+    assert set(numbers["state"]) == set(jb.RigidState._fields)
+    assert numbers["assumptions"]["needed_friction"] == pytest.approx(0.187, abs=1e-3)
+    assert "a real foot needs a friction coefficient of 0.187" in capsys.readouterr().out
+
+
+def test_walk_with_other_laws(tmp_path):
+    walk = tmp_path / "walk.json"
+    flags = ("--normal", "hunt-crossley", "--friction", "viscous", "--duration", "1.2")
+    assert _run("walk", *flags, "--json", str(walk)) == 0
+    assert json.loads(walk.read_text())["ending"] == "walking"
