@@ -32,7 +32,7 @@ def run_rigid_walk(
         if getattr(solve, name) != getattr(usual, name):
             raise ArgumentError(
                 f'{name} = {getattr(solve, name)} is not allowed with model = "rigid": its steps '
-                "are Tsitouras's, with an absolute tolerance of a hundredth of the relative one."
+                "are dopri8's, with an absolute tolerance of a hundredth of the relative one."
             )
     prepared = time.perf_counter()
     options: dict[str, Any] = dict(
@@ -59,7 +59,7 @@ def run_rigid_walk(
         "duration_s": float(walk.t),
         "steps": _footsteps(scene, walk),
         "solver": {
-            "name": "tsit5",
+            "name": "dopri8",
             "rtol": solve.rtol,
             "engine": walk.engine,
             "attempted": int(walk.attempts),

@@ -55,9 +55,10 @@ class Inertia(NamedTuple):
 
         The swing leg is eliminated first: its mass may be far below the hip's.
         """
-        ratio = self.coupling / self.swing
+        inverse = 1.0 / self.swing  # a number of the walker: divided once, not at every stage
+        ratio = self.coupling * inverse
         of_stance = (stance - ratio * swing) / (self.stance - ratio * self.coupling)
-        return of_stance, swing / self.swing - ratio * of_stance
+        return of_stance, swing * inverse - ratio * of_stance
 
 
 def inertia_of(walker: Walker, stance: Support, sine: Scalar, cosine: Scalar) -> Inertia:
@@ -70,6 +71,47 @@ def inertia_of(walker: Walker, stance: Support, sine: Scalar, cosine: Scalar) ->
         coupling=walker.m * walker.d * (stance.hip_x * cosine + stance.hip_z * sine),
         swing=walker.J + walker.m * walker.d * walker.d,
     )
+
+
+class Rates(NamedTuple):
+    """Angular accelerations in single support [rad/s²]: of swing leg and stance leg."""
+
+    alpha_1: Scalar
+    alpha_2: Scalar
+
+
+def rolling_rates(scene: RigidScene, state: RigidState) -> Rates:
+    """Angular accelerations at a state; leaves shaped as the state's.
+
+    Lagrange's equations of the two angles, with all that does not change gathered: of the stance
+    leg's inertia only one term does. By the sources' symbols: l − r is hip to foot centre, d hip to
+    centre of mass.
+    """
+    walker, ground = scene.walker, scene.ground
+    m, d, r = walker.m, walker.d, walker.r
+    reach, below, carried = walker.hip_to_foot, walker.hip_to_foot - d, walker.hip_mass + m
+    g_x, g_z = ground.g * jnp.sin(ground.slope), -ground.g * jnp.cos(ground.slope)
+    moment = carried * reach + m * below
+    fixed = walker.total_mass * r * r + carried * reach * reach + m * below * below + walker.J
+    swing_inertia = walker.J + m * d * d
+    sine_1, cosine_1 = sine_cosine(state.theta_1)
+    sine_2, cosine_2 = sine_cosine(state.theta_2)
+    sine = sine_1 * cosine_2 - cosine_1 * sine_2
+    cosine = cosine_1 * cosine_2 + sine_1 * sine_2
+    swing_square, stance_square = state.omega_1 * state.omega_1, state.omega_2 * state.omega_2
+    inertia = Inertia(
+        stance=fixed + 2.0 * r * moment * cosine_2,
+        coupling=-(m * d * r * cosine_1 + m * d * reach * cosine),
+        swing=swing_inertia,
+    )
+    swing_torque = m * d * g_x * cosine_1 + m * d * g_z * sine_1
+    swing_torque = swing_torque + m * d * reach * sine * stance_square
+    stance_torque = r * moment * sine_2 * stance_square - (
+        walker.total_mass * r * g_x + moment * g_x * cosine_2 + moment * g_z * sine_2
+    )
+    stance_torque = stance_torque - swing_square * (m * d * r * sine_1 + m * d * reach * sine)
+    alpha_2, alpha_1 = inertia.solved(stance_torque, swing_torque)
+    return Rates(alpha_1, alpha_2)
 
 
 class RollingMotion(NamedTuple):
@@ -87,48 +129,35 @@ class RollingMotion(NamedTuple):
 
 
 def rolling(scene: RigidScene, state: RigidState) -> RollingMotion:
-    """Accelerations and reaction at a state; leaves shaped as the state's.
+    """Accelerations and the ground's reaction at a state; leaves shaped as the state's.
 
-    Lagrange's equations of the two angles, with the accelerations of hip and centres of mass
-    written out. By the sources' symbols: l − r is hip to foot centre, d hip to centre of mass.
+    The reaction is what the accelerations of hip and centres of mass leave of the weight.
     """
     walker, ground = scene.walker, scene.ground
-    m, d, r = walker.m, walker.d, walker.r
-    reach, below = walker.hip_to_foot, walker.hip_to_foot - d
-    carried = walker.hip_mass + m
+    alpha_1, alpha_2 = rolling_rates(scene, state)
     stance = support_of(walker, state.theta_2)
     sine, cosine = sine_cosine(state.theta_1)
-    g_x, g_z = ground.g * jnp.sin(ground.slope), -ground.g * jnp.cos(ground.slope)
     stance_square, swing_square = state.omega_2**2, state.omega_1**2
-    # Centripetal accelerations: of the hip and of the centres of mass about what carries them.
-    hip_x, hip_z = reach * stance.sine * stance_square, -reach * stance.cosine * stance_square
-    own_x, own_z = below * stance.sine * stance_square, -below * stance.cosine * stance_square
-    swing_x, swing_z = -d * sine * swing_square, d * cosine * swing_square
-    inertia = inertia_of(walker, stance, sine, cosine)
-    swing_torque = m * d * (cosine * (g_x - hip_x) + sine * (g_z - hip_z))
-    # The part of the stance's centripetal acceleration along its own velocity: −r (…) sin θ.
-    along = r * stance.sine * stance_square
-    stance_torque = (
-        m * (stance.mass_x * g_x + stance.mass_z * g_z + along * below)
-        + carried * (stance.hip_x * g_x + stance.hip_z * g_z + along * reach)
-        - m * (stance.hip_x * swing_x + stance.hip_z * swing_z)
-    )
-    alpha_2, alpha_1 = inertia.solved(stance_torque, swing_torque)
-    hip_ax, hip_az = stance.hip_x * alpha_2 + hip_x, stance.hip_z * alpha_2 + hip_z
-    own_ax, own_az = stance.mass_x * alpha_2 + own_x, stance.mass_z * alpha_2 + own_z
-    swing_ax = d * cosine * alpha_1 + swing_x
-    swing_az = d * sine * alpha_1 + swing_z
-    total = walker.total_mass
+    reach, below = walker.hip_to_foot, walker.hip_to_foot - walker.d
+    hip_x = stance.hip_x * alpha_2 + reach * stance.sine * stance_square
+    hip_z = stance.hip_z * alpha_2 - reach * stance.cosine * stance_square
+    own_x = stance.mass_x * alpha_2 + below * stance.sine * stance_square
+    own_z = stance.mass_z * alpha_2 - below * stance.cosine * stance_square
+    swing_x = walker.d * (cosine * alpha_1 - sine * swing_square)
+    swing_z = walker.d * (sine * alpha_1 + cosine * swing_square)
+    carried, total = walker.hip_mass + walker.m, walker.total_mass
+    weight_x = total * ground.g * jnp.sin(ground.slope)
+    weight_z = -total * ground.g * jnp.cos(ground.slope)
     force = FootForce(
-        normal=carried * hip_az + m * (own_az + swing_az) - total * g_z,
-        tangential=carried * hip_ax + m * (own_ax + swing_ax) - total * g_x,
+        normal=carried * hip_z + walker.m * (own_z + swing_z) - weight_z,
+        tangential=carried * hip_x + walker.m * (own_x + swing_x) - weight_x,
     )
     return RollingMotion(alpha_1, alpha_2, force)
 
 
 def rolling_field(t: Any, state: RigidState, scene: RigidScene) -> RigidState:
     """Time derivative of the state, in the form that `diffrax.ODETerm` takes."""
-    motion = rolling(scene, state)
+    motion = rolling_rates(scene, state)
     _, cosine = sine_cosine(state.theta_2)
     walker = scene.walker
     return RigidState(

@@ -11,21 +11,24 @@ import jax.tree_util as jtu
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._rolling import rolling
+from jaxbiped.dynamics._rolling import rolling_rates
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.solve._ending import Ending, rigid_ending
 
-_TABLEAU = diffrax.Tsit5.tableau
-_SAFETY, _MOST_SHRINK, _MOST_GROWTH = 0.9, 0.2, 5.0
+_TABLEAU = diffrax.Dopri8.tableau
+_ORDER = 8
+_SAFETY, _MOST_SHRINK, _MOST_GROWTH = 0.8, 0.2, 5.0
 _FIRST_STEP = 0.03
 """First step, in units of √(l/g)."""
 _ROUNDING = 1e-14
 """Shortest step, as a share of the time."""
 _CLOSED = 1e-12
 """Sum of the leg angles [rad] up to which the feet have not opened since the last strike."""
-_NEAR = 1e-3
+_NEAR = 3e-2
 """Sum of the leg angles from which one Euler step leads onto a strike, in units of √rtol: the
 square of what is left is far below the tolerance."""
+_NEWTON = 3
+"""Newton steps on the quintic that guesses where a heel strike lies within a step."""
 _MOST_LANDINGS = 12
 """Newton steps onto a heel strike, after which it counts as missed."""
 
@@ -97,7 +100,7 @@ def attempted(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Scala
     state = _where(landing, landed.state, trial)
     rates = _accelerations(walk, state)
     last = (trial.omega_1, trial.omega_2, *rates)
-    free = _free(walk, now, trial, _error(walk, now, trial, [*stages, last]))
+    free = _free(walk, now, trial, stages[-1], _error(walk, now, trial, [*stages, last]))
     after = _where(landing, landed, free)
     kept = landing | (after.t > now.t)
     after = after._replace(rates=_where(kept, rates, now.rates), attempts=now.attempts + 1)
@@ -115,22 +118,31 @@ def ending_of(walk: RigidWalk, now: RigidProgress, waits: Scalar) -> Scalar:
     return jnp.where(late, int(Ending.OUT_OF_STEPS), now.code)
 
 
-def _free(walk: RigidWalk, now: RigidProgress, trial: RigidState, error: Scalar) -> RigidProgress:
+def _free(
+    walk: RigidWalk,
+    now: RigidProgress,
+    trial: RigidState,
+    rates: tuple[Scalar, ...],
+    error: Scalar,
+) -> RigidProgress:
     """After a step in single support: kept or not, and whether a heel strike lies behind it."""
     old, old_rate = _opening(now.state)
     new, new_rate = _opening(trial)
+    course = _Course.of(
+        now.step, (old, old_rate, now.rates[0] + now.rates[1]), (new, new_rate, rates[2] + rates[3])
+    )
     ahead = (trial.theta_1 > trial.theta_2) & (new <= 0.0)
     # A step so long that the legs open and close within it is tried again at half the length.
     turn = old_rate / jnp.where(old_rate == new_rate, 1.0, old_rate - new_rate)
     bulges = (old_rate > 0.0) & (new_rate < 0.0)
-    bulges = bulges & (_cubic(now.step, old, old_rate, new, new_rate, turn) > 0.0)
+    bulges = bulges & (course.value(turn) > 0.0)
     skips = ahead & (old <= _CLOSED) & bulges
     keep = (error <= 1.0) & ~skips
     closes = keep & ahead & (old > _CLOSED)
-    factor = _SAFETY * jnp.maximum(error, 1e-10) ** (-0.2)
+    factor = _SAFETY * jnp.maximum(error, 1e-10) ** (-1.0 / _ORDER)
     pace = now.step * jnp.clip(factor, _MOST_SHRINK, _MOST_GROWTH)
     pace = jnp.where(skips, 0.5 * now.step, pace)
-    back = now.step * (_root(now.step, old, old_rate, new, new_rate) - 1.0)
+    back = now.step * (course.root() - 1.0)
     t = jnp.where(keep, now.t + now.step, now.t)
     code = jnp.where(keep & ~closes, rigid_ending(trial), 0)
     lost = ~jnp.isfinite(pace) | (pace <= _ROUNDING * t)
@@ -199,7 +211,7 @@ def _error(
 
 
 def _accelerations(walk: RigidWalk, state: RigidState) -> tuple[Scalar, Scalar]:
-    motion = rolling(walk.scene, state)
+    motion = rolling_rates(walk.scene, state)
     return motion.alpha_1, motion.alpha_2
 
 
@@ -231,27 +243,48 @@ def _opening(state: RigidState) -> tuple[Scalar, Scalar]:
     return state.theta_1 + state.theta_2, state.omega_1 + state.omega_2
 
 
-def _cubic(step: Scalar, a: Scalar, a_rate: Scalar, b: Scalar, b_rate: Scalar, x: Any) -> Scalar:
-    """Hermite's cubic through both ends of a step, at a share `x` of it."""
-    return _cubic_and_slope(step, a, a_rate, b, b_rate, x)[0]
+class _Course(NamedTuple):
+    """Hermite's quintic of the opening over a step, by its coefficients."""
 
+    coefficients: tuple[Scalar, ...]
 
-def _cubic_and_slope(
-    step: Scalar, a: Scalar, a_rate: Scalar, b: Scalar, b_rate: Scalar, x: Any
-) -> tuple[Scalar, Scalar]:
-    p, q = step * a_rate, step * b_rate
-    bend, twist = 3.0 * (b - a) - 2.0 * p - q, p + q - 2.0 * (b - a)
-    value = a + x * (p + x * (bend + x * twist))
-    return value, p + x * (2.0 * bend + 3.0 * x * twist)
+    @staticmethod
+    def of(step: Scalar, old: tuple[Scalar, ...], new: tuple[Scalar, ...]) -> "_Course":
+        """From values, rates and second derivatives at both ends."""
+        rise = new[0] - old[0]
+        p, q = step * old[1], step * new[1]
+        a, b = 0.5 * step * step * old[2], 0.5 * step * step * new[2]
+        return _Course(
+            (
+                old[0],
+                p,
+                a,
+                10.0 * rise - 6.0 * p - 4.0 * q - 3.0 * a + b,
+                -15.0 * rise + 8.0 * p + 7.0 * q + 3.0 * a - 2.0 * b,
+                6.0 * rise - 3.0 * (p + q) - a + b,
+            )
+        )
 
+    def value(self, x: Scalar) -> Scalar:
+        """At a share `x` of the step."""
+        return self._value_and_slope(x)[0]
 
-def _root(step: Scalar, a: Scalar, a_rate: Scalar, b: Scalar, b_rate: Scalar) -> Scalar:
-    """The share of a step at which the cubic falls through zero, roughly."""
-    x = a / jnp.where(a == b, 1.0, a - b)
-    for _ in range(3):
-        value, slope = _cubic_and_slope(step, a, a_rate, b, b_rate, x)
-        x = jnp.clip(x - value / jnp.where(slope == 0.0, 1.0, slope), 0.0, 1.0)
-    return x
+    def root(self) -> Scalar:
+        """The share of the step at which it falls through zero, roughly."""
+        end = functools.reduce(operator.add, self.coefficients)
+        rise = end - self.coefficients[0]
+        x = -self.coefficients[0] / jnp.where(rise == 0.0, 1.0, rise)
+        for _ in range(_NEWTON):
+            value, slope = self._value_and_slope(x)
+            x = jnp.clip(x - value / jnp.where(slope == 0.0, 1.0, slope), 0.0, 1.0)
+        return x
+
+    def _value_and_slope(self, x: Scalar) -> tuple[Scalar, Scalar]:
+        value, slope = self.coefficients[-1], jnp.zeros_like(self.coefficients[-1])
+        for coefficient in self.coefficients[-2::-1]:
+            slope = slope * x + value
+            value = value * x + coefficient
+        return value, slope
 
 
 def _where(condition: Scalar, a: Any, b: Any) -> Any:

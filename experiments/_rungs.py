@@ -1,0 +1,125 @@
+"""What each rung of the ladder costs and how far its gait lies from the rung above."""
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import jaxbiped as jb
+
+DURATION = 2.0
+SPREAD = 0.01
+"""Largest relative change of a component of the gait's state among the starts of a batch."""
+EXACT = 1e-10
+TOLERANCES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 1e-6)
+COMPLIANT_TOLERANCE = 1e-6
+MEASURES = ("period", "step_length", "speed", "spectral_radius")
+REPEATS = 7
+WITNESSES = 64
+
+
+class Cost(NamedTuple):
+    """What a footstep costs by lanes, at a tolerance whose error was measured.
+
+    Attributes:
+        rtol: relative tolerance.
+        error: median over the starts of the largest error of an angle or rate after two seconds.
+        single_us: one walk, for each footstep [µs]; batch_us in a batch on all cores [µs].
+    """
+
+    rtol: float
+    error: float
+    single_us: float
+    batch_us: float
+
+
+def gait_of(scene: jb.Scene | jb.RigidScene) -> jb.Gait:
+    """The gait at heel strike, which every rung has."""
+    return jb.find_gait(scene, section=jb.HeelStrike(), parameters=(), radius_sensitivities=False)
+
+
+def measures_of(gait: jb.Gait) -> dict[str, Any]:
+    """Measures of a gait, and its leading multipliers."""
+    values = np.asarray(gait.multipliers)
+    return {name: float(getattr(gait.measures, name)) for name in MEASURES} | {
+        "multipliers": [[float(v.real), float(v.imag)] for v in values[:3]],
+        "unit_multiplier_error": float(gait.unit_multiplier_error),
+    }
+
+
+def distances(measures: dict[str, Any], above: dict[str, Any]) -> dict[str, float]:
+    """Relative differences of the measures from those of the rung above."""
+    return {name: measures[name] / above[name] - 1.0 for name in MEASURES}
+
+
+def cost_of(scene: jb.Scene | jb.RigidScene, gait: jb.Gait, batch: int, error: float) -> Cost:
+    """Cost at the loosest tolerance that keeps the rigid walker's error below `error`.
+
+    A compliant one takes the default tolerance.
+    """
+    starts = starts_about(gait.measures.state, batch)
+    some = jax.tree.map(lambda leaf: leaf[:WITNESSES], starts)
+    rigid = isinstance(scene, jb.RigidScene)
+    exact = walked(scene, EXACT)(some)
+    for rtol in reversed(TOLERANCES) if rigid else (COMPLIANT_TOLERANCE,):
+        off = _error(walked(scene, rtol)(some), exact)
+        if rigid and off > error:
+            break
+        chosen, reached = rtol, off
+    footsteps = DURATION / float(gait.measures.period)
+    one = jax.tree.map(lambda leaf: leaf[0], starts)
+    alone, many = walked(scene, chosen, single=True), walked(scene, chosen)
+    single = seconds(lambda: alone(one)) / footsteps
+    together = seconds(lambda: many(starts)) / (batch * footsteps)
+    return Cost(chosen, reached, 1e6 * single, 1e6 * together)
+
+
+def starts_about(state: Any, count: int) -> Any:
+    """Starts scattered about a gait's state; a compliant foot is not lifted by it."""
+    generator = np.random.default_rng(0)
+
+    def scattered(name: str, leaf: Any) -> Any:
+        moves = name.startswith(("theta", "omega"))
+        spread = SPREAD * generator.uniform(-1.0, 1.0, count) * moves
+        return leaf * (1.0 + jnp.asarray(spread))
+
+    names = state._fields
+    return type(state)(*map(scattered, names, state))
+
+
+def walked(
+    scene: jb.Scene | jb.RigidScene, rtol: float, *, single: bool = False
+) -> Callable[[Any], Any]:
+    """A walk of two seconds as a compiled function of its start; of a batch unless `single`."""
+
+    def end(start: Any) -> Any:
+        if isinstance(scene, jb.RigidScene):
+            walk = jb.rigid_walk(scene, start, duration=DURATION, rtol=rtol, engine="lanes")
+            return walk.state, walk.ending
+        walk = jb.simulate(scene, start, duration=DURATION, rtol=rtol, save="end", engine="lanes")
+        return jax.tree.map(lambda leaf: leaf[0], walk.state), walk.ending
+
+    return jax.jit(end if single else jax.vmap(end))
+
+
+def seconds(work: Callable[[], Any]) -> float:
+    """Median time of a warm run."""
+    jax.block_until_ready(work())
+    times = []
+    for _ in range(REPEATS):
+        begin = time.perf_counter()
+        jax.block_until_ready(work())
+        times.append(time.perf_counter() - begin)
+    return float(np.median(times))
+
+
+def _error(found: Any, exact: Any) -> float:
+    """Of the walks that both count as walking."""
+    (state, ending), (truth, true_ending) = found, exact
+    walking = (np.asarray(ending) == 0) & (np.asarray(true_ending) == 0)
+    names = [n for n in state._fields if n.startswith(("theta", "omega"))]
+    gaps = [np.abs(np.asarray(getattr(state, n)) - np.asarray(getattr(truth, n))) for n in names]
+    return float(np.median(np.max(gaps, axis=0)[walking]))

@@ -1,0 +1,163 @@
+"""The ladder of fidelity: what each model of the walker costs, and what it changes.
+
+Writes ladder.png, cost per footstep against the gait's distance from the rung above, and
+rigid_limit.png, how the seed's gait approaches the rigid walker's as its contact stiffens.
+"""
+
+import os
+from typing import Any
+
+import numpy as np
+from _options import Options, parse
+from _rigid_limit import DOUBLINGS, PATHS, QUICK_DOUBLINGS, Approach, approach
+from _rungs import Cost, cost_of, distances, gait_of, measures_of
+
+import jaxbiped as jb
+from jaxbiped.plot._style import new_figure
+
+BATCH, QUICK_BATCH = 8192, 256
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000")
+MARKERS = ("o", "s", "^", "D", "v")
+
+
+def main() -> None:
+    options = parse(__doc__ or "")
+    rungs = jb.ladder()
+    gaits = {name: gait_of(scene) for name, scene in rungs.items()}
+    measures = {name: measures_of(gait) for name, gait in gaits.items()}
+    names = list(rungs)
+    apart = {
+        name: distances(measures[name], measures[above])
+        for name, above in zip(names, [*names[1:], names[-1]], strict=True)
+    }
+    costs = costs_of(rungs, gaits, QUICK_BATCH if options.quick else BATCH)
+    say_rungs(options, measures, apart, costs)
+    doublings = QUICK_DOUBLINGS if options.quick else DOUBLINGS
+    chosen = list(PATHS)[:2] if options.quick else list(PATHS)
+    paths = {path: approach(path, gaits["rigid"], doublings) for path in chosen}
+    say_paths(options, paths)
+    pictures = [draw_rungs(options, apart, costs), draw_paths(options, paths)]
+    ratio = costs["stribeck"].batch_us / costs["rigid"].batch_us
+    options.say(f"a compliant footstep costs {ratio:.0f} rigid ones in a batch")
+    options.finish(
+        {
+            "threads": os.cpu_count(),
+            "measures": measures,
+            "distance_from_rung_above": apart,
+            "costs": {name: cost._asdict() for name, cost in costs.items()},
+            "batch_ratio_stribeck_to_rigid": ratio,
+            "paths": {name: path._asdict() for name, path in paths.items()},
+            "pictures": pictures,
+        }
+    )
+
+
+def costs_of(rungs: dict[str, Any], gaits: dict[str, jb.Gait], batch: int) -> dict[str, Cost]:
+    """Costs of all rungs; the rigid one's at no larger error than the seed's laws have."""
+    costs = {
+        name: cost_of(scene, gaits[name], batch, np.inf)
+        for name, scene in rungs.items()
+        if name != "rigid"
+    }
+    rigid = cost_of(rungs["rigid"], gaits["rigid"], batch, costs["stribeck"].error)
+    return {"rigid": rigid} | costs
+
+
+def say_rungs(
+    options: Options,
+    measures: dict[str, Any],
+    apart: dict[str, dict[str, float]],
+    costs: dict[str, Cost],
+) -> None:
+    options.say(
+        "rung      period s  length m  radius   from above: period  length  radius"
+        "   rtol   error    single us  batch us per footstep"
+    )
+    for name, found in measures.items():
+        off, cost = apart[name], costs[name]
+        options.say(
+            f"{name:<9} {found['period']:.5f}  {found['step_length']:.5f}  "
+            f"{found['spectral_radius']:.4f}  {off['period']:>18.1%}  {off['step_length']:>6.1%}  "
+            f"{off['spectral_radius']:>6.1%}  {cost.rtol:.0e}  {cost.error:.1e}  "
+            f"{cost.single_us:>9.1f}  {cost.batch_us:>8.3f}"
+        )
+
+
+def say_paths(options: Options, paths: dict[str, Approach]) -> None:
+    options.say()
+    options.say("path            gaits to factor  period    length    radius   rates of the three")
+    for name, path in paths.items():
+        rates = ", ".join("none" if p is None else f"{p:.2f}" for p in path.rates.values())
+        options.say(
+            f"{name:<15} {path.factors[-1]:>15.0f}  {path.period[-1]:>8.1e}  "
+            f"{path.step_length[-1]:>8.1e}  {path.spectral_radius[-1]:>8.1e}  {rates}"
+            + ("" if path.ended is None else f" ({path.ended})")
+        )
+
+
+def draw_rungs(options: Options, apart: dict[str, dict[str, float]], costs: dict[str, Cost]) -> str:
+    figure = new_figure(8.0, 4.2)
+    left, right = figure.subplots(1, 2)
+    names = list(costs)
+    rows = np.arange(len(names))
+    for key, colour, label in (
+        ("single_us", COLOURS[0], "one walk"),
+        ("batch_us", COLOURS[1], "in a batch"),
+    ):
+        values = [getattr(costs[name], key) for name in names]
+        left.plot(values, rows, "o", color=colour, label=label)
+    left.set_xscale("log")
+    left.set_xlabel("time for a footstep (µs)")
+    left.set_title("Cost by lanes", loc="left")
+    shown = {"period": "period", "step_length": "step length", "spectral_radius": "radius"}
+    for k, (key, label) in enumerate(shown.items()):
+        values = [100.0 * abs(apart[name][key]) for name in names[:-1]]
+        right.plot(values, rows[:-1], MARKERS[k], color=COLOURS[k], label=label)
+    right.set_xscale("log")
+    right.set_xlabel("distance from the rung above (%)")
+    right.set_title("What the next rung changes", loc="left")
+    for ax in (left, right):
+        ax.set_yticks(rows, names)
+        ax.set_ylim(-0.5, len(names) - 0.5)
+        ax.grid(axis="x", color="#DDDDDD")
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3, frameon=False)
+    path = options.path("ladder.png")
+    figure.savefig(path, dpi=150)
+    return str(path)
+
+
+def draw_paths(options: Options, paths: dict[str, Approach]) -> str:
+    figure = new_figure(9.0, 4.2)
+    titles = {"period": "period", "step_length": "step length", "spectral_radius": "radius"}
+    for ax, (key, title) in zip(figure.subplots(1, 3), titles.items(), strict=True):
+        for k, (name, path) in enumerate(paths.items()):
+            gaps = np.asarray(getattr(path, key))
+            ax.plot(path.factors, np.abs(gaps), color=COLOURS[k], linewidth=1.0, label=name)
+            above = gaps > 0.0
+            factors = np.asarray(path.factors)
+            # Hollow where the compliant gait's measure is the larger one.
+            for side, fill in ((above, "white"), (~above, COLOURS[k])):
+                ax.plot(
+                    factors[side],
+                    np.abs(gaps[side]),
+                    MARKERS[k],
+                    color=COLOURS[k],
+                    markerfacecolor=fill,
+                    markersize=4,
+                )
+        ax.set_xscale("log", base=2)
+        ax.set_yscale("log")
+        ax.set_title(title, loc="left")
+        ax.set_xlabel("factor of the path, $s$")
+        ax.grid(color="#DDDDDD")
+    figure.axes[0].set_ylabel("distance from the rigid gait, relative")
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
+    figure.suptitle("Filled: below the rigid gait's; hollow: above it", fontsize=9)
+    path = options.path("rigid_limit.png")
+    figure.savefig(path, dpi=150)
+    return str(path)
+
+
+if __name__ == "__main__":
+    main()
