@@ -15,9 +15,9 @@ from _options import Options, parse
 
 import jaxbiped as jb
 from jaxbiped.gait._orbit import slopes_of
-from jaxbiped.scene._parameters import chosen_parameters
 from jaxbiped.gait._stability import stability_of
 from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with, turn
+from jaxbiped.scene._parameters import chosen_parameters
 from jaxbiped.solve._passage import Precision
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)

@@ -9,6 +9,7 @@ display.
 from jaxbiped.plot._animation import animate as animate
 from jaxbiped.plot._animation import animation_html as animation_html
 from jaxbiped.plot._animation import save_animation as save_animation
+from jaxbiped.plot._bristle_law import bristle_law as bristle_law
 from jaxbiped.plot._contact_forces import contact_forces as contact_forces
 from jaxbiped.plot._laws import friction_law as friction_law
 from jaxbiped.plot._laws import normal_law as normal_law

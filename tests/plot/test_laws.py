@@ -50,7 +50,10 @@ def test_an_elastic_law_has_one_curve_and_gives_all_back():
     assert right.get_title(loc="left").endswith("restitution 1.000")
 
 
-@pytest.mark.parametrize("name", jb.FRICTION_LAWS)
+BRISTLES = ("dahl", "lugre")
+
+
+@pytest.mark.parametrize("name", [name for name in jb.FRICTION_LAWS if name not in BRISTLES])
 def test_friction_over_load_against_slip(name):
     law = jb.friction_law_like(name, **FRICTION)
     figure = plot.friction_law(law)
@@ -93,3 +96,24 @@ def test_a_range_and_axes_may_be_given(tmp_path):
 def test_bad_arguments_are_named(draw, match):
     with pytest.raises(jb.ArgumentError, match=f"^{match}"):
         draw()
+
+
+@pytest.mark.parametrize("name", BRISTLES)
+def test_bristles_make_a_loop(name, tmp_path):
+    law = jb.friction_law_like(name, **FRICTION)
+    figure = plot.bristle_law(law, slip_speed=1e-5)
+    (ax,) = figure.axes
+    _, first, back, again = _curves(ax)
+    assert first[1][0] < 0.1 < first[1][-1]
+    # Steady slip meets the law's coefficient, and the loop is odd.
+    steady = law.mu if name == "dahl" else law.mu_static
+    assert first[1][-1] == pytest.approx(float(steady), rel=1e-2)
+    np.testing.assert_allclose(back[1][-1], -again[1][-1], rtol=1e-3)
+    # It gives back less than it took.
+    assert np.trapezoid(again[1], again[0]) + np.trapezoid(back[1], back[0]) > 0.0
+    figure.savefig(tmp_path / "law.png")
+    assert (tmp_path / "law.png").stat().st_size > 5000
+    with pytest.raises(jb.ArgumentError, match="slip_speed = 0"):
+        plot.bristle_law(law, slip_speed=0.0)
+    with pytest.raises(jb.ArgumentError, match="law = Viscous"):
+        plot.bristle_law(jb.Viscous(k=1.0))
