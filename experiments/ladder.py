@@ -15,7 +15,8 @@ from _rungs import Cost, cost_of, distances, gait_of, measures_of
 import jaxbiped as jb
 from jaxbiped.plot._style import new_figure
 
-BATCH, QUICK_BATCH = 8192, 256
+BATCH, QUICK_BATCH = 4096, 128
+TOLERANCES = (1e-6, 1e-7, 1e-8)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000")
 MARKERS = ("o", "s", "^", "D", "v")
 
@@ -30,22 +31,31 @@ def main() -> None:
         name: distances(measures[name], measures[above])
         for name, above in zip(names, [*names[1:], names[-1]], strict=True)
     }
-    costs = costs_of(rungs, gaits, QUICK_BATCH if options.quick else BATCH)
+    batch = QUICK_BATCH if options.quick else BATCH
+    costs = costs_of(rungs, gaits, batch)
     say_rungs(options, measures, apart, costs)
+    tolerances = TOLERANCES[:1] if options.quick else TOLERANCES
+    pairs = [pair_of(rungs, gaits, batch, rtol) for rtol in tolerances]
+    say_pairs(options, pairs)
     doublings = QUICK_DOUBLINGS if options.quick else DOUBLINGS
     chosen = list(PATHS)[:2] if options.quick else list(PATHS)
     paths = {path: approach(path, gaits["rigid"], doublings) for path in chosen}
     say_paths(options, paths)
     pictures = [draw_rungs(options, apart, costs), draw_paths(options, paths)]
-    ratio = costs["stribeck"].batch_us / costs["rigid"].batch_us
-    options.say(f"a compliant footstep costs {ratio:.0f} rigid ones in a batch")
     options.finish(
         {
             "threads": os.cpu_count(),
             "measures": measures,
             "distance_from_rung_above": apart,
             "costs": {name: cost._asdict() for name, cost in costs.items()},
-            "batch_ratio_stribeck_to_rigid": ratio,
+            "equal_errors": [
+                {
+                    "stribeck": a._asdict(),
+                    "rigid": b._asdict(),
+                    "batch_ratio": a.batch_us / b.batch_us,
+                }
+                for a, b in pairs
+            ],
             "paths": {name: path._asdict() for name, path in paths.items()},
             "pictures": pictures,
         }
@@ -55,12 +65,28 @@ def main() -> None:
 def costs_of(rungs: dict[str, Any], gaits: dict[str, jb.Gait], batch: int) -> dict[str, Cost]:
     """Costs of all rungs; the rigid one's at no larger error than the seed's laws have."""
     costs = {
-        name: cost_of(scene, gaits[name], batch, np.inf)
-        for name, scene in rungs.items()
-        if name != "rigid"
+        name: cost_of(scene, gaits[name], batch) for name, scene in rungs.items() if name != "rigid"
     }
-    rigid = cost_of(rungs["rigid"], gaits["rigid"], batch, costs["stribeck"].error)
-    return {"rigid": rigid} | costs
+    error = costs["stribeck"].error
+    return {"rigid": cost_of(rungs["rigid"], gaits["rigid"], batch, error=error)} | costs
+
+
+def pair_of(
+    rungs: dict[str, Any], gaits: dict[str, jb.Gait], batch: int, rtol: float
+) -> tuple[Cost, Cost]:
+    """Costs of the seed's laws at a tolerance, and of the rigid walker at no larger an error."""
+    compliant = cost_of(rungs["stribeck"], gaits["stribeck"], batch, rtol=rtol)
+    return compliant, cost_of(rungs["rigid"], gaits["rigid"], batch, error=compliant.error)
+
+
+def say_pairs(options: Options, pairs: list[tuple[Cost, Cost]]) -> None:
+    options.say()
+    for compliant, rigid in pairs:
+        options.say(
+            f"at errors of {compliant.error:.1e} and {rigid.error:.1e}: a compliant footstep "
+            f"{compliant.batch_us:.2f} us, a rigid one {rigid.batch_us:.3f} us in a batch: "
+            f"{compliant.batch_us / rigid.batch_us:.0f} to 1"
+        )
 
 
 def say_rungs(

@@ -7,7 +7,7 @@ def test_rungs_and_the_way_to_the_rigid_limit(tmp_path):
     numbers = quick_numbers(
         "ladder",
         tmp_path,
-        keys={"measures", "costs", "distance_from_rung_above", "paths"},
+        keys={"measures", "costs", "distance_from_rung_above", "paths", "equal_errors"},
         pictures={"ladder.png", "rigid_limit.png"},
     )
     measures = numbers["measures"]
