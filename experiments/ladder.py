@@ -146,7 +146,14 @@ def draw_rungs(options: Options, apart: dict[str, dict[str, float]], costs: dict
         ax.set_yticks(rows, names)
         ax.set_ylim(-0.5, len(names) - 0.5)
         ax.grid(axis="x", color="#DDDDDD")
-        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=3, frameon=False)
+        ax.legend(
+            loc="upper center",
+            bbox_to_anchor=(0.5, -0.18),
+            ncols=3,
+            frameon=False,
+            columnspacing=1.0,
+            handletextpad=0.2,
+        )
     path = options.path("ladder.png")
     figure.savefig(path, dpi=150)
     return str(path)
