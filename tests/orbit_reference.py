@@ -236,8 +236,7 @@ def gait(start, p, guess=None):
         reached, measures = turn(x, p)
         step = np.linalg.solve(slope, reached - x)
         x = x - step
-        # Each step is some hundredth of the one before: the next would be below 1e-11.
-        if np.max(np.abs(step)) < 5e-10:
+        if np.max(np.abs(step)) < 1e-11:
             return x, measures
     raise AssertionError("no gait of the reference near the start")
 

@@ -77,8 +77,8 @@ def orbit_of(
     last, coarse = found.last, found.coarse
     stability = stability_of(last.monodromy[:, :m], coarse.monodromy[:, :m], velocity, CLOSENESS)
     slopes, looser = (slopes_of(each) for each in (last, coarse))
-    # Where the force itself jumped, a column lacks the jump's own correction.
-    slopes = jax.tree.map(lambda leaf: jnp.where(last.jumps > 0, jnp.nan, leaf), slopes)
+    # Where the force itself jumped on the section, columns lack the jump's own correction.
+    slopes = jax.tree.map(lambda leaf: jnp.where(last.missed > 0, jnp.nan, leaf), slopes)
     errors = jax.tree.map(lambda a, b: jnp.abs(a - b), slopes, looser)
     _, sizes = seeded(args, active, m)
     radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
@@ -123,6 +123,7 @@ def _radius_slopes(
     change = left @ jax.lax.complex(second[:m, :, 0], second[:m, :, 1])
     value = left @ (jacobian.astype(vector.dtype) @ vector)
     slopes = (jnp.conj(value) * change).real / jnp.abs(value)
+    # Second derivatives across a jump of the force itself would need more than its Jacobians'.
     return jnp.where(last.jumps > 0, jnp.nan, slopes)
 
 

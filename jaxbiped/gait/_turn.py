@@ -78,7 +78,7 @@ class Turn(NamedTuple):
         peak: largest load; `peak_row` (n,). Zeros where the system has none.
         code: 0 or that of an `Ending`.
         attempted: solver steps attempted.
-        jumps: crossings where the vector field itself jumped.
+        jumps: crossings where the vector field itself jumped; `missed` of them had no correction.
         nodes: times and states at the ends of the steps of each passage, leaves (steps, …).
     """
 
@@ -94,6 +94,7 @@ class Turn(NamedTuple):
     code: Scalar
     attempted: Scalar
     jumps: Scalar
+    missed: Scalar
     nodes: Any
 
 
@@ -218,5 +219,6 @@ def _turn(
         code=code,
         attempted=jnp.sum(passages.attempted),
         jumps=jnp.sum(passages.jumps),
+        missed=jnp.sum(passages.missed),
         nodes=passages.nodes,
     )

@@ -18,6 +18,7 @@ from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._columns import Seeded, Tangents, active_leaves, with_active
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._landing import Landed, Landing, Watch
+from jaxbiped.solve._leap import can_leap, leap_at
 from jaxbiped.solve._passage import onto_section, peak_of
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.solve._step_control import first_step, step_control
@@ -57,7 +58,7 @@ class Crossed(NamedTuple):
 
     Attributes:
         t, state, columns, time_columns: on the section.
-        code, attempted, jumps, peak, peak_columns: see there.
+        code, attempted, jumps, missed, peak, peak_columns: see there.
     """
 
     t: Any
@@ -67,6 +68,7 @@ class Crossed(NamedTuple):
     code: Any
     attempted: Any
     jumps: Any
+    missed: Any
     peak: Any
     peak_columns: Any
 
@@ -130,6 +132,7 @@ class AdaptiveColumns:
         return _Now(zero, next_t, given.state, columns, landed, columns, count, none, none)
 
     def attempt(self, given: Crossing, now: _Now) -> tuple[_Now, Scalar]:
+        now = self._leapt(given, now)
         step = differentiated_step(
             self.solver.tableau, self.watch.field, now.t, now.next_t, now.state, given.args
         )
@@ -178,6 +181,7 @@ class AdaptiveColumns:
         if self.watch.peak is not None:
             highest = Tangents(now.landed.at_peak, jnp.concatenate(now.peak_columns).T)
             peak, peak_columns = peak_of(self.watch, highest, seeded, _along_rows)
+            peak_columns = jnp.where(now.landed.peak_leapt, jnp.nan, peak_columns)
         return Crossed(
             t=t,
             state=y.state,
@@ -186,9 +190,29 @@ class AdaptiveColumns:
             code=jnp.where(now.landed.arrived, 0, ended),
             attempted=now.attempted,
             jumps=now.landed.jumps,
+            missed=now.landed.leapt,
             peak=peak,
             peak_columns=peak_columns,
         )
+
+    def _leapt(self, given: Crossing, now: _Now) -> _Now:
+        """The columns behind a jump of the field, where the last accepted step passed one."""
+        if not can_leap(self.watch, now.state, given.args):
+            return now
+        leap = leap_at(self.watch, now.state, self._seeded(given), now.landed.leapt)
+
+        def moved(column: Any, forcing: Any) -> Any:
+            return column + leap.change * (jnp.sum(leap.by_state * column) + forcing)
+
+        by_state, by_parameter = now.columns
+        if by_state.shape[0]:
+            by_state = jax.lax.map(lambda column: moved(column, 0.0), by_state)
+        if by_parameter.shape[0]:
+            by_parameter = jax.lax.map(
+                lambda each: moved(each[0], each[1] * each[2]),
+                (by_parameter, leap.by_parameter, given.sizes),
+            )
+        return now._replace(columns=(by_state, by_parameter))
 
     def _seeded(self, given: Crossing) -> Seeded:
         m, p = given.by_state.shape[0], given.by_parameter.shape[0]

@@ -45,6 +45,7 @@ def passage_by_lanes(
         peak=found.peak,
         peak_columns=found.peak_columns,
         jumps=found.jumps,
+        missed=found.missed,
         attempted=found.attempted,
         nodes=_nodes(y0.state, recorded),
     )

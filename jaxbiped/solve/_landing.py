@@ -53,6 +53,8 @@ class Landed(NamedTuple):
         accepted: number of steps accepted.
         landings: number of them that ended just past a switch.
         jumps: number of them that ended past a switch where the vector field itself jumps.
+        leapt: whether the last accepted step did: columns have yet to leap there.
+        peak_leapt: whether the step with the largest value did.
         arrived: whether the section was reached.
         code: that of the misfortune that ended the solve, 0 for none.
         peak: largest value of the watched quantity at the ends of steps; None where none is.
@@ -63,6 +65,8 @@ class Landed(NamedTuple):
     accepted: Scalar
     landings: Scalar
     jumps: Scalar
+    leapt: Scalar
+    peak_leapt: Scalar
     arrived: Scalar
     code: Scalar
     peak: Any
@@ -101,7 +105,8 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
         if self.watch.peak is not None:
             peak = jax.lax.stop_gradient(self.watch.peak(plain_args(args), plain_state(y0)))
         at_peak = None if peak is None else y0
-        return first, Landed(inner, zero, zero, zero, jnp.asarray(False), zero, peak, at_peak)
+        no = jnp.asarray(False)
+        return first, Landed(inner, zero, zero, zero, no, no, no, zero, peak, at_peak)
 
     def adapt_step_size(
         self,
@@ -141,7 +146,7 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
         # A state that is no longer a number leaves no step size to go on with.
         lost = ~jnp.isfinite(next_t1)
         result = diffrax.RESULTS.where(lost, diffrax.RESULTS.dt_min_reached, result)
-        return keep, next_t0, next_t1, jump, landed, result
+        return keep, next_t0, next_t1, jump | landed.leapt, landed, result
 
     def _crossings(
         self, span: Any, scene: PyTree, before: PyTree, after: PyTree, landed: Landed
@@ -199,17 +204,20 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
         if self.watch.ending is not None:
             ending = functools.partial(self.watch.ending, scene, after)
             code = jnp.where(keep, fenced(keep, ending), 0)
-        peak, at_peak = old.peak, old.at_peak
+        peak, at_peak, peak_leapt = old.peak, old.at_peak, old.peak_leapt
         if self.watch.peak is not None:
             value = fenced(keep, functools.partial(self.watch.peak, scene, after))
             record = keep & (value > peak)
             peak = jnp.where(record, value, peak)
+            peak_leapt = jnp.where(record, crossed.jump, peak_leapt)
             at_peak = jtu.tree_map(lambda a, b: jnp.where(record, a, b), y1, at_peak)
         return Landed(
             inner=inner,
             accepted=old.accepted + jnp.where(keep, 1, 0),
             landings=old.landings + jnp.where(keep & crossed.switch, 1, 0),
             jumps=old.jumps + jnp.where(keep & crossed.jump, 1, 0),
+            leapt=jnp.where(keep, crossed.jump, old.leapt),
+            peak_leapt=peak_leapt,
             arrived=keep & crossed.section,
             code=code,
             peak=peak,

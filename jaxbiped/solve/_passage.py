@@ -50,6 +50,7 @@ class Passage(NamedTuple):
         peak: largest value of the watched quantity, 0 where there is none; `peak_columns` its
             derivatives, shape (n,), where the solve carried columns.
         jumps: steps that ended past a switch where the vector field itself jumps.
+        missed: whether the last of them was the last step at all: columns did not leap there.
         attempted: number of steps attempted.
         nodes: times and states at the ends of the accepted steps, where saved.
     """
@@ -61,6 +62,7 @@ class Passage(NamedTuple):
     peak: Scalar
     peak_columns: Any
     jumps: Scalar
+    missed: Scalar
     attempted: Scalar
     nodes: Any
 
@@ -88,7 +90,7 @@ def passage(
     field: Any = watch.field
     if carries:
         controller = TangentControl.around(controller, precision.tangent_rtol)
-        solver = TangentSolver(watch.field, solver, columns_only_steer)
+        solver = TangentSolver(watch, solver, columns_only_steer)
         field = VariationalField(watch.field)
     end = diffrax.SubSaveAt(t1=True)
     every = diffrax.SubSaveAt(t0=True, steps=True, fn=_plain_node)
@@ -112,7 +114,11 @@ def passage(
     landed: Any = solution.controller_state
     last = jtu.tree_map(lambda leaf: leaf[-1], states[0])
     y, time, time_columns = onto_section(watch, last, times[0][-1], args)
-    peak, peak_columns = peak_of(watch, landed.at_peak, args) if carries else (jnp.zeros(()), None)
+    peak, peak_columns = jnp.zeros(()), None
+    if carries:
+        peak, rows = peak_of(watch, landed.at_peak, args)
+        # Columns that have yet to leap do not tell how a load right behind a jump changes.
+        peak_columns = jnp.where(landed.peak_leapt, jnp.nan, rows)
     return Passage(
         y=y,
         time=time,
@@ -121,6 +127,7 @@ def passage(
         peak=peak,
         peak_columns=peak_columns,
         jumps=landed.jumps,
+        missed=landed.leapt,
         attempted=solution.stats["num_steps"],
         nodes=(times[1], states[1]) if save_nodes else None,
     )

@@ -8,11 +8,14 @@ import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns
+from jaxbiped.solve._landing import Watch
+from jaxbiped.solve._leap import can_leap, leap_at, leaping_values
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.solve._rosenbrock_columns import rosenbrock_columns
 
@@ -37,13 +40,13 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
     the state's; `TangentControl` reads it. Steps forwards in time.
 
     Attributes:
-        field: the state's own vector field.
+        watch: with the state's own vector field, and the surfaces where it jumps.
         solver: any one-step solver that carries nothing from step to step.
         columns_only_steer: whether the columns only choose the steps and are not themselves
             differentiated: for reverse mode, whose derivatives then are these columns' transpose.
     """
 
-    field: Callable[..., PyTree]
+    watch: Watch
     solver: diffrax.AbstractAdaptiveSolver
     columns_only_steer: bool = eqx.field(static=True, default=False)
     term_structure: ClassVar = diffrax.AbstractTerm
@@ -76,7 +79,8 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
         made_jump: Any,
     ) -> tuple[Tangents, Tangents, dict[str, Any], None, Any]:
         """One step, as `diffrax.AbstractSolver.step` describes it."""
-        del terms, solver_state, made_jump
+        del terms, solver_state
+        y0 = _leapt(self.watch, y0, args, made_jump)
         if self.columns_only_steer:
             y1, error = _plain_step(self, t0, t1, y0.state, args.args)
             steering, errors = jax.lax.stop_gradient(_tangent_step(self, t0, t1, y0, args))
@@ -86,10 +90,29 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
         return new, error, dict(y0=y0, y1=new), None, diffrax.RESULTS.successful
 
 
+def _leapt(watch: Watch, y: Tangents, args: Seeded, made_jump: Any) -> Tangents:
+    """The columns behind a jump of the field, where one has just been passed.
+
+    The state stays what it is, but JAX's own derivatives of it leap as well.
+    """
+    if not can_leap(watch, y.state, args.args):
+        return y
+    still, held = jax.lax.stop_gradient((y.state, args))
+    leap = leap_at(watch, still, held, jax.lax.stop_gradient(jnp.asarray(made_jump)))
+    rows = leap.by_state @ y.columns + leap.by_parameter @ args.seeds
+    leaves, structure = jtu.tree_flatten(y.state)
+    nothing = leaping_values(watch, y.state, args.args)
+    nothing = nothing - jax.lax.stop_gradient(nothing)
+    shift = jnp.sum(jnp.where(leap.which, nothing, 0.0))
+    moved = [leaf + change * shift for leaf, change in zip(leaves, leap.change, strict=True)]
+    state = jtu.tree_unflatten(structure, moved)
+    return Tangents(state, y.columns + jnp.outer(leap.change, rows))
+
+
 def _plain_step(
     solver: TangentSolver, t0: Any, t1: Any, state: PyTree, args: PyTree
 ) -> tuple[PyTree, PyTree]:
-    term = diffrax.ODETerm(solver.field)
+    term = diffrax.ODETerm(solver.watch.field)
     y1, error, *_ = solver.solver.step(term, t0, t1, state, args, None, False)
     return y1, error
 
@@ -100,7 +123,7 @@ def _tangent_step(
 ) -> tuple[Tangents, Tangents]:
     inner = solver.solver
     if isinstance(inner, AbstractRosenbrock):
-        found = rosenbrock_columns(inner.tableau, solver.field, t0, t1, y0, args)
+        found = rosenbrock_columns(inner.tableau, solver.watch.field, t0, t1, y0, args)
         if found is not None:
             return found
     step = functools.partial(_plain_step, solver, t0, t1)

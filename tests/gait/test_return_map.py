@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import jaxbiped as jb
+from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._orbit import orbit_of
 from jaxbiped.gait._precision import precision_of
 from jaxbiped.gait._search import Method, search
@@ -221,3 +222,44 @@ def test_what_does_not_return_says_so():
     state = (jnp.asarray(0.0), jnp.asarray(3.0))
     found = jb.return_map(args, state, section=up, system=Ball(), time_limit=1.0)
     assert jb.Ending(int(found.code)) == jb.Ending.OUT_OF_STEPS
+
+
+class Step(Flowing):
+    """A force that jumps: y'' = −a above the ground y = s, and +b below it; given as (a, b, s)."""
+
+    def vector_field(self, t, y, args):
+        a, b, ground = args
+        return y[1], jnp.where(y[0] > ground, -a, b)
+
+    def switches(self, args, y):
+        return (Switch(y[0] - args[2], True, force_jumps=True),)
+
+
+@pytest.mark.parametrize(
+    ("mode", "engine"), [("forward", "xla"), ("forward", "lanes"), ("reverse", "xla")]
+)
+def test_derivatives_leap_where_the_force_jumps(mode, engine):
+    """Dropped from y, it turns (y − s) a/b below the ground, after (1 + a/b) √(2 (y − s)/a)."""
+
+    def turned(numbers):
+        y, a, b, ground = numbers
+        r = jb.return_map(
+            (a, b, ground),
+            (y, jnp.zeros_like(y)),
+            section=TURNING_POINT,
+            system=Step(),
+            gradient=MODES[mode],
+            accuracy="tight",
+            engine=engine,
+        )
+        return jnp.stack([r.state[0], r.time])
+
+    def truth(numbers):
+        y, a, b, ground = numbers
+        fall = y - ground
+        return jnp.stack([ground - fall * a / b, (1.0 + a / b) * jnp.sqrt(2.0 * fall / a)])
+
+    at = jnp.array([1.3, 0.9, 3.0, 0.2])
+    assert np.asarray(turned(at)) == pytest.approx(np.asarray(truth(at)), rel=1e-8)
+    ours, expected = derivative(turned, mode)(at), jax.jacfwd(truth)(at)
+    assert np.asarray(ours) == pytest.approx(np.asarray(expected), rel=1e-6, abs=1e-8)
