@@ -151,6 +151,17 @@ def test_rolling_keeps_energy(scene):
     assert abs(float(power)) < 1e-12 * float(jnp.abs(energy(scene, state)) + 1.0)
 
 
+@pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-11])
+def test_a_swing_keeps_energy_to_the_tolerance(rtol):
+    scene = WALKERS[0]
+    start = jb.RigidState(*map(jnp.asarray, (0.0, -0.24, 0.24, -1.09, -1.64)))
+    swing = jb.rigid_walk(scene, start, duration=0.3, rtol=rtol)
+    assert int(swing.footsteps) == 0
+    before, after = float(energy(scene, start)), float(energy(scene, swing.state))
+    # In units of the kinetic energy, which the rates' tolerance is felt in.
+    assert abs(after - before) < 3.0 * rtol * 0.33
+
+
 def test_checks_name_what_a_real_foot_would_do():
     scene = rigid_seed()
     fast = jb.RigidState(*map(jnp.asarray, (0.0, -0.2, 0.2, 0.0, -12.0)))
