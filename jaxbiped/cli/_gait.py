@@ -84,7 +84,8 @@ class FindGait:
         report = Report(self.output.json)
         if found:
             _print(report, numbers, gait)
-            report.say(_assumed(numbers.get("assumptions")))
+            if "assumptions" in numbers:
+                report.say(_assumed(numbers["assumptions"]))
         else:
             report.say(_failure(numbers, gait))
         if found and self.output.out is not None:
@@ -173,9 +174,7 @@ def _assumptions(scene: RigidScene, gait: Gait) -> dict[str, float]:
     }
 
 
-def _assumed(known: dict[str, float] | None) -> str:
-    if known is None:
-        return ""
+def _assumed(known: dict[str, float]) -> str:
     flies = "would fly" if known["least_normal_N"] <= 0.0 else "stays down"
     held = "leaves the ground" if known["lifting_m_s"] >= 0.0 else "would be held by the ground"
     return (

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._state import State
@@ -35,7 +36,11 @@ def foot_force(scene: Scene, foot: Foot) -> FootForce:
     if isinstance(scene.friction, Frictionless):
         return FootForce(normal, None)
     if isinstance(scene.friction, AbstractBristleLaw):
-        assert foot.bristle is not None
+        if foot.bristle is None:
+            raise ArgumentError(
+                f"state has no bristles, which friction = {type(scene.friction).__name__} needs: "
+                "give a BristleState."
+            )
         return FootForce(normal, scene.friction.force(normal, foot.slip_speed, foot.bristle))
     return FootForce(normal, scene.friction.force(normal, foot.slip_speed))
 

@@ -101,8 +101,8 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
 def _bristle_rates(law: AbstractBristleLaw, scene: Scene, state: State) -> dict[str, Scalar]:
     rates = {}
     for name, foot in zip(("bristle_1", "bristle_2"), feet(scene, state), strict=True):
+        load = foot_force(scene, foot).normal  # refuses a foot without a bristle
         assert foot.bristle is not None
-        load = foot_force(scene, foot).normal
         rates[name] = law.bristle_rate(load, foot.slip_speed, foot.bristle)
     return rates
 

@@ -1,5 +1,7 @@
 """Leg angles over time (paper, figure 6)."""
 
+from typing import Any
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -29,8 +31,13 @@ def leg_angles(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None) 
         ValueError: the trajectory was not saved step by step.
     """
     t, state = sampled(trajectory)
+    return draw_leg_angles(t, (state.theta_1, state.theta_2), "Leg angles", ax)
+
+
+def draw_leg_angles(t: Any, angles: tuple[Any, Any], title: str, ax: Axes | None) -> Figure:
+    """Draws the angles of leg 1 and leg 2 [rad] at times [s]."""
     ax = axes_or_new(ax, 7.2, 3.4)
-    for k, angle in enumerate((state.theta_1, state.theta_2)):
+    for k, angle in enumerate(angles):
         ax.plot(
             t,
             angle,
@@ -40,6 +47,6 @@ def leg_angles(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None) 
             label=LEG_NAMES[k],
         )
     ax.margins(x=0.01)
-    dress(ax, "Leg angles", "time, $t$ (s)", r"leg angle, $\theta$ (rad)")
+    dress(ax, title, "time, $t$ (s)", r"leg angle, $\theta$ (rad)")
     legend_above(ax)
     return figure_of(ax)

@@ -8,15 +8,7 @@ from matplotlib.figure import Figure
 
 from jaxbiped._checks import check_positive
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.plot._style import (
-    LEG_COLOURS,
-    LEG_NAMES,
-    LEG_STYLES,
-    axes_or_new,
-    dress,
-    figure_of,
-    legend_above,
-)
+from jaxbiped.plot._leg_angle import draw_leg_angles
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 
@@ -44,17 +36,5 @@ def rigid_leg_angles(
     walks = jax.vmap(lambda t: rigid_walk(scene, state, duration=t))(times)
     odd = np.asarray(walks.footsteps) % 2 == 1
     one, two = np.asarray(walks.state.theta_1), np.asarray(walks.state.theta_2)
-    ax = axes_or_new(ax, 7.2, 3.4)
-    for k, angle in enumerate((np.where(odd, two, one), np.where(odd, one, two))):
-        ax.plot(
-            times,
-            angle,
-            color=LEG_COLOURS[k],
-            linestyle=LEG_STYLES[k],
-            linewidth=1.3,
-            label=LEG_NAMES[k],
-        )
-    ax.margins(x=0.01)
-    dress(ax, "Leg angles on rigid feet", "time, $t$ (s)", r"leg angle, $\theta$ (rad)")
-    legend_above(ax)
-    return figure_of(ax)
+    angles = (np.where(odd, two, one), np.where(odd, one, two))
+    return draw_leg_angles(times, angles, "Leg angles on rigid feet", ax)

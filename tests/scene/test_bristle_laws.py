@@ -146,3 +146,9 @@ def test_bad_arguments():
         jb.Dahl(mu=0.4, sigma_0=0.0)
     with pytest.raises(jb.ArgumentError, match="v_s = -1"):
         jb.LuGre(mu_static=0.5, mu_kinetic=0.4, v_s=-1.0, sigma_0=1e4, sigma_1=1.0)
+
+
+def test_a_state_without_bristles_is_refused_where_nothing_adds_them():
+    for use in (jb.foot_forces, lambda scene, state: jb.vector_field(0.0, state, scene)):
+        with pytest.raises(jb.ArgumentError, match="state has no bristles, which friction = LuGre"):
+            use(with_law(LUGRE), jb.seed_state())
