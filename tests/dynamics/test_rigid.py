@@ -8,6 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
+from tests.rigid_reference import (
+    contact_rows,
+    coordinates,
+    impact_solution,
+    rolling_solution,
+)
 from tests.rigid_walkers import compass_gait, rigid_seed, simplest_walker
 
 WALKERS = [rigid_seed(0.03), compass_gait(), jb.RigidScene(
@@ -20,50 +26,12 @@ states = st.builds(
 )  # fmt: skip
 
 
-def mass_matrix(walker, theta):
-    """Of (hip x, hip z, θ1, θ2), without any contact."""
-    m, d = float(walker.m), float(walker.d)
-    matrix = np.diag([float(walker.total_mass)] * 2 + [float(walker.J) + m * d * d] * 2)
-    for i, angle in enumerate(theta):
-        column = m * d * np.array([np.cos(angle), np.sin(angle)])
-        matrix[:2, 2 + i] = matrix[2 + i, :2] = column
-    return matrix
-
-
-def contact_rows(walker, angle, leg):
-    """Velocity of the point of a foot that touches, by (hip vx, hip vz, ω1, ω2)."""
-    reach, r = float(walker.hip_to_foot), float(walker.r)
-    rows = np.zeros((2, 4))
-    rows[:, :2] = np.eye(2)
-    rows[:, 2 + leg] = [reach * np.cos(angle) + r, reach * np.sin(angle)]
-    return rows
-
-
-def coordinates(scene, state):
-    whole = jb.whole_state(scene, state)
-    theta = np.array([float(state.theta_1), float(state.theta_2)])
-    rates = np.array([float(whole.hip_vx), float(whole.hip_vz), *map(float, state[3:])])
-    return whole, theta, rates
-
-
 @pytest.mark.parametrize("scene", WALKERS)
 @settings(deadline=None, max_examples=25)
 @given(states)
 def test_rolling_solves_the_equations_with_multipliers(scene, state):
-    walker, slope, g = scene.walker, float(scene.ground.slope), float(scene.ground.g)
     _, theta, rates = coordinates(scene, state)
-    m, d, total = float(walker.m), float(walker.d), float(walker.total_mass)
-    matrix, rows = mass_matrix(walker, theta), contact_rows(walker, theta[1], 1)
-    pull = g * np.array([np.sin(slope), -np.cos(slope)])
-    forces = np.concatenate([total * pull, np.zeros(2)])
-    reach = float(walker.hip_to_foot)
-    for i, angle in enumerate(theta):
-        outward = np.array([-np.sin(angle), np.cos(angle)])
-        forces[:2] -= m * d * outward * rates[2 + i] ** 2
-        forces[2 + i] += m * d * pull @ [np.cos(angle), np.sin(angle)]
-    centripetal = reach * np.array([-np.sin(theta[1]), np.cos(theta[1])]) * rates[3] ** 2
-    system = np.block([[matrix, -rows.T], [rows, np.zeros((2, 2))]])
-    solved = np.linalg.solve(system, np.concatenate([forces, -centripetal]))
+    solved = rolling_solution(scene, theta, rates)
     motion = jb.rolling(scene, state)
     got = [motion.alpha_1, motion.alpha_2, motion.force.tangential, motion.force.normal]
     scale = np.abs(solved).max()
@@ -104,10 +72,7 @@ def test_an_impact_keeps_two_angular_momenta_and_stops_the_new_contact(scene, st
     for point, legs, with_hip in ((contact, (0, 1), True), (hip, (1,), False)):
         kept = momentum_about(point, before, legs, with_hip)
         assert abs(momentum_about(point, after, legs, with_hip) - kept) < 1e-12 * scale
-    rows = contact_rows(walker, theta[0], 0)
-    matrix = mass_matrix(walker, theta)
-    system = np.block([[matrix, -rows.T], [rows, np.zeros((2, 2))]])
-    solved = np.linalg.solve(system, np.concatenate([matrix @ before, np.zeros(2)]))
+    solved = impact_solution(scene, theta, before)
     np.testing.assert_allclose(after, solved[:4], rtol=1e-9, atol=1e-11 * scale)
     impulse = [found.impulse_x, found.impulse_z]
     np.testing.assert_allclose(np.array(impulse), solved[4:], rtol=1e-9, atol=1e-11 * scale)

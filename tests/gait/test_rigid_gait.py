@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 import jaxbiped as jb
+from tests.rigid_reference import footstep
 from tests.rigid_walkers import (
     FIRST_DOUBLING,
     MULTIPLIER,
@@ -61,13 +62,22 @@ def test_first_period_doubling_of_the_simplest_walker():
 
 
 def test_compass_gait_converges_and_is_stable():
-    """Step period and length are those of the literature's phase portraits, to their digits."""
+    """One of the gaits that starts lead to is stable; an independent solve returns to it."""
     gaits = jb.find_gaits(compass_gait(), jb.rolling_starts(compass_gait(), 32, spread=0.5))
     stable = np.asarray(gaits.gaits.stable)
     assert stable.sum() == 1
     k = int(np.argmax(stable))
     assert float(gaits.gaits.measures.period[k]) == pytest.approx(0.734, abs=1e-3)
     assert float(gaits.gaits.measures.step_length[k]) == pytest.approx(0.535, abs=1e-3)
+    state = jax.tree.map(lambda leaf: leaf[k], gaits.gaits.measures.state)
+    assert_returns(compass_gait(), state, gaits.gaits.measures.period[k])
+
+
+def assert_returns(scene, state, period):
+    """A footstep by another program and integrator, with multipliers, leads back to the state."""
+    after, time = footstep(scene, state)
+    np.testing.assert_allclose(after, np.array(state[1:]), rtol=0.0, atol=2e-8)
+    assert time == pytest.approx(float(period), abs=2e-8)
 
 
 def test_the_seeds_walker_in_the_rigid_limit():
@@ -76,6 +86,7 @@ def test_the_seeds_walker_in_the_rigid_limit():
     assert bool(gait.stable)
     assert float(gait.measures.period) == pytest.approx(0.44378, abs=5e-6)
     assert float(gait.measures.step_length) == pytest.approx(0.19041, abs=5e-6)
+    assert_returns(rigid_seed(), gait.measures.state, gait.measures.period)
     # Mass alone scales nothing, and gravity only the time.
     index = gait.parameters.index
     elasticities = gait.elasticities
@@ -96,7 +107,7 @@ def test_sensitivities_equal_differences(measure):
     at = gait.measures.state
 
     def value(parameter, step):
-        moved = {"slope": 0.02, "r": 0.08, "d": 0.1, "hip_mass": 0.0} | {}
+        moved = {"slope": 0.02, "r": 0.08, "d": 0.1, "hip_mass": 0.0}
         moved[parameter] += step
         walker = jb.seed_scene(**{k: v for k, v in moved.items() if k != "slope"}).walker
         changed = jb.RigidScene(walker=walker, ground=jb.Ground(slope=moved["slope"]))
