@@ -9,7 +9,7 @@ import pytest
 import jaxbiped as jb
 
 PACKAGE = Path(jb.__file__).parent
-LAYERS = ["scene", "dynamics", "solve", "lanes", "simulate", "gait", "plot", "cli"]
+LAYERS = ["scene", "dynamics", "solve", "lanes", "simulate", "gait", "sweep", "plot", "cli"]
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 

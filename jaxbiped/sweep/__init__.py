@@ -1,0 +1,1 @@
+"""Basins of attraction: starts, labels, sweeps and stores. Public names: see `jaxbiped`."""
