@@ -132,3 +132,9 @@ from jaxbiped.simulate._simulate import Simulation as Simulation
 from jaxbiped.simulate._simulate import simulate as simulate
 from jaxbiped.solve._solvers import SOLVERS as SOLVERS
 from jaxbiped.solve._trajectory import Trajectory as Trajectory
+from jaxbiped.sweep._fractions import Fraction as Fraction
+from jaxbiped.sweep._fractions import basin_fractions as basin_fractions
+from jaxbiped.sweep._fractions import wilson_interval as wilson_interval
+from jaxbiped.sweep._label import Label as Label
+from jaxbiped.sweep._label import label_name as label_name
+from jaxbiped.sweep._label import label_names as label_names
