@@ -138,3 +138,5 @@ from jaxbiped.sweep._fractions import wilson_interval as wilson_interval
 from jaxbiped.sweep._label import Label as Label
 from jaxbiped.sweep._label import label_name as label_name
 from jaxbiped.sweep._label import label_names as label_names
+from jaxbiped.sweep._refine import RefinedBoundary as RefinedBoundary
+from jaxbiped.sweep._refine import refined_boundary as refined_boundary
