@@ -132,6 +132,8 @@ from jaxbiped.simulate._simulate import Simulation as Simulation
 from jaxbiped.simulate._simulate import simulate as simulate
 from jaxbiped.solve._solvers import SOLVERS as SOLVERS
 from jaxbiped.solve._trajectory import Trajectory as Trajectory
+from jaxbiped.sweep._dimension import Dimension as Dimension
+from jaxbiped.sweep._dimension import boundary_dimension as boundary_dimension
 from jaxbiped.sweep._fractions import Fraction as Fraction
 from jaxbiped.sweep._fractions import basin_fractions as basin_fractions
 from jaxbiped.sweep._fractions import wilson_interval as wilson_interval
@@ -140,3 +142,6 @@ from jaxbiped.sweep._label import label_name as label_name
 from jaxbiped.sweep._label import label_names as label_names
 from jaxbiped.sweep._refine import RefinedBoundary as RefinedBoundary
 from jaxbiped.sweep._refine import refined_boundary as refined_boundary
+from jaxbiped.sweep._uncertainty import Uncertainty as Uncertainty
+from jaxbiped.sweep._uncertainty import sampled_uncertainty as sampled_uncertainty
+from jaxbiped.sweep._uncertainty import uncertainty_exponent as uncertainty_exponent
