@@ -134,6 +134,8 @@ from jaxbiped.solve._solvers import SOLVERS as SOLVERS
 from jaxbiped.solve._trajectory import Trajectory as Trajectory
 from jaxbiped.sweep._dimension import Dimension as Dimension
 from jaxbiped.sweep._dimension import boundary_dimension as boundary_dimension
+from jaxbiped.sweep._entropy import BasinEntropy as BasinEntropy
+from jaxbiped.sweep._entropy import basin_entropy as basin_entropy
 from jaxbiped.sweep._fractions import Fraction as Fraction
 from jaxbiped.sweep._fractions import basin_fractions as basin_fractions
 from jaxbiped.sweep._fractions import wilson_interval as wilson_interval
