@@ -136,6 +136,8 @@ from jaxbiped.sweep._dimension import Dimension as Dimension
 from jaxbiped.sweep._dimension import boundary_dimension as boundary_dimension
 from jaxbiped.sweep._entropy import BasinEntropy as BasinEntropy
 from jaxbiped.sweep._entropy import basin_entropy as basin_entropy
+from jaxbiped.sweep._fatal_push import FatalPush as FatalPush
+from jaxbiped.sweep._fatal_push import fatal_push as fatal_push
 from jaxbiped.sweep._fractions import Fraction as Fraction
 from jaxbiped.sweep._fractions import basin_fractions as basin_fractions
 from jaxbiped.sweep._fractions import wilson_interval as wilson_interval
