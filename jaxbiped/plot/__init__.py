@@ -1,16 +1,18 @@
 """Figures and animation of simulated walks. This is their one import path.
 
 The figures of a motion take the scene and a trajectory that was saved step by step; those of a
-periodic gait take the gait; those of a law of contact take the law. Each draws into the axes or the
-figure it is given (or a new one) and returns the figure. None touches pyplot, so all work without a
-display.
+periodic gait take the gait; those of a law of contact take the law; those of basins take labels,
+refined boundaries or fractions. Each draws into the axes or the figure it is given (or a new one)
+and returns the figure. None touches pyplot, so all work without a display.
 """
 
 from jaxbiped.plot._animation import animate as animate
 from jaxbiped.plot._animation import animation_html as animation_html
 from jaxbiped.plot._animation import save_animation as save_animation
+from jaxbiped.plot._basin import basin as basin
 from jaxbiped.plot._bristle_law import bristle_law as bristle_law
 from jaxbiped.plot._contact_forces import contact_forces as contact_forces
+from jaxbiped.plot._fractions import basin_fractions as basin_fractions
 from jaxbiped.plot._laws import friction_law as friction_law
 from jaxbiped.plot._laws import normal_law as normal_law
 from jaxbiped.plot._leg_angle import leg_angles as leg_angles
@@ -18,6 +20,7 @@ from jaxbiped.plot._multipliers import multipliers as multipliers
 from jaxbiped.plot._orbit import gait_orbit as gait_orbit
 from jaxbiped.plot._penetration import penetrations as penetrations
 from jaxbiped.plot._phase_portrait import phase_portrait as phase_portrait
+from jaxbiped.plot._refined_basin import refined_basin as refined_basin
 from jaxbiped.plot._rigid_leg_angle import rigid_leg_angles as rigid_leg_angles
 from jaxbiped.plot._strobe import gait_strobe as gait_strobe
 from jaxbiped.plot._tornado import elasticities as elasticities

@@ -1,0 +1,212 @@
+"""A picture of basins of attraction in two coordinates of the start."""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from jaxbiped._checks import ArgumentError, check_finite
+from jaxbiped.plot._label_colours import GAIT_SUFFIX, in_order, label_colour
+from jaxbiped.plot._style import axes_or_new, figure_of
+from jaxbiped.sweep._fractions import basin_fractions
+from jaxbiped.sweep._label import Label, label_names
+
+_HATCH = "////"
+"""Over what is pending, so that it reads as missing in print without colour too."""
+
+
+def basin(
+    labels: npt.ArrayLike,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    *,
+    names: tuple[str, str],
+    units: tuple[str, str] = ("", ""),
+    period: npt.ArrayLike | None = None,
+    gait: npt.ArrayLike | None = None,
+    mark: tuple[float, float] | None = None,
+    title: str = "",
+    ax: Axes | None = None,
+) -> Figure:
+    """Draws labels of starts on a grid, each in its own colour, and says the fraction of each.
+
+    Args:
+        labels: codes of `Label` or names (`label_names`), shape (ny, nx); row by row along y.
+        x, y: coordinates along the two axes, increasing: centres, shape (nx,) and (ny,), or edges
+            of the cells, one more.
+        names, units: what the axes are, as ("angle of the stance leg", …) and ("rad", …).
+        period: footsteps in the cycle of the gait that each start walks to, a shape that
+            broadcasts to (ny, nx); only for codes. Unless given, it is not said.
+        gait: which gait that is, from 0, to tell apart those of one period; only for codes.
+        mark: where the gait is, in the units of the axes.
+        title: above the axes.
+        ax: axes to draw into; a new figure unless given.
+
+    Raises:
+        ArgumentError: shapes that do not fit, an empty grid, coordinates that do not increase.
+    """
+    words = names_of(labels, period, gait)
+    x_edges, y_edges = _edges("x", x, words.shape[1]), _edges("y", y, words.shape[0])
+    ax = axes_or_new(ax, 7.2, 4.4)
+    draw_labels(ax, words, x_edges, y_edges)
+    finish(ax, words, names, units, mark, title)
+    return figure_of(ax)
+
+
+def names_of(
+    labels: npt.ArrayLike,
+    period: npt.ArrayLike | None = None,
+    gait: npt.ArrayLike | None = None,
+) -> np.ndarray:
+    """Names on a grid of two dimensions, from names or codes, periods and gaits.
+
+    Raises:
+        ArgumentError: not a grid of two dimensions, a code that is not known, or shapes that do
+            not fit.
+    """
+    grid = np.asarray(labels)
+    if grid.ndim != 2 or grid.size == 0:
+        raise ArgumentError(
+            f"labels has shape {grid.shape}: it must be (ny, nx) with at least one entry."
+        )
+    if grid.dtype.kind not in "iu":
+        return grid.astype(str).astype(object)
+    unknown = sorted(set(np.unique(grid).tolist()) - set(map(int, Label)))
+    if unknown:
+        raise ArgumentError(f"labels holds {unknown[0]}: it must hold names or codes of Label.")
+    if period is None:
+        words = np.vectorize(lambda code: str(Label(code)), otypes=[object])(grid)
+    else:
+        words = label_names(grid, _fitting("period", period, grid.shape))
+    if gait is not None:
+        which = _fitting("gait", gait, grid.shape)
+        walks = grid == Label.WALKING
+        words[walks] += [GAIT_SUFFIX.format(gait=k) for k in which[walks]]
+    return words
+
+
+def _fitting(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
+    array = np.asarray(value)
+    try:
+        return np.broadcast_to(array, shape)
+    except ValueError:
+        raise ArgumentError(
+            f"{name} has shape {array.shape}: it must fit labels, {shape}."
+        ) from None
+
+
+def _edges(name: str, value: npt.ArrayLike, n: int) -> np.ndarray:
+    """The edges of n cells, given them or the centres."""
+    check_finite(name, value)
+    array = np.asarray(value, dtype=float)
+    if array.shape not in ((n,), (n + 1,)):
+        raise ArgumentError(
+            f"{name} has shape {array.shape}: it must be ({n},), centres, or ({n + 1},), edges."
+        )
+    if (np.diff(array) <= 0.0).any():
+        raise ArgumentError(f"{name} does not increase everywhere: it must.")
+    if array.size == n + 1:
+        return array
+    if n == 1:
+        raise ArgumentError(f"{name} has one centre: it must be given by its 2 edges.")
+    middle = 0.5 * (array[1:] + array[:-1])
+    return np.concatenate([[2 * array[0] - middle[0]], middle, [2 * array[-1] - middle[-1]]])
+
+
+def draw_labels(ax: Axes, words: np.ndarray, x_edges: np.ndarray, y_edges: np.ndarray) -> None:
+    """Fills each cell with its label's colour, and hatches what is pending."""
+    present = in_order(set(words.ravel().tolist()))
+    codes = np.searchsorted(np.sort(present), words.astype(str))
+    places = np.argsort(present)[codes]
+    colours = ListedColormap([label_colour(name) for name in present])
+    norm = BoundaryNorm(np.arange(len(present) + 1) - 0.5, len(present))
+    ax.pcolormesh(x_edges, y_edges, places, cmap=colours, norm=norm, rasterized=True)
+    pending = words == str(Label.PENDING)
+    if pending.any():
+        _hatch(ax, pending, x_edges, y_edges)
+
+
+def _hatch(ax: Axes, pending: np.ndarray, x_edges: np.ndarray, y_edges: np.ndarray) -> None:
+    """Hatches each run of pending cells in a row as one rectangle: few of them on a large grid."""
+    beyond = np.zeros((len(pending), 1), dtype=bool)
+    turns = np.diff(np.concatenate([beyond, pending, beyond], axis=1).astype(int), axis=1)
+    row, left = np.nonzero(turns == 1)
+    _, right = np.nonzero(turns == -1)
+    across = x_edges[np.stack([left, right, right, left], axis=1)]
+    along = y_edges[np.stack([row, row, row + 1, row + 1], axis=1)]
+    runs = PolyCollection(
+        list(np.stack([across, along], axis=-1)),
+        facecolors="none",
+        edgecolors="#A0A0A0",
+        linewidths=0.0,
+        hatch=_HATCH,
+    )
+    ax.add_collection(runs, autolim=False)
+
+
+def finish(
+    ax: Axes,
+    words: np.ndarray,
+    names: tuple[str, str],
+    units: tuple[str, str],
+    mark: tuple[float, float] | None,
+    title: str,
+    more: tuple[Any, ...] = (),
+) -> None:
+    """Names of the axes, the gait's mark, and the legend with fractions right of the axes."""
+    handles = [*_patches(words), *more]
+    if mark is not None:
+        check_finite("mark", mark)
+        if np.shape(mark) != (2,):
+            raise ArgumentError(f"mark = {mark!r} is not allowed: it must be two numbers, x and y.")
+        style: dict[str, Any] = {
+            "marker": "*", "markersize": 15, "markerfacecolor": "white",
+            "markeredgecolor": "black", "linestyle": "none",
+        }  # fmt: skip
+        ax.plot(*mark, clip_on=False, zorder=5, **style)
+        handles.append(Line2D([], [], label="gait", **style))
+    ax.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(1.01, 1.0),
+        frameon=False,
+        fontsize="small",
+        borderaxespad=0.0,
+    )
+    x_label, y_label = (
+        f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=True)
+    )
+    ax.set_xlabel(x_label)
+    ax.set_ylabel(y_label)
+    ax.set_title(title, loc="left", fontsize="medium")
+
+
+def _patches(words: np.ndarray) -> list[Patch]:
+    """Entries of the legend: labels that occur, with their parts of what is labelled."""
+    fractions = basin_fractions(words)
+    patches = []
+    for name in in_order(set(words.ravel().tolist())):
+        if name == str(Label.PENDING):
+            text = f"{name}: {int((words == name).sum())} of {words.size}"
+            patch = Patch(facecolor=label_colour(name), edgecolor="#A0A0A0", hatch=_HATCH)
+        else:
+            text = f"{name}: {_percent(fractions[name].estimate)}"
+            patch = Patch(facecolor=label_colour(name), edgecolor="#404040", linewidth=0.5)
+        patch.set_label(text)
+        patches.append(patch)
+    return patches
+
+
+def _percent(part: float) -> str:
+    """A part as a percentage; never as 0 % of what occurs or 100 % of what is not all."""
+    digits = 2 if 0.0 < part < 0.001 or 0.999 < part < 1.0 else 1
+    shown = f"{100.0 * part:.{digits}f}"
+    if part < 1.0 and float(shown) == 100.0:
+        return "> 99.99 %"
+    return "< 0.01 %" if part > 0.0 and float(shown) == 0.0 else f"{shown} %"

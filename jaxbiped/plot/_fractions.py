@@ -1,0 +1,117 @@
+"""Fractions of the basins along a parameter."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
+from jaxbiped.plot._label_colours import in_order, label_colour, label_marker
+from jaxbiped.plot._style import axes_or_new, dress, figure_of
+from jaxbiped.sweep._fractions import Fraction, wilson_interval
+
+
+def basin_fractions(
+    values: npt.ArrayLike,
+    fractions: Sequence[Mapping[str, Fraction]],
+    *,
+    name: str,
+    unit: str = "",
+    kind: str = "lines",
+    confidence: float = 0.95,
+    log: bool = False,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draws the fraction of starts with each label against a parameter.
+
+    Lines lie in bands, Wilson's intervals of the counts (see `wilson_interval`); a label that
+    did not occur at a value counts as none of the starts there.
+
+    Args:
+        values: the parameter, increasing, shape (n,).
+        fractions: what `jaxbiped.basin_fractions` found at each value.
+        name, unit: of the parameter.
+        kind: "lines", or "stacked": areas that add up to one, without bands.
+        confidence: of the bands.
+        log: whether the parameter's axis is logarithmic.
+        ax: axes to draw into; a new figure unless given.
+
+    Raises:
+        ArgumentError: no value, as many values as fractions are not there, values that do not
+            increase or are not above 0 on a logarithmic axis, one value to stack, or nothing
+            labelled at a value.
+    """
+    check_choice("kind", kind, ("lines", "stacked"))
+    along = _checked(values, fractions, log)
+    if kind == "stacked" and along.size == 1:
+        raise ArgumentError("values has one entry: a stacked figure must have at least 2.")
+    labels = in_order({label for found in fractions for label in found})
+    counts = np.asarray([[_count(found, label) for found in fractions] for label in labels])
+    totals = counts.sum(axis=0)
+    ax = axes_or_new(ax, 7.2, 4.0)
+    if kind == "stacked":
+        colours = [label_colour(label) for label in labels]
+        ax.stackplot(
+            along, counts / totals, labels=labels, colors=colours, edgecolor="white", linewidth=0.4
+        )
+    else:
+        low, high = wilson_interval(counts, totals, confidence=confidence)
+        for k, label in enumerate(labels):
+            colour = label_colour(label)
+            ax.fill_between(along, low[k], high[k], color=colour, alpha=0.25, linewidth=0.0)
+            marker: dict[str, Any] = {
+                "marker": label_marker(label),
+                "markersize": 4.0,
+                "clip_on": False,
+            }
+            ax.plot(along, counts[k] / totals, color=colour, label=label, **marker)
+    _frame(ax, along, name, unit, log, f"bands: {100.0 * confidence:.4g} % confidence", kind)
+    return figure_of(ax)
+
+
+def _count(found: Mapping[str, Fraction], label: str) -> int:
+    return found[label].count if label in found else 0
+
+
+def _checked(
+    values: npt.ArrayLike, fractions: Sequence[Mapping[str, Fraction]], log: bool
+) -> np.ndarray:
+    check_finite("values", values)
+    along = np.asarray(values, dtype=float)
+    if along.ndim != 1 or along.size == 0 or along.size != len(fractions):
+        raise ArgumentError(
+            f"values has shape {along.shape} and there are {len(fractions)} fractions: there must "
+            "be one for each value, and at least one."
+        )
+    if (np.diff(along) <= 0.0).any():
+        raise ArgumentError("values does not increase everywhere: it must.")
+    if log:
+        check_positive("values", along)
+    empty = [k for k, found in enumerate(fractions) if not found]
+    if empty:
+        raise ArgumentError(
+            f"fractions[{empty[0]}] is empty: at least one start must be labelled at each value."
+        )
+    return along
+
+
+def _frame(
+    ax: Axes, along: np.ndarray, name: str, unit: str, log: bool, bands: str, kind: str
+) -> None:
+    title = "Fractions of the starts" + (f" ({bands})" if kind == "lines" else "")
+    dress(ax, title, f"{name} ({unit})" if unit else name, "fraction of the starts")
+    if log:
+        ax.set_xscale("log")
+    if along.size > 1:
+        ax.set_xlim(along[0], along[-1])
+    ax.set_ylim(*((0.0, 1.0) if kind == "stacked" else (-0.02, 1.02)))
+    handles, labels = ax.get_legend_handles_labels()
+    if kind == "stacked":
+        handles, labels = handles[::-1], labels[::-1]
+    ax.legend(
+        handles, labels, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False,
+        fontsize="small", borderaxespad=0.0,
+    )  # fmt: skip
