@@ -12,7 +12,7 @@ from jaxbiped.sweep._sphere import normalised
 Normal = Callable[[np.ndarray], npt.ArrayLike]
 """Gradients, shape (n, d), of points on the boundary, shape (n, d)."""
 
-_TURNS = (1.0, 0.5, 2.0, 0.25, 4.0, 0.125, 0.0625, 0.03125)
+_TURNS = (1.0, 0.5, 2.0, 0.25)
 """Parts of the way to the normal that are tried: short ones where the boundary bulges inward."""
 _SHORTEST = 0.02
 """Turns are halved where none helps, and given up below this part of their lengths."""

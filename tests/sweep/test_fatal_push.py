@@ -95,12 +95,25 @@ def test_any_plane(d, seed, distance):
     assert distance <= found.distance <= distance + 1.5 * TOLERANCE
 
 
-def test_an_edge_that_points_inward_is_found_roughly():
+@pytest.mark.parametrize("seed", range(6))
+def test_an_edge_that_points_inward_is_found_roughly(seed):
     """No normal exists at the nearest point: rays beside the best one are tried."""
-    label_of = lambda x: ((x[:, 0] > 1.0) & (x[:, 1] > 0.7)).astype(int)
+    one, two, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0].T
+    label_of = lambda x: ((x @ one > 1.0) & (x @ two > 0.7)).astype(int)
     found = _push(label_of, np.zeros(3), np.ones(3))
-    assert found.bisected_distance > np.hypot(1.0, 0.7) + 0.015
-    assert found.distance == pytest.approx(np.hypot(1.0, 0.7), abs=0.01)
+    assert found.bisected_distance > np.hypot(1.0, 0.7) + 0.02
+    assert found.distance == pytest.approx(np.hypot(1.0, 0.7), abs=0.02)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_distance_by_bisection_alone_is_that_of_the_nearest_ray(seed):
+    rays = np.random.default_rng(seed).normal(size=(300, 3))
+    rays /= np.linalg.norm(rays, axis=1)[:, None]
+    normal = np.array([0.6, 0.0, 0.8])
+    found = _push(half_space(normal, 0.9), np.zeros(3), np.ones(3), directions=rays, steps=8)
+    nearest = 0.9 / np.max(rays @ normal)
+    assert nearest <= found.bisected_distance <= nearest + TOLERANCE
+    assert 0.9 <= found.distance <= 0.9 + 1.5 * TOLERANCE
 
 
 def test_the_nearest_of_two_boundaries_and_its_label():
