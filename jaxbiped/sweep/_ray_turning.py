@@ -132,10 +132,7 @@ def turned(
         old = rays.take(k)
         tried = _between(old, normals[k], length[k])
         if normals_of.polls:
-            basis = np.linalg.qr(random.normal(size=(d - 1, d - 1)))[0] @ _tangents(old.directions)
-            tried = np.concatenate(
-                [tried, _beside(old.directions, basis, _POLL * length[k])], axis=1
-            )
+            tried = np.concatenate([tried, _around(old, _POLL * length[k], random)], axis=1)
         new = nearest_of(around, tried, old.outside, tolerance)
         found = np.isfinite(new.outside)
         length[k] *= 0.5
@@ -156,6 +153,13 @@ def _between(rays: Brackets, normals: np.ndarray, length: np.ndarray) -> np.ndar
     """Directions part of the way to the normals, and beyond; shape (n, turns, d)."""
     parts = np.multiply.outer(length, _TURNS)[:, :, None]
     return normalised(rays.directions[:, None] + parts * (normals - rays.directions)[:, None])
+
+
+def _around(rays: Brackets, angle: np.ndarray, random: np.random.Generator) -> np.ndarray:
+    """Directions at an angle (n,) to the rays, another way each time; shape (n, 2 (d − 1), d)."""
+    tangents = _tangents(rays.directions)
+    basis = np.linalg.qr(random.normal(size=(tangents.shape[1],) * 2))[0]
+    return _beside(rays.directions, basis @ tangents, angle)
 
 
 def _angle(rays: Brackets, normals: np.ndarray) -> np.ndarray:

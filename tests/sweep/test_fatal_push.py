@@ -70,6 +70,8 @@ def test_shortest_axis_of_an_ellipsoid(d, with_normal):
     _consistent(found, label_of, origin, scales)
     assert true <= found.distance <= true + 1.5 * TOLERANCE
     assert (found.origin_label, found.label) == (4, 2)
+    aligned = np.sqrt(TOLERANCE / true)
+    assert found.angle <= (0.1 * aligned if with_normal else aligned)
 
 
 @pytest.mark.parametrize("with_normal", [True, False])
