@@ -53,7 +53,7 @@ class RefinedBoundary:
     @property
     def points(self) -> np.ndarray:
         """Coordinates of the points labelled, shape (n, d)."""
-        return self.lower + self.positions * self.cell_size(self.levels)
+        return _places(self.lower, self.upper, self.cells_across(self.levels), self.positions)
 
     def cells_across(self, level: int) -> tuple[int, ...]:
         """How many cells of a level lie along each dimension of the box."""
@@ -153,6 +153,14 @@ def refined_boundary(
     )
 
 
+def _places(
+    lower: np.ndarray, upper: np.ndarray, across: npt.ArrayLike, positions: np.ndarray
+) -> np.ndarray:
+    """Coordinates of lattice positions (n, d), to the last bit those of `np.linspace`."""
+    inside = lower + positions * ((upper - lower) / across)
+    return np.where(positions == across, upper, inside)
+
+
 class _Lattice:
     """Labels of the finest lattice's points: asked for once, then remembered by number."""
 
@@ -171,8 +179,7 @@ class _Lattice:
         keys = np.ravel_multi_index(tuple(np.moveaxis(positions, -1, 0)), tuple(self.across + 1))
         new = np.setdiff1d(keys, self.keys)
         if new.size:
-            part = self.positions(new) / self.across
-            labels = self.ask(self.lower + part * (self.upper - self.lower))
+            labels = self.ask(_places(self.lower, self.upper, self.across, self.positions(new)))
             keys_now = np.concatenate([self.keys, new])
             order = np.argsort(keys_now)
             self.keys = keys_now[order]

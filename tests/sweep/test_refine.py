@@ -125,6 +125,10 @@ def test_cells_have_places_and_sizes():
     np.testing.assert_array_equal(refined.cell_size(0), [2.0, 0.25])
     np.testing.assert_array_equal(refined.cell_size(1), [1.0, 0.125])
     np.testing.assert_array_equal(refined.axis(0), [-1.0, 0.0, 1.0, 2.0, 3.0])
+    for k in (0, 1):
+        np.testing.assert_array_equal(
+            refined.points[:, k], refined.axis(k)[refined.positions[:, k]]
+        )
     coarse = jb.refined_boundary(half_space((1.0, 0.0), 0.1), *UNEVEN, (2, 2), levels=0)
     assert (coarse.asked, coarse.full, coarse.calls) == (9, 9, 1)
 
