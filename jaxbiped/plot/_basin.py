@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 from jaxbiped._checks import ArgumentError, check_finite
 from jaxbiped.plot._label_colours import GAIT_SUFFIX, in_order, label_colour
 from jaxbiped.plot._style import axes_or_new, figure_of
+from jaxbiped.sweep._arguments import check_known
 from jaxbiped.sweep._fractions import basin_fractions
 from jaxbiped.sweep._label import Label, label_names
 
@@ -77,9 +78,7 @@ def names_of(
         )
     if grid.dtype.kind not in "iu":
         return grid.astype(str).astype(object)
-    unknown = sorted(set(np.unique(grid).tolist()) - set(map(int, Label)))
-    if unknown:
-        raise ArgumentError(f"labels holds {unknown[0]}: it must hold names or codes of Label.")
+    check_known(grid)
     if period is None:
         words = np.vectorize(lambda code: str(Label(code)), otypes=[object])(grid)
     else:

@@ -73,3 +73,10 @@ def check_label_grid(labels: npt.ArrayLike) -> np.ndarray:
             f"labels has {pending} pending entries of {grid.size}: they must all be labelled."
         )
     return grid
+
+
+def check_known(labels: np.ndarray) -> None:
+    """Raises `ArgumentError` for whole numbers that are no code of `Label`."""
+    unknown = sorted(set(np.unique(labels).tolist()) - set(map(int, Label)))
+    if unknown:
+        raise ArgumentError(f"labels holds {unknown[0]}: it must hold names or codes of Label.")

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from scipy.special import ndtri
 
 from jaxbiped._checks import ArgumentError, check_at_least, check_not_negative
-from jaxbiped.sweep._arguments import check_confidence
+from jaxbiped.sweep._arguments import check_confidence, check_known
 from jaxbiped.sweep._label import Label
 
 
@@ -90,8 +90,6 @@ def _names(labels: np.ndarray) -> np.ndarray:
         raise ArgumentError(f"labels has shape {labels.shape}: it must have at least one entry.")
     if labels.dtype.kind not in "iu":
         return labels.astype(str).ravel()
+    check_known(labels)
     codes, place = np.unique(labels.ravel(), return_inverse=True)
-    unknown = sorted(set(codes.tolist()) - set(map(int, Label)))
-    if unknown:
-        raise ArgumentError(f"labels holds {unknown[0]}: it must hold names or codes of Label.")
     return np.asarray([str(Label(code)) for code in codes])[place]
