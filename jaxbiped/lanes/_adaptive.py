@@ -1,5 +1,6 @@
 """The adaptive solve of a scene as a program for lanes: the same steps as through diffrax."""
 
+import contextlib
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -118,12 +119,19 @@ class AdaptiveSolve:
         watch: misfortunes that end it.
         counting: whether footsteps are counted.
         saved: what is saved.
+        fenced: whether XLA is to compile it, and not lanes (see `fenced`).
     """
 
     def __init__(
-        self, solver: AbstractRosenbrock, watch: tuple[str, ...], *, counting: bool, saved: Saved
+        self,
+        solver: AbstractRosenbrock,
+        watch: tuple[str, ...],
+        *,
+        counting: bool,
+        saved: Saved,
+        fenced: bool = False,
     ) -> None:
-        self.solver, self.counting, self.saved = solver, counting, saved
+        self.solver, self.counting, self.saved, self.fenced = solver, counting, saved, fenced
         self.dense = saved.times or saved.section is not None
         self.events = ending_events(watch)
 
@@ -163,7 +171,7 @@ class AdaptiveSolve:
         return _Now(zero, next_t, solve.state, control, count, count, events, none, last, extremes)
 
     def attempt(self, solve: Solve, now: _Now) -> tuple[_Now, Scalar]:
-        with fences_down():
+        with contextlib.nullcontext() if self.fenced else fences_down():
             y1, error, dense = step_of(
                 self.solver.tableau, _TERM, now.t, now.next_t, now.state, solve.scene
             )

@@ -17,7 +17,8 @@ from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, ending_of
 
-_TOLERANCES = {"fast": 1e-4, "balanced": 1e-6, "tight": 1e-11}
+RIGID_ACCURACIES = {"fast": 1e-4, "balanced": 1e-6, "tight": 1e-11}
+"""Relative tolerance of each named accuracy; the absolute one (SI) is a hundredth of it."""
 _PATIENCE = 50.0
 """Time allowed for each footstep, in units of √(l/g)."""
 
@@ -95,8 +96,8 @@ def rigid_walk(
     if most_arrivals:
         check_positive("most_arrivals", most_arrivals)
     check_positive("max_solver_steps", max_solver_steps)
-    check_choice("accuracy", accuracy, _TOLERANCES)
-    tolerance = _TOLERANCES[accuracy] if rtol is None else rtol
+    check_choice("accuracy", accuracy, RIGID_ACCURACIES)
+    tolerance = RIGID_ACCURACIES[accuracy] if rtol is None else rtol
     check_positive("rtol", tolerance)
     leaves = jtu.tree_leaves((scene, state))
     narrow = any(jnp.result_type(leaf) != jnp.float64 for leaf in leaves)

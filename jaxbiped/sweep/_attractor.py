@@ -1,0 +1,109 @@
+"""Gaits as attractors: in which metric a gait draws starts in, and how far that reaches."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+import scipy.linalg
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped.dynamics._feet import feet
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._search import Search
+from jaxbiped.gait._system import checked_section
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+
+
+class Attractor(NamedTuple):
+    """A stable gait of a scene, its state without hip_x having m components.
+
+    Attributes:
+        period: footsteps in its cycle.
+        duration: of the cycle [s].
+        step_length: advance along the slope in a cycle [m].
+        state: on the section, a `State` or `RigidState` of numbers.
+        multipliers: Floquet multipliers, largest first, shape (m − 1,).
+        metric: W, shape (m − 1, m): |W (x − x*)| falls by the `contraction` in a cycle near it.
+        contraction: of that distance, below 1.
+        radius: distance within which every start is taken to converge: all of a sample on shells
+            up to there came nearer in one cycle. Negative where it was not measured, or none did.
+    """
+
+    period: int
+    duration: float
+    step_length: float
+    state: Any
+    multipliers: np.ndarray
+    metric: np.ndarray
+    contraction: float
+    radius: float
+
+    @property
+    def point(self) -> np.ndarray:
+        """Its state on the section without hip_x, shape (m,)."""
+        return np.array([float(leaf) for leaf in self.state[1:]])
+
+    def distance(self, states: np.ndarray) -> np.ndarray:
+        """Of states on the section without hip_x, shape (n, m), in the metric; shape (n,)."""
+        return np.linalg.norm((states - self.point) @ self.metric.T, axis=1)
+
+
+def unmeasured_attractor(scene: Scene | RigidScene, gait: Gait, period: int) -> Attractor:
+    """A gait's metric, from its return map's derivative; its radius is not known yet.
+
+    The metric is Lyapunov's for the derivative A on the section: with a contraction q between the
+    spectral radius and 1, P = Σ (A/q)ᵏᵀ S (A/q)ᵏ gives |A e| ≤ q |e|, S measuring each component
+    in its own size (`component_scales`).
+
+    Raises:
+        ArgumentError: the search found none, or the gait is not stable.
+    """
+    if int(gait.ending) != int(Search.FOUND) or not bool(gait.stable):
+        raise ArgumentError(
+            f"gait = {gait.outcome} with spectral radius {float(gait.measures.spectral_radius):g} "
+            "is not allowed: starts converge only to a gait that was found and is stable."
+        )
+    state = jtu.tree_map(np.asarray, gait.measures.state)
+    tangents = section_tangents(scene, state)
+    size = len(state) - 1
+    slopes = tangents.T @ np.asarray(gait.return_jacobian)[:size] @ tangents
+    contraction = 0.5 * (1.0 + float(gait.measures.spectral_radius))
+    weights = tangents.T @ np.diag(component_scales(scene, state) ** -2.0) @ tangents
+    squared = scipy.linalg.solve_discrete_lyapunov(slopes.T / contraction, weights)
+    factor = np.linalg.cholesky(0.5 * (squared + squared.T))
+    return Attractor(
+        period=period,
+        duration=float(gait.measures.period),
+        step_length=float(gait.measures.step_length),
+        state=state,
+        multipliers=np.asarray(gait.multipliers),
+        metric=factor.T @ tangents.T,
+        contraction=contraction,
+        radius=-1.0,
+    )
+
+
+def section_tangents(scene: Scene | RigidScene, state: Any) -> np.ndarray:
+    """Orthonormal directions in which the section extends at a state, shape (m, m − 1)."""
+    section = checked_section(scene, None)
+    slope = jax.grad(lambda y: section.value(scene, y))(jtu.tree_map(jnp.asarray, state))
+    normal = np.array([float(leaf) for leaf in slope[1:]])
+    return scipy.linalg.null_space(normal[None])
+
+
+def component_scales(scene: Scene | RigidScene, state: Any) -> np.ndarray:
+    """Size of each component of a state without hip_x, shape (m,), SI units.
+
+    Angles 1, velocities √(g l), rates √(g/l), the hip's height the stance foot's penetration.
+    """
+    walker, gravity = scene.walker, float(scene.ground.g)
+    length = float(walker.l)
+    speed, rate = np.sqrt(gravity * length), np.sqrt(gravity / length)
+    sizes = {"hip_vx": speed, "hip_vz": speed, "omega_1": rate, "omega_2": rate}
+    sizes |= {"theta_1": 1.0, "theta_2": 1.0, "bristle_1": 1.0, "bristle_2": 1.0}
+    if isinstance(scene, Scene):
+        sizes["hip_z"] = abs(float(feet(scene, state).foot_2.penetration))
+    return np.array([sizes[name] for name in state._fields[1:]])

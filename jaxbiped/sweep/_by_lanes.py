@@ -1,0 +1,28 @@
+"""Labelling by lanes: on every core's vectors, each lane going on to the next start."""
+
+import functools
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped.lanes._engine import CompiledProgram
+from jaxbiped.lanes._program import Program
+from jaxbiped.sweep._course import AbstractCourse, Outcome, Start
+
+
+def labelled_by_lanes(course: AbstractCourse, starts: Start) -> Outcome:
+    """Follows n starts until each is certain; NumPy's arrays (n, …) in and out."""
+    leaves, structure = jtu.tree_flatten(starts)
+    shapes = tuple(np.shape(leaf)[1:] for leaf in leaves)
+    outcome: Outcome = _compiled(course, structure, shapes).run(starts).outputs
+    return outcome
+
+
+@functools.lru_cache(maxsize=64)
+def _compiled(course: AbstractCourse, structure: Any, shapes: Any) -> CompiledProgram:
+    leaves = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in shapes]
+    program = Program(course.begin, course.attempt, course.finish)
+    return CompiledProgram(program, jtu.tree_unflatten(structure, leaves))

@@ -1,0 +1,126 @@
+"""The gaits of a scene, and how they change with its parameters."""
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped.sweep._attractor import Attractor
+from jaxbiped.sweep._broadcast import repeated
+from jaxbiped.sweep._goals import NO_GAIT, Goals
+
+
+class Family(NamedTuple):
+    """Stable gaits for each of P combinations of parameters (one, where none differ).
+
+    Attributes:
+        names: of the q parameters that differ, none for ().
+        table: their values, shape (P, q).
+        rows: the gaits of each combination, P tuples; any may be empty.
+        states: for each combination, a state on the section where starts take what they are not
+            told: its first gait's, else a neighbour's.
+        scales: size of each component of the state, shape (P, m).
+    """
+
+    names: tuple[str, ...]
+    table: np.ndarray
+    rows: tuple[tuple[Attractor, ...], ...]
+    states: tuple[Any, ...]
+    scales: np.ndarray
+
+    @property
+    def periods(self) -> tuple[int, ...]:
+        """Cycle lengths for which the labelling loop has room: for every row's gaits."""
+        most: Counter[int] = Counter()
+        for row in self.rows:
+            most |= Counter(gait.period for gait in row)
+        return tuple(sorted(most.elements())) or (1,)
+
+    def goals(
+        self, parameters: Mapping[str, np.ndarray], count: int
+    ) -> tuple[Goals, tuple[int, ...]]:
+        """For n starts with these parameters: what they may converge to, and the cycle lengths.
+
+        Raises:
+            ArgumentError: parameters for which no gait was looked for.
+        """
+        periods = self.periods
+        tables = [self._goals_of(k, periods) for k in range(len(self.rows))]
+        if not self.names:
+            # The gaits are those of the scene's own parameters, not of others.
+            own = tables[0]
+            if parameters:
+                own = own._replace(radii=np.full_like(own.radii, NO_GAIT))
+            return repeated(own, count), periods
+        rows = self.row_of(parameters)
+        columns = zip(*tables, strict=True)
+        return Goals(*[np.stack(column)[rows] for column in columns]), periods
+
+    def row_of(self, parameters: Mapping[str, np.ndarray]) -> np.ndarray:
+        """The combination that each start has, shape (n,).
+
+        Raises:
+            ArgumentError: parameters for which no gait was looked for.
+        """
+        if set(parameters) != set(self.names):
+            raise ArgumentError(
+                f"parameters = {sorted(parameters)} is not allowed: the gaits are known for "
+                f"{sorted(self.names)}."
+            )
+        given = np.stack([parameters[name] for name in self.names], axis=1)
+        known = {tuple(values): k for k, values in enumerate(self.table)}
+        unique, which = np.unique(given, axis=0, return_inverse=True)
+        try:
+            places = np.array([known[tuple(values)] for values in unique], dtype=int)
+        except KeyError as missing:
+            raise ArgumentError(
+                f"parameters {self.names} = {missing.args[0]} is not allowed: no gait was looked "
+                "for there."
+            ) from None
+        return np.asarray(places[which.reshape(-1)])
+
+    def described(self) -> list[dict[str, Any]]:
+        """Each row's parameters and gaits, ready for JSON."""
+        return [
+            {
+                "parameters": dict(zip(self.names, map(float, values), strict=True)),
+                "gaits": [
+                    {
+                        "period": gait.period,
+                        "duration_s": float(gait.duration),
+                        "point": [float(x) for x in gait.point],
+                        "radius": float(gait.radius),
+                    }
+                    for gait in row
+                ],
+            }
+            for values, row in zip(self.table, self.rows, strict=True)
+        ]
+
+    def _goals_of(self, k: int, periods: tuple[int, ...]) -> Goals:
+        size = self.scales.shape[1]
+        count = len(periods)
+        goals = Goals(
+            np.zeros((count, size)),
+            np.zeros((count, size - 1, size)),
+            np.full(count, NO_GAIT),
+            self.scales[k],
+        )
+        for place, gait in zip(_places(self.rows[k], periods), self.rows[k], strict=True):
+            goals.points[place] = gait.point
+            goals.metrics[place] = gait.metric
+            goals.radii[place] = gait.radius
+        return goals
+
+
+def _places(row: tuple[Attractor, ...], periods: tuple[int, ...]) -> list[int]:
+    """Where each gait of a row stands among the cycles that there is room for."""
+    free = list(range(len(periods)))
+    places = []
+    for gait in row:
+        place = next(i for i in free if periods[i] == gait.period)
+        free.remove(place)
+        places.append(place)
+    return places

@@ -1,0 +1,123 @@
+"""The search for the gaits that starts may converge to."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._types import as_float
+from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.sweep._attractor import Attractor, component_scales, unmeasured_attractor
+from jaxbiped.sweep._family import Family
+from jaxbiped.sweep._follow import Effort
+from jaxbiped.sweep._radius import with_radius
+
+_SAME = 1e-5
+"""Relative difference of duration and length up to which two finds are of one gait."""
+
+
+def find_family(
+    scene: Scene | RigidScene,
+    effort: Effort,
+    *,
+    parameters: Mapping[str, Sequence[float] | np.ndarray],
+    guess: Any,
+) -> Family:
+    """The gait of one footstep for every combination of the parameters' values.
+
+    Each search begins from the nearest gait found so far, the first from the guess, and one that
+    fails begins again from the seed's start.
+    """
+    names = tuple(parameters)
+    grids = np.meshgrid(*[np.asarray(parameters[name], float) for name in names], indexing="ij")
+    table = np.stack([grid.ravel() for grid in grids], axis=1) if names else np.zeros((1, 0))
+    spans = np.where(np.ptp(table, axis=0) > 0.0, np.ptp(table, axis=0), 1.0)
+    rows: list[tuple[Attractor, ...]] = [()] * len(table)
+
+    def near(k: int) -> list[Any]:
+        """The state of the nearest gait that is known."""
+        known = [j for j, row in enumerate(rows) if row]
+        off = [float(np.linalg.norm((table[j] - table[k]) / spans)) for j in known]
+        return [rows[known[int(np.argmin(off))]][0].state] if known else []
+
+    # Forward, then back: a gait may be found from one side only.
+    for k in [*range(len(table)), *reversed(range(len(table)))]:
+        if not rows[k]:
+            own = scene_with(scene, names, table[k])
+            guesses = [*(near(k) or [guess]), seed_start(own)]
+            rows[k] = _found(own, guesses, 1, effort)
+    return _family(scene, names, table, tuple(rows), guess)
+
+
+def with_gaits(
+    scene: Scene | RigidScene,
+    family: Family,
+    effort: Effort,
+    found: Mapping[int, Sequence[tuple[int, Any]]],
+) -> Family:
+    """The family with more gaits in some rows, searched from these periods and states."""
+    rows = list(family.rows)
+    for k, guesses in found.items():
+        own = scene_with(scene, family.names, family.table[k])
+        for period, guess in guesses:
+            new = [
+                gait
+                for gait in _found(own, [guess], period, effort)
+                if not any(_same(gait, old) for old in rows[k])
+            ]
+            # Stable by period, so that positions follow from the cycles' lengths.
+            rows[k] = tuple(sorted([*rows[k], *new], key=lambda gait: gait.period))
+    return _family(scene, family.names, family.table, tuple(rows), family.states[0])
+
+
+def scene_with(scene: Any, names: Sequence[str], values: np.ndarray) -> Any:
+    """The scene of one combination of parameters."""
+    changed = with_parameters(scene, dict(zip(names, values, strict=True)))
+    return jtu.tree_map(as_float, changed)
+
+
+def _found(
+    scene: Scene | RigidScene, guesses: Sequence[Any], period: int, effort: Effort
+) -> tuple[Attractor, ...]:
+    """The stable gait that the first successful guess leads to, or none."""
+    for guess in guesses:
+        gait = find_gait(
+            scene,
+            jtu.tree_map(as_float, guess),
+            period=period,
+            parameters=(),
+            radius_sensitivities=False,
+        )
+        if bool(gait.stable):
+            return (with_radius(scene, unmeasured_attractor(scene, gait, period), effort),)
+    return ()
+
+
+def _family(
+    scene: Scene | RigidScene,
+    names: tuple[str, ...],
+    table: np.ndarray,
+    rows: tuple[tuple[Attractor, ...], ...],
+    guess: Any,
+) -> Family:
+    known = [k for k, row in enumerate(rows) if row]
+    states, scales = [], []
+    for k, values in enumerate(table):
+        near = min(known, key=lambda j: (abs(j - k), j)) if known else None
+        state = guess if near is None else rows[near][0].state
+        states.append(jtu.tree_map(np.asarray, state))
+        scales.append(component_scales(scene_with(scene, names, values), state))
+    return Family(names, table, rows, tuple(states), np.stack(scales))
+
+
+def _same(a: Attractor, b: Attractor) -> bool:
+    return (
+        a.period == b.period
+        and abs(a.duration / b.duration - 1.0) < _SAME
+        and abs(a.step_length / b.step_length - 1.0) < _SAME
+    )

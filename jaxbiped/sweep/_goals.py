@@ -1,0 +1,24 @@
+"""The gaits that starts may converge to, as numbers that a labelling loop reads."""
+
+import math
+from typing import Any, NamedTuple
+
+NO_GAIT = -math.inf
+"""Radius of a place for a gait that holds none."""
+
+
+class Goals(NamedTuple):
+    """G gaits of a scene, their states without hip_x having m components.
+
+    Attributes:
+        points: a state of each on the section, shape (G, m).
+        metrics: W, shape (G, m − 1, m): |W (x − point)| falls from cycle to cycle near the gait.
+        radii: distance, so measured, within which every start converges; negative where none is
+            known to. Shape (G,).
+        scales: size of each component, by which recurrences are measured; shape (m,).
+    """
+
+    points: Any
+    metrics: Any
+    radii: Any
+    scales: Any

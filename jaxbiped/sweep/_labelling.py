@@ -1,0 +1,234 @@
+"""The labelling of starts: what becomes of each."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._checks import (
+    ArgumentError,
+    check_choice,
+    check_positive,
+    check_type,
+)
+from jaxbiped._types import as_float
+from jaxbiped.dynamics._bristles import BristleState, state_type
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import State
+from jaxbiped.scene._parameters import parameter_names, with_parameters
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.simulate._rigid_walk import RIGID_ACCURACIES
+from jaxbiped.solve._accuracy import ACCURACIES
+from jaxbiped.solve._engine import engine_for
+from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+from jaxbiped.solve._solvers import solver_named
+from jaxbiped.sweep._broadcast import repeated
+from jaxbiped.sweep._family import Family
+from jaxbiped.sweep._follow import Effort, follow
+from jaxbiped.sweep._label import Label, label_names
+
+_GAP, _GAP_SHARE = 1e-4, 30.0
+"""Gap between states that repeat each other, at least; and in units of the tolerance."""
+
+
+class Labelled(NamedTuple):
+    """What became of n starts: NumPy's arrays of shape (n,).
+
+    Attributes:
+        label: code of a `Label`.
+        gait: the gait that it converges to, by its position in `Family.periods`; −1 for none.
+        period: footsteps in that gait's cycle. Where the label is "unresolved" it is that of a
+            cycle which the last footsteps repeated, of a gait that is not among the attractors.
+        footsteps: heel strikes until the label was certain.
+        time: simulated until then [s].
+        distance: walked along the slope until then [m].
+        rate: share of the distance from the gait that is left after a footstep, at last.
+        closest: smallest distance from any of the gaits, in its metric; infinite without arrival.
+        attempts: of the solver's steps.
+        final: last states on the section without hip_x, shape (n, m); infinite without arrival.
+    """
+
+    label: np.ndarray
+    gait: np.ndarray
+    period: np.ndarray
+    footsteps: np.ndarray
+    time: np.ndarray
+    distance: np.ndarray
+    rate: np.ndarray
+    closest: np.ndarray
+    attempts: np.ndarray
+    final: np.ndarray
+
+    @property
+    def names(self) -> np.ndarray:
+        """The labels in words, "walking period-1" and so on, shape (n,)."""
+        return label_names(self.label, self.period)
+
+
+class Labelling(eqx.Module):
+    """How starts are labelled. Call it with many of them; `labelling` makes one.
+
+    Attributes:
+        scene: the walker.
+        family: its gaits, for every value of the scene's parameters that the starts differ in.
+        effort: how far and how accurately starts are followed.
+    """
+
+    scene: Scene | RigidScene
+    family: Family
+    effort: Effort = eqx.field(static=True)
+
+    def __call__(
+        self, states: Any, *, parameters: Mapping[str, np.ndarray] | None = None
+    ) -> Labelled:
+        """Labels n starts.
+
+        Each is followed until its label is certain: until it comes within a known gait's radius,
+        and nearer than a cycle before; until it falls, stops, stumbles or slides; or until all the
+        footsteps are walked. No start's result depends on another's; one that is no number is
+        labelled "solver failed".
+
+        Args:
+            states: leaves of shape (n,).
+            parameters: parameters of the scene that differ from start to start, shape (n,). Where
+                the family was not made for them, a start walks that repeats a cycle several times,
+                whatever its gait.
+
+        Raises:
+            ArgumentError: a state of another kind, leaves of different shapes, a parameter that
+                is not allowed.
+        """
+        states = _checked_states(self.scene, states)
+        count = len(states.hip_x)
+        values = {} if parameters is None else dict(parameters)
+        given = {name: _column(name, value, count) for name, value in values.items()}
+        scene = with_parameters(self.scene, {k: jnp.asarray(v) for k, v in given.items()})
+        scene = jtu.tree_map(lambda leaf: _spread(leaf, count), scene)
+        goals, periods = self.family.goals(given, count)
+        outcome = follow(scene, states, goals, periods, self.effort)
+        label = outcome.label.astype(np.int8)
+        if given and not self.family.names:
+            # No gait is known to compare with: a cycle that repeats itself has to do.
+            repeats = (label == int(Label.UNRESOLVED)) & (outcome.period > 0)
+            label = np.where(repeats, np.int8(Label.WALKING), label)
+        return Labelled(
+            label=label,
+            gait=outcome.goal.astype(np.int16),
+            period=outcome.period.astype(np.int16),
+            footsteps=outcome.footsteps.astype(np.int32),
+            time=outcome.time,
+            distance=outcome.distance,
+            rate=outcome.rate,
+            closest=outcome.closest,
+            attempts=outcome.attempts.astype(np.int32),
+            final=np.stack(outcome.final, axis=1),
+        )
+
+    def base(self, parameters: Mapping[str, np.ndarray], count: int) -> Any:
+        """For n starts with these parameters, the gait's state: what they do not name themselves.
+
+        Where there is no gait it is that of the nearest combination that has one.
+        """
+        states = self.family.states
+        if not self.family.names:
+            return repeated(states[0], count)
+        rows = self.family.row_of(parameters)
+        columns = zip(*states, strict=True)
+        leaves = [np.array([float(leaf) for leaf in column]) for column in columns]
+        return type(states[0])(*[leaf[rows] for leaf in leaves])
+
+    def settings(self) -> dict[str, Any]:
+        """Everything that the labels depend on, ready for JSON."""
+        names = parameter_names(self.scene)
+        scene = {name: float(_leaf(self.scene, name)) for name in names}
+        laws = {}
+        if isinstance(self.scene, Scene):
+            parts = ("normal", "friction", "clearance")
+            laws = {part: type(getattr(self.scene, part)).__name__ for part in parts}
+        effort = self.effort._asdict() | {"solver": type(self.effort.solver).__name__}
+        # Both engines give the same labels.
+        effort.pop("engine")
+        return {
+            "model": "rigid" if isinstance(self.scene, RigidScene) else "compliant",
+            "scene": scene | laws,
+            "effort": effort,
+            "gaits": self.family.described(),
+        }
+
+
+def checked_effort(
+    scene: Scene | RigidScene,
+    *,
+    footsteps: int,
+    accuracy: str,
+    rtol: float | None,
+    solver: str | AbstractRosenbrock,
+    max_solver_steps: int,
+    engine: str,
+) -> Effort:
+    """How to follow starts, from what a user says.
+
+    Raises:
+        ArgumentError: an argument that is not allowed.
+    """
+    check_type("scene", scene, Scene, RigidScene)
+    check_positive("footsteps", footsteps)
+    check_positive("max_solver_steps", max_solver_steps)
+    names = RIGID_ACCURACIES if isinstance(scene, RigidScene) else ACCURACIES
+    check_choice("accuracy", accuracy, names)
+    tolerance = names[accuracy] if rtol is None else rtol
+    check_positive("rtol", tolerance)
+    method = solver_named(solver)
+    if not isinstance(method, AbstractRosenbrock):
+        raise ArgumentError(
+            f"solver = {type(method).__name__} is not allowed: labelling takes rodas3p to rodas5p."
+        )
+    return Effort(
+        rtol=float(tolerance),
+        footsteps=int(footsteps),
+        most_attempts=int(max_solver_steps),
+        gap=max(_GAP, _GAP_SHARE * float(tolerance)),
+        solver=method,
+        engine=engine_for(engine, obstacle=None),
+    )
+
+
+def _checked_states(scene: Scene | RigidScene, states: Any) -> Any:
+    kind: Any = RigidState if isinstance(scene, RigidScene) else state_type(scene)
+    if kind is BristleState and isinstance(states, State):
+        straight: Any = np.zeros_like(np.asarray(states.hip_x))
+        states = BristleState(*states, *[straight] * 2)
+    check_type("states", states, kind)
+    leaves = [np.asarray(leaf, dtype=np.float64) for leaf in states]
+    shapes = {leaf.shape for leaf in leaves}
+    if len(shapes) > 1 or len(leaves[0].shape) != 1:
+        raise ArgumentError(
+            f"states has leaves of shapes {sorted(shapes)}: all of them must be (n,)."
+        )
+    return kind(*leaves)
+
+
+def _column(name: str, value: Any, count: int) -> np.ndarray:
+    column = np.asarray(value, dtype=np.float64)
+    if column.shape != (count,):
+        raise ArgumentError(
+            f"parameters[{name!r}] has shape {column.shape}: one value for each of the {count} "
+            "starts is needed."
+        )
+    return column
+
+
+def _spread(leaf: Any, count: int) -> np.ndarray:
+    array = np.asarray(as_float(leaf))
+    return array if array.shape == (count,) else repeated(array, count)
+
+
+def _leaf(scene: Scene | RigidScene, name: str) -> Any:
+    from jaxbiped.scene._parameters import chosen_parameters
+
+    _, (place,) = chosen_parameters(scene, (name,))
+    return jtu.tree_leaves(scene)[place]
