@@ -17,8 +17,8 @@ _SHELLS = 1e-5 * 1.5 ** np.arange(30)
 """Distances that are tried."""
 _NEARER = 0.95
 """Share of its distance that is left of every sample after a cycle, where the shell is good."""
-_NOISE = 20.0
-"""Distance that the solver's error may add, in units of its tolerance."""
+_NOISE = 100.0
+"""Distance that the solver may make of none, in units of its tolerance."""
 _DIRECTIONS = 128
 _SHARE = 0.7
 """Of the largest distance from which every sample came nearer."""
@@ -50,7 +50,7 @@ def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort)
     returned = (outcome.label == int(Label.UNRESOLVED)) & np.isfinite(final).all(axis=1)
     final = np.where(returned[:, None], final, attractor.point)
     after = attractor.distance(final)
-    allowed = _NEARER * np.repeat(_SHELLS, _DIRECTIONS) + _NOISE * effort.rtol
+    allowed = np.maximum(_NEARER * np.repeat(_SHELLS, _DIRECTIONS), _NOISE * effort.rtol)
     nearer = (returned & (after <= allowed)).reshape(len(_SHELLS), _DIRECTIONS).all(axis=1)
     good = len(_SHELLS) if nearer.all() else int(np.argmin(nearer))
     return attractor._replace(radius=_SHARE * float(_SHELLS[good - 1]) if good else -1.0)
