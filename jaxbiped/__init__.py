@@ -53,6 +53,7 @@ from jaxbiped.gait._gradient import Reverse as Reverse
 from jaxbiped.gait._ledger import EnergyLedger as EnergyLedger
 from jaxbiped.gait._ledger import energy_ledger as energy_ledger
 from jaxbiped.scene._parameters import parameter_names as parameter_names
+from jaxbiped.scene._parameters import parameter_values as parameter_values
 from jaxbiped.scene._parameters import with_parameters as with_parameters
 from jaxbiped.gait._return_map import Return as Return
 from jaxbiped.gait._return_map import return_map as return_map

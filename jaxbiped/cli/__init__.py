@@ -7,6 +7,7 @@ import tyro
 from tyro.conf import subcommand
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped.cli._basin import Basin
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
 from jaxbiped.cli._walk import Walk
@@ -14,6 +15,7 @@ from jaxbiped.cli._walk import Walk
 _Command = (
     Annotated[Walk, subcommand("walk")]
     | Annotated[FindGait, subcommand("gait")]
+    | Annotated[Basin, subcommand("basin")]
     | Annotated[Models, subcommand("models")]
     | Annotated[None, subcommand("version")]
 )

@@ -26,6 +26,12 @@ def parameter_names(scene: Scene | RigidScene) -> tuple[str, ...]:
     return (*first, *(name for name in names if name not in first))
 
 
+def parameter_values(scene: Scene | RigidScene) -> dict[str, Any]:
+    """A scene's parameters by name (see `parameter_names`), their own leaves."""
+    by_leaf = dict(zip(_names_by_leaf(scene), jtu.tree_leaves(scene), strict=True))
+    return {name: by_leaf[name] for name in parameter_names(scene)}
+
+
 def chosen_parameters(
     scene: Scene | RigidScene, parameters: tuple[str, ...] | None
 ) -> tuple[tuple[str, ...], tuple[int, ...]]:

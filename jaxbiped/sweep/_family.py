@@ -90,6 +90,8 @@ class Family(NamedTuple):
                     {
                         "period": gait.period,
                         "duration_s": float(gait.duration),
+                        "step_length_m": float(gait.step_length),
+                        "multipliers": [[float(v.real), float(v.imag)] for v in gait.multipliers],
                         "point": [float(x) for x in gait.point],
                         "radius": float(gait.radius),
                     }

@@ -18,7 +18,7 @@ from jaxbiped._types import as_float
 from jaxbiped.dynamics._bristles import BristleState, state_type
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._parameters import parameter_names, with_parameters
+from jaxbiped.scene._parameters import parameter_values, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._rigid_walk import RIGID_ACCURACIES
@@ -143,8 +143,7 @@ class Labelling(eqx.Module):
 
     def settings(self) -> dict[str, Any]:
         """Everything that the labels depend on, ready for JSON."""
-        names = parameter_names(self.scene)
-        scene = {name: float(_leaf(self.scene, name)) for name in names}
+        scene: dict[str, Any] = {k: float(v) for k, v in parameter_values(self.scene).items()}
         laws = {}
         if isinstance(self.scene, Scene):
             parts = ("normal", "friction", "clearance")
@@ -163,12 +162,12 @@ class Labelling(eqx.Module):
 def checked_effort(
     scene: Scene | RigidScene,
     *,
-    footsteps: int,
-    accuracy: str,
-    rtol: float | None,
-    solver: str | AbstractRosenbrock,
-    max_solver_steps: int,
-    engine: str,
+    footsteps: int = 30,
+    accuracy: str = "fast",
+    rtol: float | None = None,
+    solver: str | AbstractRosenbrock = "rodas4",
+    max_solver_steps: int = 65536,
+    engine: str = "auto",
 ) -> Effort:
     """How to follow starts, from what a user says.
 
@@ -225,10 +224,3 @@ def _column(name: str, value: Any, count: int) -> np.ndarray:
 def _spread(leaf: Any, count: int) -> np.ndarray:
     array = np.asarray(as_float(leaf))
     return array if array.shape == (count,) else repeated(array, count)
-
-
-def _leaf(scene: Scene | RigidScene, name: str) -> Any:
-    from jaxbiped.scene._parameters import chosen_parameters
-
-    _, (place,) = chosen_parameters(scene, (name,))
-    return jtu.tree_leaves(scene)[place]

@@ -1,6 +1,7 @@
 """Results in a Zarr store: written a chunk at a time, continued where a killed run left off."""
 
 import json
+import os
 import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -47,8 +48,7 @@ class Store:
             ArgumentError: the directory holds something else, or a store made with other settings,
                 or cannot be written.
         """
-        if path.exists() and not path.is_dir():
-            raise ArgumentError(f"store = {str(path)!r} is a file: it must be a directory.")
+        check_store(path)
         try:
             if not path.exists() or not any(path.iterdir()):
                 _create(path, layout, settings, attributes)
@@ -95,6 +95,17 @@ class Store:
         return opened(self.path)
 
 
+def check_store(path: Path) -> None:
+    """Raises `ArgumentError` where no store can be made or continued at this path."""
+    if path.exists() and not path.is_dir():
+        raise ArgumentError(f"store = {str(path)!r} is a file: it must be a directory.")
+    home = next(each for each in [path, *path.absolute().parents] if each.is_dir())
+    if not os.access(home, os.W_OK | os.X_OK):
+        raise ArgumentError(
+            f"store = {str(path)!r} cannot be written: its folder must be writable."
+        )
+
+
 def opened(path: Path) -> xr.Dataset:
     """The dataset of a store, read as it is needed."""
     return xr.open_zarr(path, chunks=None, consolidated=False)
@@ -119,6 +130,7 @@ def _create(
     dataset.attrs = {**attributes, SETTINGS: json.dumps(settings)}
     encoding = {name: {"chunks": layout.chunk_shape} for name in FIELDS if name in dataset}
     half = path.with_name(path.name + ".new")
+    half.parent.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(half, ignore_errors=True)
     dataset.to_zarr(half, mode="w", encoding=encoding, consolidated=False)
     if path.exists():

@@ -20,7 +20,7 @@ from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._layout import Layout, empty_dataset, fields_of
 from jaxbiped.sweep._prepare import with_gaits_met, with_gaits_of
 from jaxbiped.sweep._starts import AbstractStarts
-from jaxbiped.sweep._store import SETTINGS, Store
+from jaxbiped.sweep._store import SETTINGS, Store, check_store
 
 CHUNK = 16384
 _AHEAD = 2
@@ -71,6 +71,8 @@ def sweep(
     check_positive("workers", workers)
     if not starts.size:
         raise ArgumentError("starts is empty: give at least one.")
+    if store is not None:
+        check_store(Path(store))
     began = time.perf_counter()
     layout = Layout.of(starts, int(chunk))
     known = with_gaits_met(labelling, starts) if look_for_gaits else labelling

@@ -1,0 +1,221 @@
+"""`jaxbiped basin`: what becomes of many starts."""
+
+import dataclasses
+import json
+import math
+import time
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import xarray as xr
+from tyro.conf import OmitArgPrefixes
+
+from jaxbiped import _clock
+from jaxbiped._checks import check_positive
+from jaxbiped.cli._basin_options import StartsOptions
+from jaxbiped.cli._report import Report, table
+from jaxbiped.cli._walk_options import OutputOptions, SceneOptions
+from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.sweep._cluster import cluster_executor, local_executor
+from jaxbiped.sweep._coordinates import COORDINATES, UNITS
+from jaxbiped.sweep._fractions import basin_fractions
+from jaxbiped.sweep._label import label_names
+from jaxbiped.sweep._labelling import Labelling, checked_effort
+from jaxbiped.sweep._prepare import labelling
+from jaxbiped.sweep._starts import AbstractStarts, GivenStarts
+from jaxbiped.sweep._store import check_store
+from jaxbiped.sweep._sweep import CHUNK, sweep
+
+_MOST_ROWS = 64
+
+
+@dataclasses.dataclass(frozen=True)
+class SweepOptions:
+    """How starts are followed, and where the results go."""
+
+    footsteps: int = 30
+    """After which a start that is not certain yet is unresolved."""
+    accuracy: str = "fast"
+    """How accurately to solve: fast, balanced or tight."""
+    engine: str = "auto"
+    """What computes: xla, lanes, or auto for the faster one that can."""
+    store: Path | None = None
+    """Zarr store for the results; a run that was killed continues there."""
+    chunk: int = CHUNK
+    """Starts that are labelled and written at once."""
+    workers: int = 1
+    """Processes of this machine that share the work, each with its share of the cores."""
+    scheduler: str | None = None
+    """Address of a dask scheduler whose workers do the work."""
+
+    def executor(self) -> tuple[Executor | None, int]:
+        """What runs the chunks, and how many at once; raises `ArgumentError`."""
+        check_positive("workers", self.workers)
+        if self.scheduler is not None:
+            return cluster_executor(self.scheduler)
+        if self.workers > 1:
+            return local_executor(self.workers), self.workers
+        return None, 1
+
+
+@dataclasses.dataclass(frozen=True)
+class Basin:
+    """Label many starts: which walk on and in which gait, and how the others end."""
+
+    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
+        default_factory=SceneOptions
+    )
+    starts: Annotated[StartsOptions, OmitArgPrefixes] = dataclasses.field(
+        default_factory=StartsOptions
+    )
+    sweep: Annotated[SweepOptions, OmitArgPrefixes] = dataclasses.field(
+        default_factory=SweepOptions
+    )
+    output: Annotated[OutputOptions, OmitArgPrefixes] = dataclasses.field(
+        default_factory=OutputOptions
+    )
+
+    def run(self) -> int:
+        """Runs the command; returns the exit code."""
+        scene = self.scene.scene()
+        starts = self.starts.chosen(scene)
+        how: dict[str, Any] = dict(
+            footsteps=self.sweep.footsteps,
+            accuracy=self.sweep.accuracy,
+            engine=self.sweep.engine,
+        )
+        effort = checked_effort(scene, **how)
+        check_positive("chunk", self.sweep.chunk)
+        self.output.check()
+        if self.sweep.store is not None:
+            check_store(self.sweep.store)
+        executor, workers = self.sweep.executor()
+        known = labelling(scene, parameters=starts.parameters, **how)
+        began = time.perf_counter()
+        found = sweep(
+            known,
+            starts,
+            store=self.sweep.store,
+            chunk=self.sweep.chunk,
+            executor=executor,
+            workers=workers,
+            progress=True,
+        )
+        seconds = time.perf_counter() - began
+        if executor is not None:
+            executor.shutdown()
+        numbers = basin_numbers(found, seconds) | {"engine": effort.engine}
+        if isinstance(starts, GivenStarts):
+            numbers["labels"] = _names(found).tolist()
+        report = Report(self.output.json)
+        _print(report, numbers)
+        if self.output.out is not None:
+            for path in _written(found, known, starts, self.output.out):
+                report.say(f"wrote {path}")
+        numbers["wall_s"] = time.perf_counter() - _clock.IMPORT_BEGAN
+        report.finish(numbers)
+        return 0
+
+
+def basin_numbers(found: xr.Dataset, seconds: float) -> dict[str, Any]:
+    """What is known of a basin in SI units, ready for JSON."""
+    fractions = basin_fractions(_names(found))
+    fresh = int(found.attrs["labelled_in_this_run"])
+    gaits = [
+        gait | {"parameters": row["parameters"]}
+        for row in json.loads(found.attrs["gaits"])
+        for gait in row["gaits"]
+    ]
+    return {
+        "fractions": {name: [f.estimate, f.low, f.high] for name, f in fractions.items()},
+        "counts": {name: f.count for name, f in fractions.items()},
+        "starts": int(found.label.size),
+        "labelled_in_this_run": fresh,
+        "starts_per_s": fresh / seconds,
+        "mean_footsteps": float(found.footsteps.mean()),
+        "solver_steps": int(found.attempts.sum()),
+        "gaits": gaits,
+    }
+
+
+def _names(found: xr.Dataset) -> np.ndarray:
+    return label_names(found.label.values, found.period.values)
+
+
+def _print(report: Report, numbers: dict[str, Any]) -> None:
+    rows = [
+        (name, str(numbers["counts"][name]), *(f"{100 * value:.2f}" for value in values))
+        for name, values in numbers["fractions"].items()
+    ]
+    report.say(table(("label", "starts", "%", "from", "to"), rows, most=_MOST_ROWS))
+    report.say("from, to: 95 % interval by Wilson")
+    report.say()
+    head = ("gait", "period s", "length m", "largest multiplier", "radius")
+    rows = [
+        (
+            f"period-{gait['period']}" + _at(gait["parameters"]),
+            f"{gait['duration_s']:.6f}",
+            f"{gait['step_length_m']:.6f}",
+            f"{math.hypot(*gait['multipliers'][0]):.5f}",
+            f"{gait['radius']:.3g}",
+        )
+        for gait in numbers["gaits"]
+    ]
+    report.say(table(head, rows, most=_MOST_ROWS) if rows else "no stable gait is known")
+    report.say()
+    report.say(
+        f"{numbers['starts']} starts, {numbers['labelled_in_this_run']} of them labelled in this "
+        f"run: {numbers['starts_per_s']:.0f} starts/s; {numbers['mean_footsteps']:.1f} footsteps "
+        f"and {numbers['solver_steps'] / numbers['starts']:.0f} solver steps a start; "
+        f"engine {numbers['engine']}"
+    )
+
+
+def _at(parameters: dict[str, float]) -> str:
+    return "".join(f", {name} {value:.4g}" for name, value in parameters.items())
+
+
+def _written(found: xr.Dataset, known: Labelling, starts: AbstractStarts, out: Path) -> list[Path]:
+    """Writes the results, and the picture where there are two axes; returns the paths."""
+    paths = [out / "basin.nc"]
+    found.to_netcdf(paths[0])
+    names = list(starts.axes)
+    if len(names) == 2 and min(starts.shape) > 1:
+        from jaxbiped import plot
+
+        y, x = names
+        figure = plot.basin(
+            found.label.values,
+            found[x].values,
+            found[y].values,
+            names=(_words(x), _words(y)),
+            units=(UNITS.get(x, ""), UNITS.get(y, "")),
+            period=found.period.values,
+            mark=_mark(known, x, y),
+        )
+        paths.append(out / "basin.png")
+        figure.savefig(paths[1])
+    return paths
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _mark(known: Labelling, x: str, y: str) -> tuple[float, float] | None:
+    """Where the gait of the scene itself is in these coordinates, if it has one."""
+    gaits = [gait for row in known.family.rows for gait in row]
+    if known.family.names or not gaits:
+        return None
+    place = [_value(known.scene, gaits[0].state, name) for name in (x, y)]
+    return place[0], place[1]
+
+
+def _value(scene: Scene | RigidScene, state: Any, name: str) -> float:
+    if name in COORDINATES:
+        return float(getattr(state, COORDINATES[name]))
+    return float(parameter_values(scene)[name])
