@@ -1,6 +1,7 @@
 """Where starts lie: on grids, in samples, or as given."""
 
 import abc
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -154,7 +155,10 @@ class Sample(AbstractStarts):
         sequence = engine(dimensions, scramble=True, rng=self.seed)
         if first:
             sequence.fast_forward(int(first))
-        return sequence.random(count)
+        with warnings.catch_warnings():
+            # A chunk is a piece of the sequence, whatever its length.
+            warnings.filterwarnings("ignore", message="The balance properties")
+            return sequence.random(count)
 
 
 class GivenStarts(AbstractStarts):

@@ -89,6 +89,7 @@ class Store:
     def note(self, attributes: Mapping[str, Any]) -> None:
         """Sets attributes."""
         self._group.attrs.update(dict(attributes))
+        zarr.consolidate_metadata(str(self.path), zarr_format=2)
 
     def dataset(self) -> xr.Dataset:
         """The results, opened lazily."""
@@ -108,7 +109,7 @@ def check_store(path: Path) -> None:
 
 def opened(path: Path) -> xr.Dataset:
     """The dataset of a store, read as it is needed."""
-    return xr.open_zarr(path, chunks=None, consolidated=False)
+    return xr.open_zarr(path, chunks=None)
 
 
 def unwritable(path: Path, error: OSError) -> ArgumentError:
@@ -132,7 +133,7 @@ def _create(
     half = path.with_name(path.name + ".new")
     half.parent.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(half, ignore_errors=True)
-    dataset.to_zarr(half, mode="w", encoding=encoding, consolidated=False)
+    dataset.to_zarr(half, mode="w", encoding=encoding, zarr_format=2, consolidated=True)
     if path.exists():
         path.rmdir()
     half.rename(path)

@@ -1,0 +1,135 @@
+"""`jaxbiped basin` as a user meets it."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from PIL import Image
+
+import jaxbiped as jb
+from jaxbiped.cli import main
+
+HEADER = "hip_x,hip_z,theta_1,theta_2,hip_vx,hip_vz,omega_1,omega_2"
+AXES = ("--x", "theta_swing=-0.5:0.3:9", "--y", "omega_swing=-2:4:7")
+
+
+def _run(*arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main(["basin", *map(str, arguments)])
+    return stopped.value.code
+
+
+@pytest.fixture(scope="module")
+def basin(tmp_path_factory):
+    """The command run once with every output: its folder."""
+    folder = tmp_path_factory.mktemp("basin")
+    outputs = ("--out", folder / "out", "--json", folder / "b.json", "--store", folder / "store")
+    assert _run(*AXES, *outputs, "--chunk", 18) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def numbers(basin):
+    return json.loads((basin / "b.json").read_text())
+
+
+def test_json(numbers):
+    assert {"fractions", "starts", "starts_per_s", "gaits", "wall_s"} <= set(numbers)
+    assert numbers["starts"] == 63
+    assert sum(numbers["counts"].values()) == 63
+    for estimate, low, high in numbers["fractions"].values():
+        assert 0.0 <= low <= estimate <= high <= 1.0
+    assert sum(f[0] for f in numbers["fractions"].values()) == pytest.approx(1.0)
+    assert "walking period-1" in numbers["fractions"]
+    (gait,) = numbers["gaits"]
+    assert gait["period"] == 1
+    assert gait["duration_s"] == pytest.approx(0.4408349, abs=1e-6)
+    assert np.hypot(*gait["multipliers"][0]) == pytest.approx(0.457064, abs=1e-4)
+
+
+def test_picture_and_results(basin, numbers):
+    with Image.open(basin / "out" / "basin.png") as picture:
+        assert min(picture.size) > 300
+    found = xr.open_dataset(basin / "out" / "basin.nc")
+    assert found.label.dims == ("omega_swing", "theta_swing")
+    assert found.theta_swing.attrs["units"] == "rad"
+    stored = xr.open_zarr(basin / "store")
+    assert np.array_equal(stored.label, found.label)
+    walks = int((found.label == jb.Label.WALKING).sum())
+    assert walks == numbers["counts"]["walking period-1"]
+
+
+def test_a_second_run_finds_all_chunks(basin, capsys):
+    outputs = ("--store", basin / "store", "--chunk", 18)
+    assert _run(*AXES, *outputs) == 0
+    assert "63 starts, 0 of them labelled in this run" in capsys.readouterr().out
+
+
+def test_a_store_of_other_settings_is_refused(basin, capsys):
+    outputs = ("--store", basin / "store", "--chunk", 18)
+    assert _run(*AXES, *outputs, "--footsteps", 7) == 2
+    assert "effort.footsteps = 30 there, 7 here" in capsys.readouterr().err
+
+
+def test_given_starts(tmp_path, capsys):
+    seed = [float(x) for x in jb.seed_state()]
+    rows = [seed, [*seed[:4], -0.5, 0.0, 0.0, 1.2565], [0.0, np.nan, *seed[2:]]]
+    text = "\n".join([HEADER, *(",".join(map(repr, row)) for row in rows)])
+    (tmp_path / "starts.csv").write_text(text + "\n")
+    assert _run("--starts", tmp_path / "starts.csv", "--json", "-") == 0
+    labels = json.loads(capsys.readouterr().out)["labels"]
+    assert labels == ["walking period-1", "stopped", "solver failed"]
+
+
+def test_samples_over_a_rigid_walker_and_its_slope(capsys):
+    arguments = ("--model", "rigid", "--x", "theta_stance=0.1:0.4:2", "--y", "slope=0.01:0.03:2")
+    assert _run(*arguments, "--samples", 100, "--json", "-") == 0
+    numbers = json.loads(capsys.readouterr().out)
+    assert numbers["starts"] == 100
+    assert set(numbers["fractions"]) > {"fell forward"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--x", "theta_swing=0.1:0.1:4"), "axis 'theta_swing=0.1:0.1:4' is empty"),
+        (("--x", "theta_swing=0:1:0"), "= 0 is not allowed"),
+        (("--x", "theta_swing"), "write name=first:last:count"),
+        (("--x", "theta_swing=0:nan:3"), "is empty"),
+        (("--x", "knee=0:1:3"), "coordinate = 'knee' is not known"),
+        (("--x", "K=-1:1:3"), "K = -1"),
+        (("--x", "g=1:2:3", "--y", "g=1:2:3"), "g is named by two axes"),
+        (("--model", "rigid", "--x", "hip_z=0:1:3"), "coordinate = 'hip_z' is not known"),
+        (("--starts", "nowhere.csv"), "starts = 'nowhere.csv' cannot be read"),
+        (("--starts", "nowhere.csv", "--x", "g=1:2:3"), "name either"),
+        (("--footsteps", "0"), "footsteps = 0"),
+        (("--accuracy", "high"), "accuracy = 'high' is not known"),
+        (("--workers", "0"), "workers = 0"),
+        (("--chunk", "0"), "chunk = 0"),
+        (("--samples", "0"), "count = 0"),
+        (("--sampling", "dice", "--samples", "4"), "method = 'dice' is not known"),
+        (("--store", "/dev/null"), "store = '/dev/null' is a file"),
+    ],
+)
+def test_one_sentence_for_bad_input(arguments, sentence, capsys):
+    assert _run(*arguments) == 2
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "has the header ''"),
+        ("a,b\n1,2\n", "has the header 'a,b'"),
+        (HEADER + "\n", "holds no starts"),
+        (HEADER + "\n1,2,3\n", "line 2: 3 numbers instead of 8"),
+        (HEADER + "\n1,2,3,4,5,6,7,x\n", "line 2: '1,2,3,4,5,6,7,x' is not all numbers"),
+    ],
+)
+def test_one_sentence_for_bad_files(text, sentence, tmp_path, capsys):
+    (tmp_path / "starts.csv").write_text(text)
+    assert _run("--starts", tmp_path / "starts.csv") == 2
+    assert sentence in capsys.readouterr().err
