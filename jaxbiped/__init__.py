@@ -148,8 +148,10 @@ from jaxbiped.sweep._fractions import wilson_interval as wilson_interval
 from jaxbiped.sweep._label import Label as Label
 from jaxbiped.sweep._label import label_name as label_name
 from jaxbiped.sweep._label import label_names as label_names
+from jaxbiped.sweep._label_at import label_at as label_at
 from jaxbiped.sweep._labelling import Labelled as Labelled
 from jaxbiped.sweep._labelling import Labelling as Labelling
+from jaxbiped.sweep._nearest_failure import nearest_failure as nearest_failure
 from jaxbiped.sweep._prepare import labelling as labelling
 from jaxbiped.sweep._prepare import with_gaits_met as with_gaits_met
 from jaxbiped.sweep._refine import RefinedBoundary as RefinedBoundary

@@ -91,7 +91,7 @@ class Grid(AbstractStarts):
         places = np.unravel_index(np.arange(first, last), self.shape)
         pairs = zip(self.values.items(), places, strict=True)
         columns = {name: values[place] for (name, values), place in pairs}
-        return _batch(labelling, columns, self.place, self.follow)
+        return batch_at(labelling, columns, place=self.place, follow=self.follow)
 
     def described(self) -> dict[str, Any]:
         values = {name: [float(x) for x in values] for name, values in self.values.items()}
@@ -131,7 +131,7 @@ class Sample(AbstractStarts):
             name: self.lower[name] + points[:, i] * (self.upper[name] - self.lower[name])
             for i, name in enumerate(self.lower)
         }
-        return _batch(labelling, columns, self.place, self.follow)
+        return batch_at(labelling, columns, place=self.place, follow=self.follow)
 
     def described(self) -> dict[str, Any]:
         bounds = {name: [self.lower[name], self.upper[name]] for name in self.lower}
@@ -254,12 +254,14 @@ def sample(
     return Sample(lower, upper, int(count), method, int(seed), place, follow)
 
 
-def _batch(
+def batch_at(
     labelling: Labelling,
     columns: dict[str, np.ndarray],
-    place: bool,
-    follow: Callable[[Any, Any], Any] | None,
+    *,
+    place: bool = False,
+    follow: Callable[[Any, Any], Any] | None = None,
 ) -> Batch:
+    """The starts at these coordinates, each (n,); `place` and `follow` as in `grid`."""
     count = len(next(iter(columns.values())))
     parameters = parameters_among(columns)
     base = labelling.base(parameters, count)

@@ -1,0 +1,53 @@
+"""Labels as a function of coordinates, as analyses of basins ask for them."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped.sweep._ask import LabelOf
+from jaxbiped.sweep._coordinates import check_coordinates
+from jaxbiped.sweep._label import Label
+from jaxbiped.sweep._labelling import Labelling
+from jaxbiped.sweep._starts import batch_at
+
+
+def label_at(
+    labelling: Labelling,
+    names: Sequence[str],
+    *,
+    failing: bool = False,
+    place: bool = False,
+    follow: Callable[[Any, Any], Any] | None = None,
+) -> LabelOf:
+    """The labelling as a function of points, for `refined_boundary`, `fatal_push` and so on.
+
+    Args:
+        labelling: see there.
+        names: of the points' coordinates (see `coordinate_names`), d of them.
+        failing: whether to tell only walking (0) from all else (1).
+        place, follow: as in `grid`.
+
+    Returns:
+        A function of points, shape (n, d), to codes of `Label`, shape (n,).
+
+    Raises:
+        ArgumentError: an unknown coordinate; points of another number of coordinates.
+    """
+    check_type("labelling", labelling, Labelling)
+    check_coordinates(labelling.scene, names)
+
+    def label_of(points: np.ndarray) -> np.ndarray:
+        points = np.asarray(points, dtype=np.float64)
+        if points.ndim != 2 or points.shape[1] != len(names):
+            raise ArgumentError(
+                f"points has shape {points.shape}: it must be (n, {len(names)}), one column for "
+                f"each of {', '.join(names)}."
+            )
+        columns = {name: points[:, i] for i, name in enumerate(names)}
+        batch = batch_at(labelling, columns, place=place, follow=follow)
+        found = labelling(batch.states, parameters=batch.parameters).label.astype(int)
+        return (found != int(Label.WALKING)).astype(int) if failing else found
+
+    return label_of

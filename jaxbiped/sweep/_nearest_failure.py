@@ -1,0 +1,105 @@
+"""The nearest start that does not return to the gait: how small a push is fatal."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped.gait._return_map import return_map
+from jaxbiped.sweep._attractor import Attractor
+from jaxbiped.sweep._fatal_push import FatalPush, fatal_push
+from jaxbiped.sweep._find_family import scene_with
+from jaxbiped.sweep._label import Label
+from jaxbiped.sweep._labelling import Labelling
+from jaxbiped.sweep._ray_turning import Normal
+
+_MOST_FOOTSTEPS = 6
+"""After which the distance from the gait is differentiated."""
+
+
+def nearest_failure(
+    labelling: Labelling,
+    *,
+    gradients: bool = True,
+    farthest: float = 1.0,
+    tolerance: float = 1e-5,
+    **options: Any,
+) -> FatalPush:
+    """The smallest push off the first gait, on its section, after which a start fails.
+
+    Coordinates are all of the state's but hip_x, in the order of its leaves, m of them; distances
+    are measured in their scales (`Family.scales`: angles 1 rad, velocities √(g l), rates √(g/l),
+    the hip's height the stance foot's penetration). Any label but walking is a failure.
+
+    Args:
+        labelling: one that knows a gait.
+        gradients: whether rays are turned to the boundary's normal by the simulator's derivatives,
+            or by differences of the distances along nearby rays.
+        farthest: distance up to which to look.
+        tolerance: of the distance.
+        options: others of `fatal_push`.
+
+    Raises:
+        ArgumentError: no gait is known, or an argument of `fatal_push` that is not allowed.
+    """
+    check_type("labelling", labelling, Labelling)
+    family = labelling.family
+    if not family.rows[0]:
+        raise ArgumentError("labelling knows no stable gait: there is nothing to push off.")
+    attractor = family.rows[0][0]
+    scene = scene_with(labelling.scene, family.names, family.table[0])
+
+    def fails(points: np.ndarray) -> np.ndarray:
+        count = len(points)
+        states = type(attractor.state)(np.zeros(count), *points.T)
+        parameters = {
+            name: np.full(count, value)
+            for name, value in zip(family.names, family.table[0], strict=True)
+        }
+        found = labelling(states, parameters=parameters)
+        return (found.label != int(Label.WALKING)).astype(int)
+
+    return fatal_push(
+        fails,
+        attractor.point,
+        scales=family.scales[0],
+        farthest=farthest,
+        tolerance=tolerance,
+        normal=boundary_normal(scene, attractor) if gradients else None,
+        **options,
+    )
+
+
+def boundary_normal(scene: Any, attractor: Attractor) -> Normal:
+    """Gradients of the distance from the gait after a few footsteps, at points (n, m).
+
+    Starts on the boundary of the basin follow it towards an unstable gait, all to one place: so
+    that distance is constant along the boundary, but for what has not died out by then. As many
+    footsteps are taken as the start has left before it fails, up to a few.
+    """
+
+    def arrival(point: Any) -> tuple[Any, Any]:
+        state = type(attractor.state)(jnp.zeros(()), *point)
+        came = return_map(scene, state)
+        after = jnp.stack(came.state[1:])
+        return after, (after, came.code)
+
+    many = jax.jit(jax.vmap(jax.jacfwd(arrival, has_aux=True)))
+    squared = attractor.metric.T @ attractor.metric
+
+    def normal(points: np.ndarray) -> np.ndarray:
+        at, on = np.array(points), np.ones(len(points), dtype=bool)
+        slopes = np.broadcast_to(np.eye(at.shape[1]), (*at.shape, at.shape[1])).copy()
+        walked = np.zeros(len(points), dtype=int)
+        for _ in range(_MOST_FOOTSTEPS):
+            change, (after, code) = jax.tree.map(np.asarray, many(jnp.asarray(at)))
+            on = on & (code == 0) & np.isfinite(change).all(axis=(1, 2))
+            slopes[on] = change[on] @ slopes[on]
+            at[on] = after[on]
+            walked += on
+        gradients = np.einsum("ni,nij->nj", (at - attractor.point) @ squared, slopes)
+        return np.where(walked[:, None] > 0, gradients, np.nan)
+
+    return normal
