@@ -12,7 +12,7 @@ from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.lanes._call import call
 from jaxbiped.lanes._engine import CompiledProgram, Recorded
 from jaxbiped.lanes._program import Program
-from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, ending_of
+from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, ending_of, whole
 
 
 class RigidSolved(NamedTuple):
@@ -44,11 +44,11 @@ def _compiled(structure: Any, recording: bool, waits: bool) -> CompiledProgram:
 
     def finish(walk: RigidWalk, now: RigidProgress) -> RigidSolved:
         code = ending_of(walk, now, jnp.asarray(waits))
-        return RigidSolved(now.t, now.state, code, now.footsteps, now.attempts)
+        return RigidSolved(now.t, whole(walk, now), code, now.footsteps, now.attempts)
 
     program = Program(begun, attempted, finish, record=_record if recording else None)
     return CompiledProgram(program, inputs)
 
 
 def _record(walk: RigidWalk, now: RigidProgress, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-    return now.struck, [now.t, *now.state]
+    return now.struck, [now.t, *whole(walk, now)]

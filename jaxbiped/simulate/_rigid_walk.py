@@ -15,7 +15,7 @@ from jaxbiped.lanes._rigid import rigid_walk_by_lanes
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._engine import engine_for
-from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, ending_of
+from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, ending_of, whole
 
 RIGID_ACCURACIES = {"fast": 1e-4, "balanced": 1e-6, "tight": 1e-11}
 """Relative tolerance of each named accuracy; the absolute one (SI) is a hundredth of it."""
@@ -138,7 +138,7 @@ def _by_xla(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
     end, strikes = _looped(walk, room)
     return RigidWalked(
         t=end.t,
-        state=end.state,
+        state=whole(walk, end),
         ending=ending_of(walk, end, jnp.asarray(waits)),
         footsteps=end.footsteps,
         attempts=end.attempts,
@@ -160,7 +160,7 @@ def _looped(walk: RigidWalk, room: int) -> tuple[RigidProgress, Any]:
             strikes = jtu.tree_map(
                 lambda kept, new: kept.at[place].set(new, mode="drop"),
                 strikes,
-                (after.t, after.state),
+                (after.t, whole(walk, after)),
             )
         return after, strikes, over
 

@@ -8,12 +8,14 @@ import diffrax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
+from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling_rates
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.solve._ending import Ending, rigid_ending
+from jaxbiped.solve._quintic import Quintic
 
 _TABLEAU = diffrax.Dopri8.tableau
 _ORDER = 8
@@ -27,8 +29,6 @@ _CLOSED = 1e-12
 _NEAR = 3e-2
 """Sum of the leg angles from which one Euler step leads onto a strike, in units of √rtol: the
 square of what is left is far below the tolerance."""
-_NEWTON = 3
-"""Newton steps on the quintic that guesses where a heel strike lies within a step."""
 _MOST_LANDINGS = 12
 """Newton steps onto a heel strike, after which it counts as missed."""
 
@@ -56,7 +56,8 @@ class RigidProgress(NamedTuple):
     """What is carried from one attempted step to the next.
 
     Attributes:
-        t, state: so far.
+        t, state: so far; hip_x is where the hip is, was or would be with the stance leg upright,
+            which changes at strikes alone. `whole` gives the hip's own.
         rates: angular accelerations of both legs there [rad/s²].
         step: to attempt next [s]; negative while a heel strike is landed on from beyond.
         pace: the last free step, with which the next footstep begins.
@@ -87,13 +88,26 @@ def begun(walk: RigidWalk) -> RigidProgress:
     step = jnp.minimum(step, walk.duration)
     no = jnp.asarray(False)
     rates = _accelerations(walk, walk.state)
-    return RigidProgress(zero, walk.state, rates, step, step, none, no, none, none, none)
+    upright = walk.state._replace(hip_x=walk.state.hip_x + _rolled(walk, walk.state.theta_2))
+    return RigidProgress(zero, upright, rates, step, step, none, no, none, none, none)
+
+
+def whole(walk: RigidWalk, now: RigidProgress) -> RigidState:
+    """The state with the hip where it is."""
+    state = now.state
+    return state._replace(hip_x=state.hip_x - _rolled(walk, state.theta_2))
+
+
+def _rolled(walk: RigidWalk, angle: Scalar) -> Scalar:
+    """How far the hip goes from a stance leg at this angle to one that is upright [m]."""
+    walker = walk.scene.walker
+    return walker.hip_to_foot * sine_cosine(angle)[0] + walker.r * angle
 
 
 def attempted(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Scalar]:
     """One attempted step further, and whether the walk is over (boolean)."""
     stages = _stages(walk, now)
-    trial = _moved(walk, now.state, now.step, _TABLEAU.b_sol[:-1], stages)
+    trial = _moved(now.state, now.step, _TABLEAU.b_sol[:-1], stages)
     landing = now.landing > 0
     landed = _landing(walk, now, trial, stages[-1])
     # The last stage is the first one of the next step, after an impact from the new state.
@@ -128,7 +142,7 @@ def _free(
     """After a step in single support: kept or not, and whether a heel strike lies behind it."""
     old, old_rate = _opening(now.state)
     new, new_rate = _opening(trial)
-    course = _Course.of(
+    course = Quintic.of(
         now.step, (old, old_rate, now.rates[0] + now.rates[1]), (new, new_rate, rates[2] + rates[3])
     )
     ahead = (trial.theta_1 > trial.theta_2) & (new <= 0.0)
@@ -172,10 +186,13 @@ def _landing(
     struck = (jnp.abs(opening) <= _NEAR * jnp.sqrt(walk.rtol)) & (rate < 0.0)
     missed = ~struck & (now.landing >= _MOST_LANDINGS)
     t = now.t + now.step + jnp.where(struck, rest, 0.0)
-    nearer = _moved(walk, trial, rest, [1.0], [rates])
+    nearer = _moved(trial, rest, [1.0], [rates])
+    # The hip stays where it is, over another leg.
+    rolled = _rolled(walk, nearer.theta_1) - _rolled(walk, nearer.theta_2)
+    after = impact(walk.scene, nearer).state._replace(hip_x=nearer.hip_x + rolled)
     return RigidProgress(
         t=t,
-        state=_where(struck, impact(walk.scene, nearer).state, trial),
+        state=_where(struck, after, trial),
         rates=now.rates,
         step=jnp.where(struck, jnp.minimum(now.pace, walk.duration - t), rest),
         pace=now.pace,
@@ -192,7 +209,7 @@ def _stages(walk: RigidWalk, now: RigidProgress) -> list[tuple[Scalar, ...]]:
     state = now.state
     stages: list[tuple[Scalar, ...]] = [(state.omega_1, state.omega_2, *now.rates)]
     for row in _TABLEAU.a_lower[:-1]:
-        at = _moved(walk, state, now.step, row, stages)
+        at = _moved(state, now.step, row, stages)
         stages.append((at.omega_1, at.omega_2, *_accelerations(walk, at)))
     return stages
 
@@ -216,20 +233,12 @@ def _accelerations(walk: RigidWalk, state: RigidState) -> tuple[Scalar, Scalar]:
 
 
 def _moved(
-    walk: RigidWalk,
-    state: RigidState,
-    step: Scalar,
-    weights: Any,
-    stages: list[tuple[Scalar, ...]],
+    state: RigidState, step: Scalar, weights: Any, stages: list[tuple[Scalar, ...]]
 ) -> RigidState:
     """The state a step further, at weighted rates of its angles and of their rates."""
     old = state[1:]
-    new = [leaf + step * _weighted(weights, stages, i) for i, leaf in enumerate(old)]
-    walker = walk.scene.walker
-    # The foot's centre moves by what the foot rolls, and the hip with it.
-    sines = jnp.sin(old[1]) - jnp.sin(new[1])
-    hip_x = state.hip_x + walker.hip_to_foot * sines + walker.r * (old[1] - new[1])
-    return RigidState(hip_x, *new)
+    new = (leaf + step * _weighted(weights, stages, i) for i, leaf in enumerate(old))
+    return RigidState(state.hip_x, *new)
 
 
 def _weighted(weights: Any, stages: list[tuple[Scalar, ...]], i: int) -> Scalar:
@@ -241,50 +250,6 @@ def _weighted(weights: Any, stages: list[tuple[Scalar, ...]], i: int) -> Scalar:
 def _opening(state: RigidState) -> tuple[Scalar, Scalar]:
     """Sum of the leg angles and its rate: above zero while the swing foot ahead is off ground."""
     return state.theta_1 + state.theta_2, state.omega_1 + state.omega_2
-
-
-class _Course(NamedTuple):
-    """Hermite's quintic of the opening over a step, by its coefficients."""
-
-    coefficients: tuple[Scalar, ...]
-
-    @staticmethod
-    def of(step: Scalar, old: tuple[Scalar, ...], new: tuple[Scalar, ...]) -> "_Course":
-        """From values, rates and second derivatives at both ends."""
-        rise = new[0] - old[0]
-        p, q = step * old[1], step * new[1]
-        a, b = 0.5 * step * step * old[2], 0.5 * step * step * new[2]
-        return _Course(
-            (
-                old[0],
-                p,
-                a,
-                10.0 * rise - 6.0 * p - 4.0 * q - 3.0 * a + b,
-                -15.0 * rise + 8.0 * p + 7.0 * q + 3.0 * a - 2.0 * b,
-                6.0 * rise - 3.0 * (p + q) - a + b,
-            )
-        )
-
-    def value(self, x: Scalar) -> Scalar:
-        """At a share `x` of the step."""
-        return self._value_and_slope(x)[0]
-
-    def root(self) -> Scalar:
-        """The share of the step at which it falls through zero, roughly."""
-        end = functools.reduce(operator.add, self.coefficients)
-        rise = end - self.coefficients[0]
-        x = -self.coefficients[0] / jnp.where(rise == 0.0, 1.0, rise)
-        for _ in range(_NEWTON):
-            value, slope = self._value_and_slope(x)
-            x = jnp.clip(x - value / jnp.where(slope == 0.0, 1.0, slope), 0.0, 1.0)
-        return x
-
-    def _value_and_slope(self, x: Scalar) -> tuple[Scalar, Scalar]:
-        value, slope = self.coefficients[-1], jnp.zeros_like(self.coefficients[-1])
-        for coefficient in self.coefficients[-2::-1]:
-            slope = slope * x + value
-            value = value * x + coefficient
-        return value, slope
 
 
 def _where(condition: Scalar, a: Any, b: Any) -> Any:

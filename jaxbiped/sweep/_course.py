@@ -14,7 +14,7 @@ from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.lanes._adaptive import AdaptiveSolve, Saved, Solve
 from jaxbiped.solve._ending import WATCHES
-from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun
+from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, whole
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.sweep._goals import Goals
 from jaxbiped.sweep._label import Label
@@ -227,7 +227,7 @@ class RigidCourse(AbstractCourse):
             code=walked.code,
             footsteps=walked.footsteps,
             time=walked.t,
-            distance=walked.state.hip_x - start.solve.state.hip_x,
+            distance=whole(start.solve, walked).hip_x - start.solve.state.hip_x,
             attempts=walked.attempts,
         )
 
