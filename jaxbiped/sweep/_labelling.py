@@ -152,8 +152,8 @@ class Labelling(eqx.Module):
             parts = ("normal", "friction", "clearance")
             laws = {part: type(getattr(self.scene, part)).__name__ for part in parts}
         effort = self.effort._asdict() | {"solver": type(self.effort.solver).__name__}
-        # Both engines give the same labels.
-        effort.pop("engine")
+        # Both engines give the same labels; the gap follows from the tolerance.
+        del effort["engine"], effort["gap"]
         return {
             "model": "rigid" if isinstance(self.scene, RigidScene) else "compliant",
             "scene": scene | laws,

@@ -84,6 +84,15 @@ class Layout(NamedTuple):
         return first, first + math.prod(self.shape_of(chunk))
 
     @property
+    def sizes(self) -> np.ndarray:
+        """How many starts each chunk has, shape (chunks,)."""
+        full = math.prod(self.chunk_shape)
+        last = math.prod(self.shape_of(self._cuts - 1))
+        sizes = np.full((self.chunks // self._cuts, self._cuts), full)
+        sizes[:, -1] = last
+        return sizes.ravel()
+
+    @property
     def _cuts(self) -> int:
         return -(-self.starts.shape[self.axis] // self.rows)
 

@@ -20,8 +20,8 @@ class Memory:
         for name in self._dataset.data_vars:
             self._dataset[name].data = np.array(self._dataset[name].data)
 
-    def missing(self) -> list[int]:
-        return list(range(self.layout.chunks))
+    def missing(self) -> np.ndarray:
+        return np.arange(self.layout.chunks)
 
     def write(self, chunk: int, fields: dict[str, np.ndarray]) -> None:
         region, shape = self.layout.region(chunk), self.layout.shape_of(chunk)

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -74,9 +75,9 @@ class Store:
         except OSError as error:
             raise unwritable(path, error) from None
 
-    def missing(self) -> list[int]:
+    def missing(self) -> np.ndarray:
         """Numbers of the chunks that are not complete."""
-        return [int(i) for i in np.flatnonzero(self._done == 0)]
+        return np.flatnonzero(self._done == 0)
 
     def write(self, chunk: int, fields: Mapping[str, np.ndarray]) -> None:
         """Writes a chunk, then marks it as complete.
@@ -113,6 +114,7 @@ class Store:
         """
         try:
             self._group.attrs.update(dict(attributes))
+            _consolidate(self.path)
         except OSError as error:
             raise unwritable(self.path, error) from None
 
@@ -176,12 +178,21 @@ def _create(
             dimension_names=["chunk"],
             attributes=done,
         )
+        _consolidate(half)
         if path.exists():
             path.rmdir()
         half.rename(path)
     except OSError:
         shutil.rmtree(half, ignore_errors=True)
         raise
+
+
+def _consolidate(path: Path) -> None:
+    """Lets `xarray.open_zarr` read all arrays' metadata at once, without a warning."""
+    with warnings.catch_warnings():
+        # Zarr's third format has no word on it yet.
+        warnings.simplefilter("ignore")
+        zarr.consolidate_metadata(str(path))
 
 
 def _is_new(path: Path) -> bool:
@@ -218,7 +229,7 @@ def _check_same(path: Path, settings: dict[str, Any], *, but: str = "") -> None:
 def _difference(old: Any, new: Any, name: str) -> str | None:
     """The first difference of two settings in words, None for none."""
     if isinstance(old, dict) and isinstance(new, dict):
-        for key in sorted({*old, *new}):
+        for key in dict.fromkeys([*new, *old]):
             inner = f"{name}.{key}" if name else key
             if key not in old or key not in new:
                 here = "only in the store" if key in old else "not in the store"

@@ -85,12 +85,13 @@ def sweep(
         else Store.open(Path(store), layout, settings, provenance())
     )
     missing = sink.missing()
-    fresh = sum(_size(layout, i) for i in missing)
+    sizes = layout.sizes
+    fresh = int(sizes[missing].sum())
     with tqdm(total=starts.size, unit="starts", disable=not progress, smoothing=0.05) as bar:
         bar.update(starts.size - fresh)
         for number, fields in computed(known, layout, missing, executor, int(workers)):
             sink.write(number, fields)
-            bar.update(_size(layout, number))
+            bar.update(int(sizes[number]))
     if look_for_gaits:
         known = _resolved(known, layout, sink)
     sink.note(
@@ -103,11 +104,6 @@ def sweep(
     )
     dataset: xr.Dataset = sink.dataset()
     return dataset
-
-
-def _size(layout: Layout, chunk: int) -> int:
-    first, last = layout.numbers(chunk)
-    return last - first
 
 
 def _resolved(labelling: Labelling, layout: Layout, sink: Any) -> Labelling:

@@ -30,7 +30,7 @@ Fields = dict[str, np.ndarray]
 def computed(
     labelling: Labelling,
     layout: Layout,
-    chunks: list[int],
+    chunks: np.ndarray,
     executor: Executor | None,
     workers: int,
 ) -> Iterator[tuple[int, Fields]]:
@@ -40,11 +40,11 @@ def computed(
         ArgumentError: the workers were lost, or cannot be sent the starts.
     """
     if executor is None:
-        for chunk in chunks:
+        for chunk in map(int, chunks):
             yield chunk, label_some(labelling, *_part(layout, chunk))
         return
     _check_sent(executor, labelling, layout)
-    queue = iter(chunks)
+    queue = map(int, chunks)
     running: dict[Future[Fields], int] = {}
     try:
         while True:
