@@ -145,6 +145,7 @@ from jaxbiped.sweep._fatal_push import fatal_push as fatal_push
 from jaxbiped.sweep._fractions import Fraction as Fraction
 from jaxbiped.sweep._fractions import basin_fractions as basin_fractions
 from jaxbiped.sweep._fractions import wilson_interval as wilson_interval
+from jaxbiped.sweep._given_starts import GivenStarts as GivenStarts
 from jaxbiped.sweep._label import Label as Label
 from jaxbiped.sweep._label import label_name as label_name
 from jaxbiped.sweep._label import label_names as label_names
@@ -156,9 +157,8 @@ from jaxbiped.sweep._prepare import labelling as labelling
 from jaxbiped.sweep._prepare import with_gaits_met as with_gaits_met
 from jaxbiped.sweep._refine import RefinedBoundary as RefinedBoundary
 from jaxbiped.sweep._refine import refined_boundary as refined_boundary
-from jaxbiped.sweep._starts import SAMPLINGS as SAMPLINGS
+from jaxbiped.sweep._points import SAMPLINGS as SAMPLINGS
 from jaxbiped.sweep._starts import AbstractStarts as AbstractStarts
-from jaxbiped.sweep._starts import GivenStarts as GivenStarts
 from jaxbiped.sweep._starts import Grid as Grid
 from jaxbiped.sweep._starts import Sample as Sample
 from jaxbiped.sweep._starts import grid as grid

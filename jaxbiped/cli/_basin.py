@@ -23,10 +23,11 @@ from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._cluster import cluster_executor, local_executor
 from jaxbiped.sweep._coordinates import COORDINATES, UNITS
 from jaxbiped.sweep._fractions import basin_fractions
+from jaxbiped.sweep._given_starts import GivenStarts
 from jaxbiped.sweep._label import label_names
 from jaxbiped.sweep._labelling import Labelling, checked_effort
 from jaxbiped.sweep._prepare import labelling
-from jaxbiped.sweep._starts import AbstractStarts, GivenStarts
+from jaxbiped.sweep._starts import AbstractStarts
 from jaxbiped.sweep._store import check_store
 from jaxbiped.sweep._sweep import CHUNK, sweep
 

@@ -1,5 +1,6 @@
-"""Executors for sweeps: processes of this machine, and workers of a dask scheduler."""
+"""Executors for sweeps: spawned processes here, or a dask.distributed cluster."""
 
+import importlib
 import multiprocessing
 import os
 from concurrent.futures import Executor, ProcessPoolExecutor
@@ -7,55 +8,64 @@ from typing import Any
 
 from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.lanes._engine import THREADS_VARIABLE, default_threads
+from jaxbiped.sweep._arguments import check_whole
 
-_TIMEOUT = 10.0
-"""How long to wait for a scheduler [s]."""
+_RETRIES = 3
+"""Times that a chunk is labelled again where its worker died."""
 
 
-def local_executor(workers: int) -> Executor:
-    """So many new processes of this machine, each with its share of the cores.
+def cluster_executor(address: str, *, timeout: float = 10.0) -> tuple[Executor, int]:
+    """An executor of a dask.distributed cluster, and how many chunks it runs at once.
+
+    Args:
+        address: of the scheduler, such as "tcp://10.0.0.1:8786".
+        timeout: how long to wait for it [s].
+
+    Returns:
+        The executor and the number of the workers' threads. `shutdown` ends neither of them.
 
     Raises:
-        ArgumentError: no workers.
+        ArgumentError: the package distributed is missing, no scheduler answers, or it has no
+            workers.
     """
-    check_positive("workers", workers)
-    share = max(1, default_threads() // int(workers))
-    # JAX deadlocks after a fork.
-    context = multiprocessing.get_context("spawn")
+    check_positive("timeout", timeout, "s")
+    try:
+        distributed: Any = importlib.import_module("distributed")
+    except ImportError:
+        raise ArgumentError(
+            f"scheduler = {address!r} needs the package distributed: pip install jaxbiped[sweep]."
+        ) from None
+    try:
+        client = distributed.Client(address, timeout=timeout, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        reason = " ".join(str(error).split()).rstrip(".")
+        raise ArgumentError(
+            f"scheduler = {address!r} does not answer ({reason}): it must be the address of a "
+            "running dask scheduler, such as 'tcp://10.0.0.1:8786'."
+        ) from None
+    threads = sum(client.nthreads().values())
+    if not threads:
+        client.close()
+        raise ArgumentError(
+            f"scheduler = {address!r} has no workers: start at least one dask worker for it."
+        )
+    return client.get_executor(pure=False, retries=_RETRIES), threads
+
+
+def local_executor(workers: int) -> ProcessPoolExecutor:
+    """An executor of spawned processes, each with its share of this process's threads.
+
+    Raises:
+        ArgumentError: `workers` is not a whole number of at least 1.
+    """
+    check_whole("workers", workers, 1)
     return ProcessPoolExecutor(
-        int(workers), mp_context=context, initializer=_use_threads, initargs=(share,)
+        workers,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=_limited,
+        initargs=(max(1, default_threads() // workers),),
     )
 
 
-def _use_threads(count: int) -> None:
-    os.environ[THREADS_VARIABLE] = str(count)
-
-
-def cluster_executor(address: str, *, timeout: float = _TIMEOUT) -> tuple[Executor, int]:
-    """The workers of a dask scheduler, and how many there are; for `sweep`.
-
-    Args:
-        address: of the scheduler, as "tcp://host:8786".
-        timeout: how long to wait for it [s].
-
-    Raises:
-        ArgumentError: nobody answers there, it has no workers, or distributed is not installed.
-    """
-    try:
-        from distributed import Client
-    except ImportError:
-        raise ArgumentError(
-            f"scheduler = {address!r} needs distributed: install jaxbiped[sweep]."
-        ) from None
-    try:
-        client: Any = Client(address, timeout=timeout)
-    except (OSError, ValueError) as error:
-        raise ArgumentError(
-            f"scheduler = {address!r} does not answer ({error}): it must be the address of a "
-            "running dask scheduler, as tcp://host:8786."
-        ) from None
-    workers = len(client.scheduler_info()["workers"])
-    if not workers:
-        client.close()
-        raise ArgumentError(f"scheduler = {address!r} has no workers: start one at least.")
-    return client.get_executor(), workers
+def _limited(threads: int) -> None:
+    os.environ[THREADS_VARIABLE] = str(threads)

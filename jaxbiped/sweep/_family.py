@@ -75,9 +75,11 @@ class Family(NamedTuple):
         try:
             places = np.array([known[tuple(values)] for values in unique], dtype=int)
         except KeyError as missing:
+            pairs = zip(self.names, missing.args[0], strict=True)
+            shown = ", ".join(f"{name} = {value:g}" for name, value in pairs)
             raise ArgumentError(
-                f"parameters {self.names} = {missing.args[0]} is not allowed: no gait was looked "
-                "for there."
+                f"{shown} is not allowed: no gait was looked for there; prepare the labelling "
+                "with these parameters."
             ) from None
         return np.asarray(places[which.reshape(-1)])
 

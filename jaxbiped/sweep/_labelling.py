@@ -26,6 +26,7 @@ from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.solve._solvers import solver_named
+from jaxbiped.sweep._arguments import check_whole
 from jaxbiped.sweep._broadcast import repeated
 from jaxbiped.sweep._family import Family
 from jaxbiped.sweep._follow import Effort, follow
@@ -46,7 +47,8 @@ class Labelled(NamedTuple):
         footsteps: heel strikes until the label was certain.
         time: simulated until then [s].
         distance: walked along the slope until then [m].
-        rate: share of the distance from the gait that is left after a footstep, at last.
+        rate: share of the distance from the gait that is left after a footstep, over the last
+            cycle; NaN without a cycle, and where nothing but rounding is left of the distance.
         closest: smallest distance from any of the gaits, in its metric; infinite without arrival.
         attempts: of the solver's steps.
         final: last states on the section without hip_x, shape (n, m); infinite without arrival.
@@ -149,8 +151,8 @@ class Labelling(eqx.Module):
             parts = ("normal", "friction", "clearance")
             laws = {part: type(getattr(self.scene, part)).__name__ for part in parts}
         effort = self.effort._asdict() | {"solver": type(self.effort.solver).__name__}
-        # Both engines give the same labels.
-        effort.pop("engine")
+        # Both engines give the same labels; the gap follows from the tolerance.
+        del effort["engine"], effort["gap"]
         return {
             "model": "rigid" if isinstance(self.scene, RigidScene) else "compliant",
             "scene": scene | laws,
@@ -175,8 +177,13 @@ def checked_effort(
         ArgumentError: an argument that is not allowed.
     """
     check_type("scene", scene, Scene, RigidScene)
-    check_positive("footsteps", footsteps)
-    check_positive("max_solver_steps", max_solver_steps)
+    check_whole("footsteps", footsteps, 1)
+    check_whole("max_solver_steps", max_solver_steps, 1)
+    if any(np.ndim(leaf) for leaf in jtu.tree_leaves(scene)):
+        raise ArgumentError(
+            "scene has parameters that are arrays: give one scene, and name what differs from "
+            "start to start among the parameters."
+        )
     names = RIGID_ACCURACIES if isinstance(scene, RigidScene) else ACCURACIES
     check_choice("accuracy", accuracy, names)
     tolerance = names[accuracy] if rtol is None else rtol

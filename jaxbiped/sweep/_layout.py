@@ -1,5 +1,6 @@
 """How the results of a sweep lie in arrays, and how these are cut into chunks."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,64 +26,81 @@ FIELDS: dict[str, tuple[str, Any, str, str]] = {
 
 
 class Layout(NamedTuple):
-    """Arrays for starts of some shape, cut into chunks along their first axis.
+    """Arrays for starts of some shape, cut into chunks of starts that follow each other.
 
     Attributes:
         starts: the starts.
-        rows: of the first axis in a chunk.
+        axis: along which it is cut: a chunk has one place of the axes before, all of those after.
+        rows: places of that axis in a chunk.
     """
 
     starts: AbstractStarts
+    axis: int
     rows: int
 
     @staticmethod
     def of(starts: AbstractStarts, chunk: int) -> "Layout":
-        """With about `chunk` starts in a chunk, whole rows of the first axis."""
-        row = starts.size // starts.shape[0]
-        return Layout(starts, max(1, min(chunk // row, starts.shape[0])))
+        """With at most `chunk` starts in a chunk."""
+        shape = starts.shape
+        axis, inner = len(shape) - 1, 1
+        while axis > 0 and inner * shape[axis] <= chunk:
+            inner *= shape[axis]
+            axis -= 1
+        return Layout(starts, axis, max(1, min(chunk // inner, shape[axis])))
 
     @property
     def chunks(self) -> int:
         """Number of chunks."""
-        return -(-self.starts.shape[0] // self.rows)
+        return math.prod(self.starts.shape[: self.axis]) * self._cuts
 
     @property
     def chunk_shape(self) -> tuple[int, ...]:
-        """Of all but the last."""
-        return (self.rows, *self.starts.shape[1:])
+        """Of all but the last of the axis that is cut."""
+        shape = self.starts.shape
+        return (*[1] * self.axis, self.rows, *shape[self.axis + 1 :])
 
     def region(self, chunk: int) -> tuple[slice, ...]:
         """Where a chunk lies in the arrays."""
-        first = chunk * self.rows
-        last = min(first + self.rows, self.starts.shape[0])
-        return (slice(first, last), *[slice(None)] * (len(self.starts.shape) - 1))
+        shape = self.starts.shape
+        outer, cut = divmod(chunk, self._cuts)
+        places = np.unravel_index(outer, shape[: self.axis]) if self.axis else ()
+        first = cut * self.rows
+        return (
+            *[slice(int(place), int(place) + 1) for place in places],
+            slice(first, min(first + self.rows, shape[self.axis])),
+            *[slice(0, size) for size in shape[self.axis + 1 :]],
+        )
 
     def shape_of(self, chunk: int) -> tuple[int, ...]:
         """Of a chunk."""
-        rows = self.region(chunk)[0]
-        return (rows.stop - rows.start, *self.starts.shape[1:])
+        return tuple(part.stop - part.start for part in self.region(chunk))
 
     def numbers(self, chunk: int) -> tuple[int, int]:
         """The first of its starts, and the one after its last."""
-        row = self.starts.size // self.starts.shape[0]
-        rows = self.region(chunk)[0]
-        return rows.start * row, rows.stop * row
+        region, shape = self.region(chunk), self.starts.shape
+        first = 0
+        for part, size in zip(region, shape, strict=True):
+            first = first * size + part.start
+        return first, first + math.prod(self.shape_of(chunk))
 
     @property
-    def own_columns(self) -> tuple[str, ...]:
-        """Coordinates that each start has for itself: those of samples."""
-        described = self.starts.described()
-        if "sample" in described:
-            return tuple(self.starts.lower)  # type: ignore[attr-defined]
-        if "given" in described:
-            return tuple(self.starts.states._fields)  # type: ignore[attr-defined]
-        return ()
+    def sizes(self) -> np.ndarray:
+        """How many starts each chunk has, shape (chunks,)."""
+        full = math.prod(self.chunk_shape)
+        last = math.prod(self.shape_of(self._cuts - 1))
+        sizes = np.full((self.chunks // self._cuts, self._cuts), full)
+        sizes[:, -1] = last
+        return sizes.ravel()
+
+    @property
+    def _cuts(self) -> int:
+        return -(-self.starts.shape[self.axis] // self.rows)
 
 
-def fields_of(layout: Layout, found: Labelled, batch: Batch) -> dict[str, np.ndarray]:
-    """What is kept of a chunk, flat arrays by name."""
+def fields_of(starts: AbstractStarts, found: Labelled, batch: Batch) -> dict[str, np.ndarray]:
+    """What is kept of some starts, flat arrays by name."""
     fields = {name: getattr(found, name) for name in FIELDS}
-    return fields | {f"start_{name}": batch.columns[name] for name in layout.own_columns}
+    return fields | {f"start_{name}": batch.columns[name] for name in starts.own_columns}
 
 
 def empty_dataset(layout: Layout) -> xr.Dataset:
@@ -90,7 +108,7 @@ def empty_dataset(layout: Layout) -> xr.Dataset:
     starts = layout.starts
     dims = tuple(starts.axes)
     kinds = dict(FIELDS)
-    for name in layout.own_columns:
+    for name in starts.own_columns:
         kinds[f"start_{name}"] = ("f8", np.nan, UNITS.get(name, ""), f"the start's {name}")
     variables = {}
     for name, (dtype, nothing, unit, what) in kinds.items():

@@ -5,15 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from jaxbiped._checks import check_finite, check_positive
+from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.scene._parameters import parameter_names, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
-from jaxbiped.sweep._coordinates import check_coordinates
+from jaxbiped.sweep._arguments import check_whole
 from jaxbiped.sweep._find_family import find_family, with_gaits
 from jaxbiped.sweep._label import Label
-from jaxbiped.sweep._labelling import Labelled, Labelling, checked_effort
+from jaxbiped.sweep._labelling import Labelling, checked_effort
 from jaxbiped.sweep._starts import AbstractStarts
 
 _ALIKE = 0.05
@@ -62,9 +63,14 @@ def labelling(
         engine=engine,
     )
     values = {} if parameters is None else dict(parameters)
-    check_coordinates(scene, values)
     for name, column in values.items():
+        check_choice("parameters", name, parameter_names(scene))
         check_finite(name, column)
+        if np.ndim(column) != 1 or not np.size(column):
+            raise ArgumentError(
+                f"{name} has values of shape {np.shape(column)}: it must be (k,), k at least 1."
+            )
+        with_parameters(scene, {name: np.asarray(column, dtype=np.float64)})
     start = seed_start(scene) if guess is None else guess
     family = find_family(scene, effort, parameters=values, guess=start)
     return Labelling(scene, family, effort)
@@ -76,39 +82,44 @@ def with_gaits_met(labelling: Labelling, starts: AbstractStarts, *, count: int =
     As many starts, evenly spread, are followed; where their last footsteps repeat a cycle, a gait
     is sought from there.
     """
-    check_positive("count", count)
+    check_whole("count", count, 1)
     chosen = np.unique(np.linspace(0, starts.size - 1, min(count, starts.size)).astype(int))
-    batches = [starts.batch(labelling, i, i + 1) for i in chosen]
-    first = batches[0]
-    states = type(first.states)(
-        *[np.concatenate(leaves) for leaves in zip(*[b.states for b in batches], strict=True)]
-    )
-    parameters = {
-        name: np.concatenate([batch.parameters[name] for batch in batches])
-        for name in first.parameters
-    }
-    found = labelling(states, parameters=parameters)
-    return with_gaits_of(labelling, found, parameters)
+    return with_guesses(labelling, guesses_among(labelling, starts, chosen))
 
 
-def with_gaits_of(
-    labelling: Labelling, found: Labelled, parameters: Mapping[str, np.ndarray]
-) -> Labelling:
-    """The labelling that also knows the gaits that unresolved starts seem to converge to."""
+Guesses = dict[int, list[tuple[int, list[float]]]]
+"""By row of a family: periods, and states on the section without hip_x, from which to search."""
+
+
+def guesses_among(labelling: Labelling, starts: AbstractStarts, numbers: np.ndarray) -> Guesses:
+    """Where to seek the gaits that the starts with these numbers seem to converge to."""
+    batch = starts.at(labelling, numbers)
+    found = labelling(batch.states, parameters=batch.parameters)
     family = labelling.family
     open_ = np.flatnonzero((found.label == int(Label.UNRESOLVED)) & (found.period > 0))
-    if not len(open_) or (parameters and not family.names):
-        return labelling
-    rows = family.row_of(parameters) if family.names else np.zeros(len(found.label), dtype=int)
-    guesses: dict[int, list[tuple[int, Any]]] = {}
+    if not len(open_) or (batch.parameters and not family.names):
+        return {}
+    rows = np.zeros(len(found.label), dtype=int)
+    if family.names:
+        rows = family.row_of(batch.parameters)
+    guesses: Guesses = {}
     for row, period in sorted({(int(rows[i]), int(found.period[i])) for i in open_}):
         among = open_[(rows[open_] == row) & (found.period[open_] == period)]
-        chosen = _apart(found.final[among] / family.scales[row])
-        kind = type(family.states[row])
-        for i in among[chosen]:
-            guess = kind(0.0, *map(float, found.final[i]))
-            guesses.setdefault(row, []).append((period, guess))
-    more = with_gaits(labelling.scene, family, labelling.effort, guesses)
+        for i in among[_apart(found.final[among] / family.scales[row])]:
+            guesses.setdefault(row, []).append((period, found.final[i].tolist()))
+    return guesses
+
+
+def with_guesses(labelling: Labelling, guesses: Guesses) -> Labelling:
+    """The labelling that also knows the gaits to which these guesses lead."""
+    if not guesses:
+        return labelling
+    family = labelling.family
+    states = {
+        row: [(period, type(family.states[row])(0.0, *point)) for period, point in each]
+        for row, each in guesses.items()
+    }
+    more = with_gaits(labelling.scene, family, labelling.effort, states)
     return Labelling(labelling.scene, more, labelling.effort)
 
 

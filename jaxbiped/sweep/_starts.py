@@ -1,24 +1,21 @@
-"""Where starts lie: on grids, in samples, or as given."""
+"""Where starts lie: on grids and in samples."""
 
 import abc
-import warnings
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax.tree_util as jtu
 import numpy as np
-from scipy.stats import qmc
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
+from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.sweep._arguments import check_whole
 from jaxbiped.sweep._coordinates import check_coordinates, parameters_among, placed, state_at
 from jaxbiped.sweep._labelling import Labelling
-
-SAMPLINGS = ("uniform", "latin-hypercube", "sobol", "halton")
-"""Ways to draw samples."""
+from jaxbiped.sweep._points import SAMPLINGS, points
 
 
 class Batch(NamedTuple):
@@ -43,8 +40,13 @@ class AbstractStarts(eqx.Module):
         """The axes by name, with their coordinates where they have such."""
 
     @abc.abstractmethod
-    def batch(self, labelling: Labelling, first: int, last: int) -> Batch:
-        """The starts from number `first` up to `last`, in the order of the axes."""
+    def at(self, labelling: Labelling, numbers: np.ndarray) -> Batch:
+        """The starts with these numbers, increasing, in the order of the axes; shape (n,)."""
+
+    @property
+    @abc.abstractmethod
+    def own_columns(self) -> tuple[str, ...]:
+        """Coordinates that each start has for itself, of which no axis tells."""
 
     @abc.abstractmethod
     def described(self) -> dict[str, Any]:
@@ -59,7 +61,11 @@ class AbstractStarts(eqx.Module):
     @property
     def size(self) -> int:
         """How many there are."""
-        return int(np.prod(self.shape))
+        return math.prod(self.shape)
+
+    def batch(self, labelling: Labelling, first: int, last: int) -> Batch:
+        """The starts from number `first` up to `last`."""
+        return self.at(labelling, np.arange(first, last))
 
 
 class Grid(AbstractStarts):
@@ -87,8 +93,12 @@ class Grid(AbstractStarts):
     def parameters(self) -> dict[str, np.ndarray]:
         return {name: np.unique(column) for name, column in parameters_among(self.values).items()}
 
-    def batch(self, labelling: Labelling, first: int, last: int) -> Batch:
-        places = np.unravel_index(np.arange(first, last), self.shape)
+    @property
+    def own_columns(self) -> tuple[str, ...]:
+        return ()
+
+    def at(self, labelling: Labelling, numbers: np.ndarray) -> Batch:
+        places = np.unravel_index(numbers, self.shape)
         pairs = zip(self.values.items(), places, strict=True)
         columns = {name: values[place] for (name, values), place in pairs}
         return batch_at(labelling, columns, place=self.place, follow=self.follow)
@@ -125,10 +135,14 @@ class Sample(AbstractStarts):
     def axes(self) -> dict[str, np.ndarray | None]:
         return {"start": None}
 
-    def batch(self, labelling: Labelling, first: int, last: int) -> Batch:
-        points = self._points(first, last)
+    @property
+    def own_columns(self) -> tuple[str, ...]:
+        return tuple(self.lower)
+
+    def at(self, labelling: Labelling, numbers: np.ndarray) -> Batch:
+        drawn = points(self.method, len(self.lower), self.count, self.seed, numbers)
         columns = {
-            name: self.lower[name] + points[:, i] * (self.upper[name] - self.lower[name])
+            name: self.lower[name] + drawn[:, i] * (self.upper[name] - self.lower[name])
             for i, name in enumerate(self.lower)
         }
         return batch_at(labelling, columns, place=self.place, follow=self.follow)
@@ -136,54 +150,8 @@ class Sample(AbstractStarts):
     def described(self) -> dict[str, Any]:
         bounds = {name: [self.lower[name], self.upper[name]] for name in self.lower}
         rest = {"place": self.place, "follow": _name_of(self.follow)}
-        return {"sample": self.method, "count": self.count, "seed": self.seed} | bounds | rest
-
-    def _points(self, first: int, last: int) -> np.ndarray:
-        """In the unit cube, shape (last − first, d), whatever was drawn before."""
-        dimensions, count = len(self.lower), last - first
-        if self.method == "uniform":
-            bits = np.random.Philox(self.seed)
-            # One 64-bit word for each number; Philox counts in blocks of four.
-            words, offset = first * dimensions, (first * dimensions) % 4
-            bits.advance(words // 4)
-            drawn = np.random.Generator(bits).random(offset + count * dimensions)
-            return drawn[offset:].reshape(count, dimensions)
-        if self.method == "latin-hypercube":
-            # A permutation of all, which has to be drawn whole.
-            return qmc.LatinHypercube(dimensions, rng=self.seed).random(self.count)[first:last]
-        engine = qmc.Sobol if self.method == "sobol" else qmc.Halton
-        sequence = engine(dimensions, scramble=True, rng=self.seed)
-        if first:
-            sequence.fast_forward(int(first))
-        with warnings.catch_warnings():
-            # A chunk is a piece of the sequence, whatever its length.
-            warnings.filterwarnings("ignore", message="The balance properties")
-            return sequence.random(count)
-
-
-class GivenStarts(AbstractStarts):
-    """Starts as they are given.
-
-    Attributes:
-        states: leaves of shape (n,).
-    """
-
-    states: Any
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return (len(self.states.hip_x),)
-
-    @property
-    def axes(self) -> dict[str, np.ndarray | None]:
-        return {"start": None}
-
-    def batch(self, labelling: Labelling, first: int, last: int) -> Batch:
-        states = jtu.tree_map(lambda leaf: np.asarray(leaf)[first:last], self.states)
-        return Batch(states, {}, states._asdict())
-
-    def described(self) -> dict[str, Any]:
-        return {"given": [np.asarray(leaf).tolist() for leaf in self.states]}
+        drawn = {"sample": self.method, "count": self.count, "seed": self.seed}
+        return drawn | {"bounds": bounds} | rest
 
 
 def grid(
@@ -212,10 +180,12 @@ def grid(
         raise ArgumentError("values = {} is empty: name at least one coordinate.")
     axes = {}
     for name, given in values.items():
+        check_finite(name, given)
         axis = np.atleast_1d(np.asarray(given, dtype=np.float64))
         if axis.ndim != 1 or not axis.size:
-            raise ArgumentError(f"{name} has no values: give at least one.")
-        check_finite(name, axis)
+            raise ArgumentError(
+                f"{name} has values of shape {axis.shape}: it must be (k,), k at least 1."
+            )
         axes[name] = axis
     _check_parameters(scene, axes)
     return Grid(axes, place, follow)
@@ -240,14 +210,20 @@ def sample(
         ArgumentError: an unknown coordinate or method, bounds that enclose nothing, no starts.
     """
     check_coordinates(scene, bounds)
-    check_positive("count", count)
+    check_whole("count", count, 1)
+    check_whole("seed", seed, 0)
     check_choice("method", method, SAMPLINGS)
     if not bounds:
         raise ArgumentError("bounds = {} is empty: name at least one coordinate.")
-    for name, (low, high) in bounds.items():
-        check_finite(name, (low, high))
+    for name, pair in bounds.items():
+        check_finite(name, pair)
+        if np.shape(pair) != (2,):
+            raise ArgumentError(f"{name} = {pair!r} is not allowed: give two numbers, its bounds.")
+        low, high = pair
         if not low < high:
-            raise ArgumentError(f"{name} = {low:g}:{high:g} is empty: the first must be less.")
+            raise ArgumentError(
+                f"{name} = {low:g}:{high:g} is not allowed: the first must be less than the second."
+            )
     lower = {name: float(low) for name, (low, _) in bounds.items()}
     upper = {name: float(high) for name, (_, high) in bounds.items()}
     _check_parameters(scene, {name: np.array([lower[name], upper[name]]) for name in lower})

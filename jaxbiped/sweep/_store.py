@@ -3,7 +3,8 @@
 import json
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,12 @@ import xarray as xr
 import zarr
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.sweep._layout import FIELDS, Layout, empty_dataset
+from jaxbiped.sweep._layout import Layout, empty_dataset
 
 SETTINGS = "settings"
 """Attribute that holds, as JSON, all that the labels depend on."""
+GAITS = "gaits"
+"""Of the settings, what a run finds for itself."""
 _DONE = "done"
 _CLOSE = 1e-6
 """Relative difference of two gaits' numbers that counts as none."""
@@ -31,6 +34,8 @@ class Store:
     def __init__(self, path: Path, layout: Layout) -> None:
         self.path, self.layout = path, layout
         self._group: Any = zarr.open_group(str(path), mode="r+", use_consolidated=False)
+        done: Any = self._group[_DONE]
+        self._done = np.asarray(done[:])
 
     @staticmethod
     def open(
@@ -49,17 +54,32 @@ class Store:
                 or cannot be written.
         """
         check_store(path)
+        path = path.absolute()
         try:
-            if not path.exists() or not any(path.iterdir()):
+            if _is_new(path):
                 _create(path, layout, settings, attributes)
             _check_same(path, settings)
             return Store(path, layout)
         except OSError as error:
             raise unwritable(path, error) from None
 
-    def missing(self) -> list[int]:
+    @staticmethod
+    def check(path: Path, settings: dict[str, Any]) -> None:
+        """Refuses early what `open` would refuse; gaits may be missing from these settings.
+
+        Raises:
+            ArgumentError: see `open`.
+        """
+        path = path.absolute()
+        try:
+            if not _is_new(path):
+                _check_same(path, settings, but=GAITS)
+        except OSError as error:
+            raise unwritable(path, error) from None
+
+    def missing(self) -> np.ndarray:
         """Numbers of the chunks that are not complete."""
-        return [int(i) for i in np.flatnonzero(np.asarray(self._group[_DONE][:]) == 0)]
+        return np.flatnonzero(self._done == 0)
 
     def write(self, chunk: int, fields: Mapping[str, np.ndarray]) -> None:
         """Writes a chunk, then marks it as complete.
@@ -70,16 +90,18 @@ class Store:
         region = self.layout.region(chunk)
         shape = self.layout.shape_of(chunk)
         try:
+            if self._done[chunk]:
+                # Were it killed amid writing, the chunk must not pass for complete.
+                self._mark(chunk, 0)
             for name, values in fields.items():
                 self._group[name][region] = np.reshape(values, shape)
-            self._group[_DONE][chunk] = 1
+            self._mark(chunk, 1)
         except OSError as error:
             raise unwritable(self.path, error) from None
 
-    def chunks(self, names: tuple[str, ...]) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
-        """All chunks one by one: their numbers and these fields of theirs, flat."""
-        for chunk in range(self.layout.chunks):
-            yield chunk, self.read(chunk, names)
+    def _mark(self, chunk: int, complete: int) -> None:
+        self._done[chunk] = complete
+        self._group[_DONE][chunk] = complete
 
     def read(self, chunk: int, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         """These fields of one chunk, flat."""
@@ -87,9 +109,20 @@ class Store:
         return {name: np.asarray(self._group[name][region]).ravel() for name in names}
 
     def note(self, attributes: Mapping[str, Any]) -> None:
-        """Sets attributes."""
-        self._group.attrs.update(dict(attributes))
-        zarr.consolidate_metadata(str(self.path), zarr_format=2)
+        """Sets attributes.
+
+        Raises:
+            ArgumentError: they cannot be written.
+        """
+        try:
+            self._group.attrs.update(dict(attributes))
+            _consolidate(self.path)
+        except OSError as error:
+            raise unwritable(self.path, error) from None
+
+    def noted(self, name: str) -> Any:
+        """An attribute, None where it is not there."""
+        return self._group.attrs.get(name)
 
     def dataset(self) -> xr.Dataset:
         """The results, opened lazily."""
@@ -124,22 +157,69 @@ def unwritable(path: Path, error: OSError) -> ArgumentError:
 def _create(
     path: Path, layout: Layout, settings: dict[str, Any], attributes: Mapping[str, Any]
 ) -> None:
-    """A store without results, complete in itself or not there at all."""
-    dataset = empty_dataset(layout)
-    done = np.zeros(layout.chunks, dtype=np.int8)
-    dataset[_DONE] = ("chunk", done, {"long_name": "whether the chunk is complete"})
-    dataset.attrs = {**attributes, SETTINGS: json.dumps(settings)}
-    encoding = {name: {"chunks": layout.chunk_shape} for name in FIELDS if name in dataset}
-    half = path.with_name(path.name + ".new")
-    half.parent.mkdir(parents=True, exist_ok=True)
+    """A store without results, complete in itself or not there at all.
+
+    Arrays take no room until they are written.
+    """
+    half = path.with_name(f".{path.name}.unfinished")
     shutil.rmtree(half, ignore_errors=True)
-    dataset.to_zarr(half, mode="w", encoding=encoding, zarr_format=2, consolidated=True)
-    if path.exists():
-        path.rmdir()
-    half.rename(path)
+    try:
+        half.parent.mkdir(parents=True, exist_ok=True)
+        group = zarr.create_group(
+            str(half), zarr_format=3, attributes={**attributes, SETTINGS: json.dumps(settings)}
+        )
+        for name, variable in empty_dataset(layout).variables.items():
+            own = name not in layout.starts.axes
+            array = group.create_array(
+                str(name),
+                shape=variable.shape,
+                chunks=layout.chunk_shape if own else variable.shape,
+                dtype=variable.dtype,
+                fill_value=variable.values.flat[0] if own else None,
+                dimension_names=list(map(str, variable.dims)),
+                attributes=variable.attrs,
+            )
+            if not own:
+                array[:] = variable.values
+        done: Any = {"long_name": "whether the chunk is complete"}
+        group.create_array(
+            _DONE,
+            shape=(layout.chunks,),
+            chunks=(layout.chunks,),
+            dtype="i1",
+            fill_value=0,
+            dimension_names=["chunk"],
+            attributes=done,
+        )
+        _consolidate(half)
+        if path.exists():
+            path.rmdir()
+        half.rename(path)
+    except OSError:
+        shutil.rmtree(half, ignore_errors=True)
+        raise
 
 
-def _check_same(path: Path, settings: dict[str, Any]) -> None:
+def _consolidate(path: Path) -> None:
+    """Lets `xarray.open_zarr` read all arrays' metadata at once, without a warning."""
+    with warnings.catch_warnings():
+        # Zarr's third format has no word on it yet.
+        warnings.simplefilter("ignore")
+        zarr.consolidate_metadata(str(path))
+
+
+def _is_new(path: Path) -> bool:
+    """Whether nothing is there yet, or an empty directory.
+
+    Raises:
+        ArgumentError: a file is there.
+    """
+    if path.exists() and not path.is_dir():
+        raise ArgumentError(f"store = {str(path)!r} is a file: it must be a directory.")
+    return not path.exists() or not any(path.iterdir())
+
+
+def _check_same(path: Path, settings: dict[str, Any], *, but: str = "") -> None:
     try:
         group = zarr.open_group(str(path), mode="r", use_consolidated=False)
         stored = json.loads(str(group.attrs[SETTINGS]))
@@ -148,7 +228,10 @@ def _check_same(path: Path, settings: dict[str, Any]) -> None:
             f"store = {str(path)!r} holds something else: it must be a new directory, or a store "
             "of the same sweep."
         ) from None
-    difference = _difference(stored, json.loads(json.dumps(settings)), "")
+    here = json.loads(json.dumps(settings))
+    for each in (stored, here):
+        each.pop(but, None)
+    difference = _difference(stored, here, "")
     if difference is not None:
         raise ArgumentError(
             f"store = {str(path)!r} was made with other settings: {difference}; give it those, or "
@@ -159,7 +242,7 @@ def _check_same(path: Path, settings: dict[str, Any]) -> None:
 def _difference(old: Any, new: Any, name: str) -> str | None:
     """The first difference of two settings in words, None for none."""
     if isinstance(old, dict) and isinstance(new, dict):
-        for key in sorted({*old, *new}):
+        for key in dict.fromkeys([*new, *old]):
             inner = f"{name}.{key}" if name else key
             if key not in old or key not in new:
                 here = "only in the store" if key in old else "not in the store"

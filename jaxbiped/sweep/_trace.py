@@ -14,6 +14,8 @@ DEPTH = 4
 """Longest cycle [footsteps] that is recognised where no gait is known."""
 _AGAIN = 3
 """Arrivals in a row that must each be near the one a cycle before."""
+_NEARING = 0.999
+"""Share of the distance from a known gait, a cycle ago, below which it may be where this ends."""
 UNDECIDED = int(Label.PENDING)
 
 
@@ -66,34 +68,46 @@ def arrived(
     """After an arrival in this state.
 
     It converges to a known gait where it lies within that gait's radius, and nearer than a cycle
-    before. Where each of several arrivals in a row differs from the one a cycle before by less
-    than `gap` (in units of the scales, root mean square), it converges to some gait: the verdict
-    is then "unresolved", with the period.
+    before, or within `gap` of the state then: at the gait itself rounding decides which is nearer.
+    Where each of several arrivals in a row differs from the one a cycle before by less
+    than `gap` (in units of the scales, root mean square), and no known gait comes nearer, it
+    converges to some other one: the verdict is then "unresolved", with the period.
     """
+    repeats = _repeats(trace, state, goals, gap)
     distances, certain, rates = [], [], []
+    nearing = jnp.asarray(False)
     for g, period in enumerate(periods):
         distance = _distance(goals, g, state)
         before = trace.distances[g][-1]
-        certain.append((distance <= goals.radii[g]) & (distance < before))
+        nearer = distance < before
+        nearing |= jnp.isfinite(before) & (distance < _NEARING * before)
+        # Of a longer cycle only the arrivals tell that are near the point itself.
+        for other in trace.distances[g][:-1]:
+            nearing |= other < _NEARING * distance
+        if period <= DEPTH:
+            nearer |= repeats[period - 1] > 0
+        certain.append((distance <= goals.radii[g]) & jnp.isfinite(before) & nearer)
         rates.append((distance / before) ** (1.0 / period))
         distances.append((distance, *trace.distances[g][:-1]))
-    repeats = _repeats(trace, state, goals, gap)
     verdict, cycle, goal = trace.verdict, trace.period, trace.goal
     for length in range(DEPTH, 0, -1):
-        again = repeats[length - 1] >= _AGAIN
+        again = (repeats[length - 1] >= _AGAIN) & ~nearing
         verdict = jnp.where(again, int(Label.UNRESOLVED), verdict)
         cycle = jnp.where(again, length, cycle)
     nearest, rate = jnp.full_like(trace.closest, jnp.inf), trace.rate
     for g in range(len(periods)):
         nearer = distances[g][0] < nearest
         # Far from every gait the nearest one tells the rate.
-        rate = jnp.where(nearer & jnp.isfinite(rates[g]), rates[g], rate)
+        known = jnp.isfinite(trace.distances[g][-1]) & jnp.isfinite(rates[g])
+        rate = jnp.where(nearer & known, rates[g], rate)
         nearest = jnp.minimum(nearest, distances[g][0])
     for g, length in reversed(list(enumerate(periods))):
         verdict = jnp.where(certain[g], int(Label.WALKING), verdict)
         cycle = jnp.where(certain[g], length, cycle)
         goal = jnp.where(certain[g], g, goal)
-        rate = jnp.where(certain[g], rates[g], rate)
+        # Where nothing but rounding is left of the distance it says nothing.
+        left = jnp.where(distances[g][0] < trace.distances[g][-1], rates[g], jnp.nan)
+        rate = jnp.where(certain[g], left, rate)
     return Trace(
         arrivals=trace.arrivals + 1,
         recent=(state, *trace.recent[:-1]),

@@ -1,0 +1,42 @@
+"""Results in memory: what a `Store` is, without a disk."""
+
+import json
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from jaxbiped.sweep._layout import Layout, empty_dataset
+from jaxbiped.sweep._store import SETTINGS
+
+
+class Memory:
+    """Arrays for all results; see `Store`."""
+
+    def __init__(self, layout: Layout, settings: dict[str, Any], attributes: dict[str, Any]):
+        self.layout = layout
+        self._dataset = empty_dataset(layout)
+        self._dataset.attrs = attributes | {SETTINGS: json.dumps(settings)}
+        for name in self._dataset.data_vars:
+            self._dataset[name].data = np.array(self._dataset[name].data)
+
+    def missing(self) -> np.ndarray:
+        return np.arange(self.layout.chunks)
+
+    def write(self, chunk: int, fields: dict[str, np.ndarray]) -> None:
+        region, shape = self.layout.region(chunk), self.layout.shape_of(chunk)
+        for name, values in fields.items():
+            self._dataset[name].data[region] = np.reshape(values, shape)
+
+    def read(self, chunk: int, names: tuple[str, ...]) -> dict[str, np.ndarray]:
+        region = self.layout.region(chunk)
+        return {name: self._dataset[name].data[region].ravel() for name in names}
+
+    def note(self, attributes: dict[str, Any]) -> None:
+        self._dataset.attrs.update(attributes)
+
+    def noted(self, name: str) -> Any:
+        return self._dataset.attrs.get(name)
+
+    def dataset(self) -> xr.Dataset:
+        return self._dataset

@@ -1,0 +1,119 @@
+"""Chunks of a sweep labelled here or by an executor's workers."""
+
+import itertools
+import pickle
+from collections.abc import Iterator
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
+
+import numpy as np
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped.sweep._given_starts import GivenStarts
+from jaxbiped.sweep._labelling import Labelling
+from jaxbiped.sweep._layout import Layout, fields_of
+from jaxbiped.sweep._starts import AbstractStarts
+
+_AHEAD = 2
+"""Chunks handed out for each worker, so that none waits for the next."""
+
+Fields = dict[str, np.ndarray]
+
+
+def computed(
+    labelling: Labelling,
+    layout: Layout,
+    chunks: np.ndarray,
+    executor: Executor | None,
+    workers: int,
+) -> Iterator[tuple[int, Fields]]:
+    """Chunks and their fields as they are ready, a few at a time for each worker.
+
+    Raises:
+        ArgumentError: the workers were lost, or cannot be sent the starts.
+    """
+    if executor is None:
+        for chunk in map(int, chunks):
+            yield chunk, label_some(labelling, *_part(layout, chunk))
+        return
+    _check_sent(executor, labelling, layout)
+    queue = map(int, chunks)
+    running: dict[Future[Fields], int] = {}
+    try:
+        while True:
+            for chunk in itertools.islice(queue, _AHEAD * workers - len(running)):
+                running[_submitted(executor, labelling, layout, chunk)] = chunk
+            if not running:
+                return
+            ready, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in ready:
+                chunk = running.pop(future)
+                yield chunk, _result(executor, future)
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def label_some(labelling: Labelling, starts: AbstractStarts, first: int, last: int) -> Fields:
+    """The fields of the starts from `first` up to `last`, flat: what a worker computes."""
+    batch = starts.batch(labelling, first, last)
+    return fields_of(starts, labelling(batch.states, parameters=batch.parameters), batch)
+
+
+def _part(layout: Layout, chunk: int) -> tuple[AbstractStarts, int, int]:
+    """What a worker needs of a chunk: starts that are given need not travel with every one."""
+    first, last = layout.numbers(chunk)
+    if isinstance(layout.starts, GivenStarts):
+        return layout.starts.between(first, last), 0, last - first
+    return layout.starts, first, last
+
+
+def _submitted(
+    executor: Executor, labelling: Labelling, layout: Layout, chunk: int
+) -> Future[Fields]:
+    try:
+        return executor.submit(label_some, labelling, *_part(layout, chunk))
+    except (BrokenExecutor, RuntimeError) as error:
+        raise _lost(executor, error) from None
+
+
+def _result(executor: Executor, future: Future[Fields]) -> Fields:
+    try:
+        return future.result()
+    except ArgumentError:
+        raise
+    except (BrokenExecutor, CancelledError, OSError) as error:
+        raise _lost(executor, error) from None
+    except Exception as error:
+        # A cluster's own, such as KilledWorker, whose package may be missing here.
+        if type(error).__module__.split(".")[0] == "distributed":
+            raise _lost(executor, error) from None
+        raise
+
+
+def _lost(executor: Executor, error: BaseException) -> ArgumentError:
+    what = " ".join(str(error).split()) or type(error).__name__
+    return ArgumentError(
+        f"executor = {type(executor).__name__} lost its workers ({what[:200].rstrip('.')}): start "
+        "it anew and run again; the chunks that are complete stay in the store."
+    )
+
+
+def _check_sent(executor: Executor, labelling: Labelling, layout: Layout) -> None:
+    """Raises `ArgumentError` where other processes could not read what they are sent."""
+    if not isinstance(executor, ProcessPoolExecutor):
+        return
+    try:
+        pickle.dumps((labelling, *_part(layout, 0)))
+    except Exception as error:
+        raise ArgumentError(
+            f"starts cannot be sent to other processes ({error}): a function that completes them "
+            "must be a module's own, not a lambda or another function's."
+        ) from None

@@ -1,0 +1,183 @@
+"""Threads, processes and clusters give what one process gives, and lose nothing when they die."""
+
+import concurrent.futures
+import os
+import pickle
+import signal
+import threading
+
+import distributed
+import jax.tree_util as jtu
+import numpy as np
+import pytest
+import zarr
+
+import jaxbiped as jb
+from jaxbiped.lanes._engine import THREADS_VARIABLE, default_threads
+from jaxbiped.sweep._cluster import cluster_executor, local_executor
+from jaxbiped.sweep._layout import Layout
+from jaxbiped.sweep._workers import _AHEAD, computed
+from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
+from tests.sweep.walkers import gaitless, same, same_results, simplest_grid
+
+SCENE = simplest_walker(0.009)
+LABELLING = gaitless(SCENE, simplest_state(*STABLE))
+STARTS = simplest_grid(SCENE)
+
+
+def _swept(labelling=LABELLING, starts=STARTS, **options):
+    return jb.sweep(labelling, starts, chunk=8, look_for_gaits=False, **options)
+
+
+@pytest.fixture(scope="module")
+def expected():
+    return _swept()
+
+
+def test_threads(expected):
+    with concurrent.futures.ThreadPoolExecutor(3) as pool:
+        same_results(_swept(executor=pool, workers=3), expected)
+
+
+def test_labellings_and_layouts_travel(simplest):
+    for thing in (simplest, Layout.of(STARTS, 8)):
+        copy = pickle.loads(pickle.dumps(thing))
+        assert jtu.tree_structure(copy) == jtu.tree_structure(thing)
+        same(copy, thing)
+    states = STARTS.batch(simplest, 0, 64).states
+    same(pickle.loads(pickle.dumps(simplest))(states), simplest(states))
+
+
+def _killing(scene, states):
+    """Ends the worker that makes the start with the largest angle."""
+    if states.theta_2[0] > 0.235:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return states
+
+
+def test_spawned_processes_and_one_that_dies(tmp_path, expected):
+    killing = jb.grid(SCENE, STARTS.values, follow=_killing)
+    with local_executor(2) as pool:
+        assert pool.submit(os.getenv, THREADS_VARIABLE).result() == str(
+            max(1, default_threads() // 2)
+        )
+        same_results(_swept(executor=pool, workers=2), expected)
+        with pytest.raises(jb.ArgumentError) as raised:
+            _swept(starts=killing, store=tmp_path / "store", executor=pool, workers=2)
+    sentence = str(raised.value)
+    assert sentence.startswith("executor = ProcessPoolExecutor lost its workers (")
+    assert sentence.endswith("run again; the chunks that are complete stay in the store.")
+    done = zarr.open_group(str(tmp_path / "store"), mode="r")["done"][:]
+    assert 1 <= done.sum() < len(done)
+    kept = zarr.open_group(str(tmp_path / "store"), mode="r")["time"][:][done == 1]
+    np.testing.assert_array_equal(kept, expected.time.values[done == 1])
+
+
+def test_what_cannot_be_sent_to_processes_is_refused():
+    starts = jb.grid(SCENE, {"theta_stance": [0.2]}, follow=lambda scene, states: states)
+    with (
+        local_executor(1) as pool,
+        pytest.raises(jb.ArgumentError, match="must be a module's own"),
+    ):
+        _swept(starts=starts, executor=pool)
+
+
+@pytest.mark.parametrize("workers", [0, 1.5, None])
+def test_workers_are_counted(workers):
+    with pytest.raises(jb.ArgumentError, match=f"workers = {workers} is not allowed"):
+        local_executor(workers)
+    with pytest.raises(jb.ArgumentError, match=f"workers = {workers} is not allowed"):
+        _swept(workers=workers)
+
+
+class _Counting(concurrent.futures.Executor):
+    """Runs at once what it is given, and counts what nobody has taken yet."""
+
+    def __init__(self):
+        self.open, self.most, self.sizes = 0, 0, []
+
+    def submit(self, function, *arguments):
+        self.open += 1
+        self.most = max(self.most, self.open)
+        self.sizes.append(len(pickle.dumps(arguments[1:])))
+        future = concurrent.futures.Future()
+        future.set_result(arguments[2])
+        return future
+
+
+def test_chunks_in_hand_are_bounded():
+    executor = _Counting()
+    layout = Layout.of(jb.grid(SCENE, {"theta_stance": np.linspace(0.1, 0.2, 100)}), 1)
+    for _ in computed(LABELLING, layout, np.arange(100), executor, 3):
+        executor.open -= 1
+    assert executor.most == 3 * _AHEAD
+    assert len(executor.sizes) == 100
+
+
+def test_given_starts_travel_in_parts():
+    executor = _Counting()
+    starts = jb.GivenStarts(jb.RigidState(*[np.zeros(10_000)] * 5))
+    list(computed(LABELLING, Layout.of(starts, 10), np.arange(1000), executor, 1))
+    assert max(executor.sizes) < 4000
+
+
+class _Watch(threading.Thread):
+    """Kills a process once some chunks of a store are complete."""
+
+    def __init__(self, path, pid, chunks):
+        super().__init__(daemon=True)
+        self.path, self.pid, self.chunks, self.killed = path, pid, chunks, threading.Event()
+        self.ended = threading.Event()
+
+    def run(self):
+        while not self.ended.wait(0.005):
+            if self.path.exists():
+                done = zarr.open_group(str(self.path), mode="r")["done"][:].sum()
+                if self.chunks <= done < 80:
+                    os.kill(self.pid, signal.SIGKILL)
+                    self.killed.set()
+                    return
+
+
+def test_a_cluster_one_of_whose_workers_is_killed(tmp_path):
+    """A scheduler and two worker processes over loopback; nothing is lost."""
+    starts = simplest_grid(SCENE, 80)
+    expected = jb.sweep(LABELLING, starts, look_for_gaits=False)
+    cluster = distributed.LocalCluster(
+        2, processes=True, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+    )
+    with cluster:
+        executor, threads = cluster_executor(cluster.scheduler_address)
+        assert threads == 2
+        watch = _Watch(tmp_path / "store", cluster.workers[0].pid, 10)
+        watch.start()
+        found = jb.sweep(
+            LABELLING,
+            starts,
+            store=tmp_path / "store",
+            chunk=80,
+            executor=executor,
+            workers=threads,
+            look_for_gaits=False,
+        )
+        watch.ended.set()
+        executor.shutdown()
+    assert watch.killed.is_set()
+    assert found.done.values.all()
+    assert found.attrs["labelled_in_this_run"] == 6400
+    same_results(found, expected)
+
+
+def test_a_cluster_that_is_not_there_is_told(monkeypatch):
+    with pytest.raises(jb.ArgumentError) as raised:
+        cluster_executor("tcp://127.0.0.1:9", timeout=0.5)
+    sentence = str(raised.value)
+    assert sentence.startswith("scheduler = 'tcp://127.0.0.1:9' does not answer (")
+    assert "\n" not in sentence
+    with pytest.raises(jb.ArgumentError, match="scheduler = 'nowhere' does not answer"):
+        cluster_executor("nowhere", timeout=0.5)
+    with pytest.raises(jb.ArgumentError, match="timeout = 0 is not allowed"):
+        cluster_executor("tcp://127.0.0.1:9", timeout=0)
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    with pytest.raises(jb.ArgumentError, match=r"pip install jaxbiped\[sweep\]"):
+        cluster_executor("tcp://127.0.0.1:9")

@@ -1,0 +1,54 @@
+"""Starts of sweeps, and labellings that need no gait to be found."""
+
+import jax.tree_util as jtu
+import numpy as np
+
+import jaxbiped as jb
+from jaxbiped.sweep._attractor import component_scales
+from jaxbiped.sweep._labelling import checked_effort
+
+
+def gaitless(scene, state, **options):
+    """A labelling that knows no gait; nothing is compiled for it."""
+    settings = dict(
+        footsteps=12, accuracy="balanced", rtol=None, solver="rodas4", max_solver_steps=65536,
+        engine="lanes",
+    )  # fmt: skip
+    effort = checked_effort(scene, **{**settings, **options})
+    state = jtu.tree_map(np.asarray, state)
+    scales = component_scales(scene, state)[None]
+    return jb.Labelling(scene, jb.Family((), np.zeros((1, 0)), ((),), (state,), scales), effort)
+
+
+def stacked(states):
+    """Single states as one with leaves of shape (n,)."""
+    columns = zip(*states, strict=True)
+    return type(states[0])(*[np.array([float(leaf) for leaf in column]) for column in columns])
+
+
+def rows(tree, places):
+    """Some of the entries of every leaf."""
+    return jtu.tree_map(lambda leaf: np.asarray(leaf)[places], tree)
+
+
+def same(found, expected):
+    """Checks that two trees hold the same bits."""
+    for a, b in zip(jtu.tree_leaves(found), jtu.tree_leaves(expected), strict=True):
+        np.testing.assert_array_equal(np.asarray(a), np.asarray(b))
+
+
+def same_results(found, expected):
+    """Checks that two sweeps' results hold the same bits."""
+    assert set(found.data_vars) - {"done"} == set(expected.data_vars) - {"done"}
+    for name in expected.data_vars:
+        if name != "done":
+            np.testing.assert_array_equal(found[name].values, expected[name].values, err_msg=name)
+
+
+def simplest_grid(scene, count=8):
+    """Starts about the simplest walker's gait; some walk, others fall either way."""
+    axes = {
+        "theta_stance": np.linspace(0.16, 0.24, count),
+        "omega_stance": np.linspace(-0.25, -0.17, count),
+    }
+    return jb.grid(scene, axes)
