@@ -39,13 +39,21 @@ class Quintic(NamedTuple):
         return self._value_and_slope(x)[0]
 
     def root(self) -> Scalar:
-        """The share of the step at which it falls through zero, roughly."""
+        """The share of the step at which it falls through zero, roughly.
+
+        Where Newton's method leaves the part that is known to hold it, that is halved: beside the
+        strike the course may have a root behind it, at which the legs opened.
+        """
         end = functools.reduce(operator.add, self.coefficients)
         rise = end - self.coefficients[0]
         x = -self.coefficients[0] / jnp.where(rise == 0.0, 1.0, rise)
+        low, high = jnp.zeros_like(x), jnp.ones_like(x)
         for _ in range(_NEWTON):
             value, slope = self._value_and_slope(x)
-            x = jnp.clip(x - value / jnp.where(slope == 0.0, 1.0, slope), 0.0, 1.0)
+            low, high = jnp.where(value > 0.0, x, low), jnp.where(value > 0.0, high, x)
+            newton = x - value / jnp.where(slope == 0.0, 1.0, slope)
+            inside = (slope < 0.0) & (newton >= low) & (newton <= high)
+            x = jnp.where(inside, newton, 0.5 * (low + high))
         return x
 
     def _value_and_slope(self, x: Scalar) -> tuple[Scalar, Scalar]:

@@ -102,6 +102,13 @@ def test_batches_and_bad_lanes():
     assert float(many.t[9]) == float(alone.t)
 
 
+def test_a_strike_is_found_though_the_legs_opened_just_before_the_step():
+    # A long step from just behind the scuff at mid-stance, which is the course's nearer root.
+    scene, start = simplest_walker(0.004), simplest_state(0.5670886075949367, -0.6)
+    for rtol in (1e-4, 1e-6, 1e-9):
+        assert str(jb.rigid_walk(scene, start, steps=30, rtol=rtol).outcome) == "fell back"
+
+
 def test_the_simplest_walkers_gaits_attract_and_repel():
     scene = simplest_walker(0.009)
     near = lambda published, d: simplest_state(published[0] + d, published[1])
