@@ -168,3 +168,9 @@ from jaxbiped.scene._linkage_scene import LinkageScene as LinkageScene
 from jaxbiped.scene._penalty import Penalty as Penalty
 from jaxbiped.scene._redundant_scene import RedundantScene as RedundantScene
 from jaxbiped.scene._walker_linkage import walker_linkage as walker_linkage
+from jaxbiped.gait._system import RedundantWalking as RedundantWalking
+from jaxbiped.simulate._swing import Swing as Swing
+from jaxbiped.simulate._swing import swing as swing
+from jaxbiped.simulate._compare_constraints import ConstraintRun as ConstraintRun
+from jaxbiped.simulate._compare_constraints import Integrator as Integrator
+from jaxbiped.simulate._compare_constraints import compare_constraints as compare_constraints

@@ -7,6 +7,7 @@ import tyro
 from tyro.conf import subcommand
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped.cli._constraints import Constraints
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
 from jaxbiped.cli._walk import Walk
@@ -15,6 +16,7 @@ _Command = (
     Annotated[Walk, subcommand("walk")]
     | Annotated[FindGait, subcommand("gait")]
     | Annotated[Models, subcommand("models")]
+    | Annotated[Constraints, subcommand("constraints")]
     | Annotated[None, subcommand("version")]
 )
 

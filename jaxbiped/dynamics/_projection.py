@@ -1,6 +1,10 @@
 """Taking coordinates and rates back to the constraints."""
 
 from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
 
 from jaxbiped._symmetric import factorised, solved
 from jaxbiped._types import Scalar
@@ -36,6 +40,7 @@ def stepped_back(
     return q, _moved(v, method.step_back(masses, at.rows, at.rate))
 
 
+@eqx.filter_jit
 def nearest(
     linkage: Linkage, q: Sequence[Scalar], v: Sequence[Scalar]
 ) -> tuple[list[Scalar], list[Scalar]]:
@@ -44,7 +49,7 @@ def nearest(
     min Δqᵀ M Δq with Φ(q + Δq) = 0: each iteration solves it with the constraints linearised where
     the last one ended, so that what it converges to is nearest to the start and not only near.
     """
-    weights, origin, q = inverse_masses(masses_of(linkage)), list(q), list(q)
+    weights, origin = inverse_masses(masses_of(linkage)), list(q)
 
     def least(rows: list[Row], residual: list[Scalar]) -> Row:
         # Shifted by nearly nothing, so that constraints that say the same twice share.
@@ -52,13 +57,17 @@ def nearest(
         shift = 1e-14 * sum((matrix[i][i] for i in range(1, len(matrix))), matrix[0][0])
         return moved_by(rows, weights, solved(factorised(gram(rows, weights, shift)), residual))
 
-    for _ in range(_ITERATIONS):
+    def nearer(_: Any, q: list[Scalar]) -> list[Scalar]:
         at = constraints_of(linkage, q, v)
         gone = [a - b for a, b in zip(q, origin, strict=True)]
         left = [off - along(row, gone) for off, row in zip(at.violation, at.rows, strict=True)]
-        q = _moved(origin, least(at.rows, left))
-    at = constraints_of(linkage, q, v)
-    return q, _moved(v, least(at.rows, at.rate))
+        return _moved(origin, least(at.rows, left))
+
+    if not linkage.joints:
+        return origin, list(v)
+    found = jax.lax.fori_loop(0, _ITERATIONS, nearer, origin)
+    at = constraints_of(linkage, found, v)
+    return found, _moved(v, least(at.rows, at.rate))
 
 
 def _moved(values: Sequence[Scalar], moves: Row) -> list[Scalar]:

@@ -12,6 +12,7 @@ from jaxbiped.dynamics._redundant_motion import redundant_field
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import Ending, ending_code, ending_events
+from jaxbiped.solve._extremes import Extremes
 from jaxbiped.solve._footstep_limit import PATIENCE, FootstepLimit
 from jaxbiped.solve._projected import projecting
 from jaxbiped.solve._step_control import first_step, step_control
@@ -29,6 +30,8 @@ def by_xla(run: "Simulation") -> Trajectory:
         controller = diffrax.ConstantStepSize()
     if run.steps is not None:
         controller = FootstepLimit.around(controller, run.steps)
+    if run.extremes is not None:
+        controller = Extremes.around(controller, run.extremes)
     events = ending_events(run.watch)
     zero = jnp.zeros_like(run.duration)
     field: Any = vector_field
@@ -51,33 +54,40 @@ def by_xla(run: "Simulation") -> Trajectory:
         adjoint=run.adjoint,
         throw=False,
     )
+    control, lowest, highest = solution.controller_state, None, None
+    if run.extremes is not None:
+        watched: Any = control
+        control, lowest, highest = watched
     return Trajectory(
         t=solution.ts,
         state=solution.ys,
-        ending=_ending(solution, list(events), run),
+        ending=_ending(solution, control, list(events), run),
         accepted=solution.stats["num_accepted_steps"],
         rejected=solution.stats["num_rejected_steps"],
         dense=solution.interpolation if run.save_steps else None,
+        lowest=lowest,
+        highest=highest,
         correction=run.correction,
     )
 
 
 def _saveat(run: "Simulation") -> diffrax.SaveAt:
-    counting = run.steps is not None
+    keeps = run.steps is not None or run.extremes is not None
     if run.save_steps:
-        return diffrax.SaveAt(t0=True, steps=True, dense=True, controller_state=counting)
+        return diffrax.SaveAt(t0=True, steps=True, dense=True, controller_state=keeps)
     if run.times is not None:
-        return diffrax.SaveAt(ts=run.times, controller_state=counting)
-    return diffrax.SaveAt(t1=True, controller_state=counting)
+        return diffrax.SaveAt(ts=run.times, controller_state=keeps)
+    return diffrax.SaveAt(t1=True, controller_state=keeps)
 
 
-def _ending(solution: diffrax.Solution, names: list[Ending], run: "Simulation") -> Array:
+def _ending(
+    solution: diffrax.Solution, control: Any, names: list[Ending], run: "Simulation"
+) -> Array:
     results = diffrax.RESULTS
     out_of_steps: Any = solution.result == results.max_steps_reached
     done: Any = solution.result == results.successful
     if run.steps is not None:
-        counting: Any = solution.controller_state
-        _, _, count = counting
+        _, _, count = control
         # Time ran out before the footsteps came, where only footsteps were asked for.
         patience_ended = done & (count < run.steps) & (run.duration >= PATIENCE * run.steps)
         out_of_steps = out_of_steps | patience_ended

@@ -35,7 +35,8 @@ def chosen_engine(
     if redundant or dt is not None:
         what = "redundant coordinates are" if redundant else "steps of one size (dt) are"
         obstacle = f"{what} diffrax's"
-    by_lanes_only = _by_lanes_only(section, extremes)
+    by_diffrax = redundant or dt is not None
+    by_lanes_only = _by_lanes_only(section, None if by_diffrax else extremes)
     if by_lanes_only is None:
         return engine_for(engine, obstacle=obstacle, prefers_xla=traced)
     check_choice("engine", engine, ENGINES)

@@ -37,8 +37,8 @@ class FootstepLimit(diffrax.AbstractAdaptiveStepSizeController):
     def around(controller: Any, limit: Any) -> "FootstepLimit":
         """Wraps a controller."""
         return FootstepLimit(
-            rtol=getattr(controller, "rtol", None),  # steps of one size have no tolerances
-            atol=getattr(controller, "atol", None),
+            rtol=getattr(controller, "rtol", 0.0),  # steps of one size have no tolerances
+            atol=getattr(controller, "atol", 0.0),
             norm=getattr(controller, "norm", rms_norm),
             controller=controller,
             limit=limit,

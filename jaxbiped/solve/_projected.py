@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import diffrax
+import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
@@ -24,7 +25,7 @@ class Projected(diffrax.AbstractWrappedSolver):
     """
 
     solver: Any  # type: ignore[misc]
-    project: Callable[[PyTree, PyTree], PyTree]
+    project: Callable[[PyTree, PyTree], PyTree] = eqx.field(static=True)
 
     @property
     def term_structure(self) -> Any:
