@@ -43,7 +43,7 @@ def accelerations(method, system):
 
 
 def by_definition(name, system):
-    """formulas of the paper's section 4, in the order and form in which they are usually printed."""
+    """The formulas of the paper's section 4, in the form in which they are usually printed."""
     jacobian, known, _ = system
     mass, applied = np.diag(known["masses"]), known["applied"]
     gamma, off, rate = known["bias"], known["violation"], known["rate"]
