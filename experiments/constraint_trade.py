@@ -181,6 +181,13 @@ def draw_trade(options: Options, runs: list[jb.ConstraintRun]) -> str:
     return str(path)
 
 
+def edges_of(values: list[float]) -> np.ndarray:
+    """Edges half way between values, on a logarithmic axis."""
+    logs = np.log10(values)
+    half = 0.5 * (logs[1] - logs[0])
+    return np.asarray(10.0 ** np.append(logs - half, logs[-1] + half))
+
+
 def draw_maps(options: Options, maps: dict[str, Any]) -> str:
     shown = {"max_violation_m": "largest violation (m)", "state_error": "error of the state (SI)"}
     figure = new_figure(3.9 * len(maps), 6.4)
@@ -189,7 +196,8 @@ def draw_maps(options: Options, maps: dict[str, Any]) -> str:
         for row, (key, title) in enumerate(shown.items()):
             ax = axes[row, column]
             values = np.log10(np.maximum(np.array(found[key], dtype=float), FLOOR))
-            image = ax.pcolormesh(found["column"], found["row"], values, cmap="viridis")
+            edges = (edges_of(found["column"]), edges_of(found["row"]))
+            image = ax.pcolormesh(*edges, values, cmap="viridis")
             ax.set_facecolor("#BBBBBB")  # where a run failed
             ax.set_xscale("log")
             ax.set_yscale("log")
