@@ -92,16 +92,16 @@ def test_what_is_not_allowed_is_one_sentence():
 
 
 def test_projected_walks_differentiate_and_batch():
-    """By the contact's damping, through 200 projected steps, against central differences."""
+    """By the contact's damping, through 20 projected steps, against central differences."""
 
     def end(change):
         scene = jb.with_parameters(jb.seed_scene(), {"c": 1e7 * (1.0 + change)})
         held = jb.RedundantScene(scene, "described")
-        how = dict(solver="euler", dt=1e-5, save="end", watch=(), max_solver_steps=256)
-        walk = jb.simulate(held, jb.seed_state(), duration=2e-3, **how)
+        how = dict(solver="euler", dt=1e-6, save="end", watch=(), max_solver_steps=64)
+        walk = jb.simulate(held, jb.seed_state(), duration=2e-5, **how)
         return 1e3 * walk.final.vz_2
 
     slope = float(jax.jit(jax.grad(end))(jnp.asarray(0.0)))
     values = np.asarray(jax.jit(jax.vmap(end))(jnp.asarray([-1e-4, 0.0, 1e-4])))
     assert slope == pytest.approx((values[2] - values[0]) / 2e-4, rel=1e-5)
-    assert abs(slope) > 1e-3
+    assert abs(slope) > 0.1
