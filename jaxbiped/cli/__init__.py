@@ -8,6 +8,7 @@ from tyro.conf import subcommand
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.cli._basin import Basin
+from jaxbiped.cli._constraints import Constraints
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
 from jaxbiped.cli._walk import Walk
@@ -17,6 +18,7 @@ _Command = (
     | Annotated[FindGait, subcommand("gait")]
     | Annotated[Basin, subcommand("basin")]
     | Annotated[Models, subcommand("models")]
+    | Annotated[Constraints, subcommand("constraints")]
     | Annotated[None, subcommand("version")]
 )
 

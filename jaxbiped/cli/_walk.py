@@ -10,6 +10,7 @@ import numpy as np
 from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
+from jaxbiped.cli._held import constraint_numbers, constraint_sentence
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._rigid_walk import run_rigid_walk
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, SolveOptions, StartOptions
@@ -17,8 +18,8 @@ from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._footsteps import Footsteps, footsteps
 from jaxbiped.gait._ledger import energy_ledger
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import Simulation
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._trajectory import Trajectory
@@ -78,7 +79,7 @@ class Walk:
         self._report(scene, trajectory, wall)
         return 1 if trajectory.outcome == Ending.SOLVER_FAILED else 0
 
-    def _report(self, scene: Scene, trajectory: Trajectory, wall: dict[str, float]) -> None:
+    def _report(self, scene: Any, trajectory: Trajectory, wall: dict[str, float]) -> None:
         steps = footsteps(scene, trajectory)
         ledger = energy_ledger(scene, trajectory)
         numbers: dict[str, Any] = {
@@ -98,14 +99,18 @@ class Walk:
             "wall_s": wall,
         }
         report = Report(self.output.json)
+        if isinstance(scene, RedundantScene):
+            numbers["constraints"] = constraint_numbers(scene, trajectory)
         _print(report, numbers)
+        if isinstance(scene, RedundantScene):
+            report.say(constraint_sentence(numbers["constraints"]))
         if self.output.out is not None:
             for path in write_outputs(scene, trajectory, self.output.out):
                 report.say(f"wrote {path}")
         report.finish(numbers)
 
 
-def write_outputs(scene: Scene, trajectory: Trajectory, out: Path) -> list[Path]:
+def write_outputs(scene: Any, trajectory: Trajectory, out: Path) -> list[Path]:
     """Writes the figures, the animation and the trajectory; returns their paths."""
     from jaxbiped import plot
     from jaxbiped.gait._dataset import trajectory_dataset

@@ -4,6 +4,7 @@ import dataclasses
 from collections.abc import Iterable
 from inspect import signature
 from pathlib import Path
+from typing import Any
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -19,8 +20,10 @@ from jaxbiped.scene._catalogue import (
     friction_law_like,
     normal_law_like,
 )
+from jaxbiped.scene._constraint_methods import method_named
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
@@ -33,6 +36,7 @@ _START = {name: float(value) for name, value in seed_state()._asdict().items()}
 
 
 MODELS = ("compliant", "rigid")
+FORMULATIONS = ("minimal", "redundant")
 _OF_CONTACT = ("n", "K", "c", "mu_static", "mu_kinetic", "v0", "xi")
 
 
@@ -42,6 +46,13 @@ class SceneOptions:
 
     model: str = "compliant"
     """compliant, or rigid: feet that roll without slip and strike without rebound."""
+    formulation: str = "minimal"
+    """minimal, or redundant: each leg has coordinates of its own, joined at the hip by a method."""
+    method: str | None = None
+    """How redundant coordinates hold the hip: standard, baumgarte, penalty, augmented, index1 (the
+    usual one), index1aug or described."""
+    orientation: str = "angle"
+    """How redundant coordinates write a leg's orientation: angle, or euler (parameters)."""
     normal: str = "ristow-schafer"
     """Law of the normal force (see jaxbiped models), matched to K, c and n under the weight."""
     friction: str = "bengisu-akay"
@@ -80,11 +91,29 @@ class SceneOptions:
     xi: float = _SEED["xi"]
     """Stribeck rate [s/m]."""
 
-    def scene(self) -> Scene | RigidScene:
+    def scene(self) -> Scene | RigidScene | RedundantScene:
         """The scene that these options describe; raises `ArgumentError`."""
         check_choice("model", self.model, MODELS)
+        check_choice("formulation", self.formulation, FORMULATIONS)
         scene = self._rigid() if self.model == "rigid" else self._compliant()
-        return with_parameters(scene, dict(_named_value(text) for text in self.set))
+        scene = with_parameters(scene, dict(_named_value(text) for text in self.set))
+        if self.formulation == "redundant":
+            return self._redundant(scene)
+        for name, usual in (("method", None), ("orientation", "angle")):
+            if getattr(self, name) != usual:
+                raise ArgumentError(
+                    f'{name} = {getattr(self, name)} is not allowed with formulation = "minimal": '
+                    "it has no constraints."
+                )
+        return scene
+
+    def _redundant(self, scene: Scene | RigidScene) -> RedundantScene:
+        if isinstance(scene, RigidScene):
+            raise ArgumentError(
+                'formulation = redundant is not allowed with model = "rigid": it rolls in minimal '
+                "coordinates."
+            )
+        return RedundantScene(scene, method_named(self.method or "index1"), self.orientation)
 
     def _compliant(self) -> Scene:
         own = seed_scene(**{name: getattr(self, name) for name in _SEED})
@@ -152,7 +181,7 @@ class StartOptions:
     omega_2: float = _START["omega_2"]
     """Rate of leg 2 [rad/s]."""
 
-    def state(self, scene: Scene | RigidScene) -> State | RigidState:
+    def state(self, scene: Any) -> State | RigidState:
         """The start, of the kind that the scene needs; raises `ArgumentError`.
 
         A rigid walker takes the place and the legs' angles and rates.

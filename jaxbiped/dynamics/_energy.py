@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._forces import foot_force
+from jaxbiped.dynamics._redundant_state import legs_of, minimal_state
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
 
@@ -49,16 +50,17 @@ class Powers(NamedTuple):
 def energies(scene: Scene, state: State) -> Energies:
     """Kinetic, gravitational and elastic energy; leaves shaped as the state's."""
     walker, ground = scene.walker, scene.ground
-    kinetic = 0.5 * walker.hip_mass * (state.hip_vx**2 + state.hip_vz**2)
-    moment_x = walker.hip_mass * state.hip_x
-    moment_z = walker.hip_mass * state.hip_z
-    for angle, rate in ((state.theta_1, state.omega_1), (state.theta_2, state.omega_2)):
-        sine, cosine = jnp.sin(angle), jnp.cos(angle)
-        vx = state.hip_vx + walker.d * cosine * rate
-        vz = state.hip_vz + walker.d * sine * rate
-        kinetic = kinetic + 0.5 * (walker.m * (vx**2 + vz**2) + walker.J * rate**2)
-        moment_x = moment_x + walker.m * (state.hip_x + walker.d * sine)
-        moment_z = moment_z + walker.m * (state.hip_z - walker.d * cosine)
+    hip = minimal_state(scene, state)
+    kinetic = 0.5 * walker.hip_mass * (hip.hip_vx**2 + hip.hip_vz**2)
+    moment_x = walker.hip_mass * hip.hip_x
+    moment_z = walker.hip_mass * hip.hip_z
+    for leg in legs_of(scene, state):
+        sine, cosine = jnp.sin(leg.angle), jnp.cos(leg.angle)
+        vx = leg.hip_vx + walker.d * cosine * leg.rate
+        vz = leg.hip_vz + walker.d * sine * leg.rate
+        kinetic = kinetic + 0.5 * (walker.m * (vx**2 + vz**2) + walker.J * leg.rate**2)
+        moment_x = moment_x + walker.m * (leg.hip_x + walker.d * sine)
+        moment_z = moment_z + walker.m * (leg.hip_z - walker.d * cosine)
     height = moment_z * jnp.cos(ground.slope) - moment_x * jnp.sin(ground.slope)
     elastic = sum(_elastic_energy(scene, foot) for foot in feet(scene, state))
     return Energies(kinetic, ground.g * height, jnp.asarray(elastic))
@@ -67,13 +69,14 @@ def energies(scene: Scene, state: State) -> Energies:
 def powers(scene: Scene, state: State) -> Powers:
     """Power of gravity and the contact's powers; leaves shaped as the state's."""
     walker, ground = scene.walker, scene.ground
-    momentum_x = walker.total_mass * state.hip_vx
-    momentum_z = walker.total_mass * state.hip_vz
-    for angle, rate in ((state.theta_1, state.omega_1), (state.theta_2, state.omega_2)):
-        momentum_x = momentum_x + walker.m * walker.d * jnp.cos(angle) * rate
-        momentum_z = momentum_z + walker.m * walker.d * jnp.sin(angle) * rate
+    hip = minimal_state(scene, state)
+    momentum_x = walker.total_mass * hip.hip_vx
+    momentum_z = walker.total_mass * hip.hip_vz
+    for leg in legs_of(scene, state):
+        momentum_x = momentum_x + walker.m * walker.d * jnp.cos(leg.angle) * leg.rate
+        momentum_z = momentum_z + walker.m * walker.d * jnp.sin(leg.angle) * leg.rate
     gravity = ground.g * (jnp.sin(ground.slope) * momentum_x - jnp.cos(ground.slope) * momentum_z)
-    indentation = damper = friction = jnp.zeros_like(state.hip_x)
+    indentation = damper = friction = jnp.zeros_like(hip.hip_x)
     for foot in feet(scene, state):
         force = foot_force(scene, foot)
         held = jnp.where(touches(foot), scene.normal.elastic_force(foot.penetration), 0.0)

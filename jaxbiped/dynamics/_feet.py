@@ -1,12 +1,11 @@
 """Where the feet are, how they move, and which of them touch the ground."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._redundant_state import Leg, legs_of
 from jaxbiped.scene._scene import Scene
 
 
@@ -42,23 +41,26 @@ class Feet(NamedTuple):
     foot_2: Foot
 
 
-def feet(scene: Scene, state: State) -> Feet:
-    """Both feet's kinematics (model: foot centre O = S + (l − r)(sin θ, −cos θ))."""
-    return Feet(
-        _foot(scene, state, 1, state.theta_1, state.omega_1, getattr(state, "bristle_1", None)),
-        _foot(scene, state, 2, state.theta_2, state.omega_2, getattr(state, "bristle_2", None)),
-    )
+def feet(scene: Any, state: Any) -> Feet:
+    """Both feet's kinematics (model: foot centre O = S + (l − r)(sin θ, −cos θ)).
+
+    In redundant coordinates S is where the foot's own leg has the hip.
+    """
+    return feet_of(scene, legs_of(scene, state))
 
 
-def _foot(
-    scene: Scene, state: State, leg: int, angle: Scalar, rate: Scalar, bristle: Scalar | None
-) -> Foot:
+def feet_of(scene: Any, legs: tuple[Leg, Leg]) -> Feet:
+    """The feet at the ends of legs."""
+    return Feet(_foot(scene, 1, legs[0]), _foot(scene, 2, legs[1]))
+
+
+def _foot(scene: Any, number: int, leg: Leg) -> Foot:
     length, radius = scene.walker.hip_to_foot, scene.walker.r
-    sine, cosine = sine_cosine(angle)
-    x = state.hip_x + length * sine
-    z = state.hip_z - length * cosine
-    vx = state.hip_vx + length * cosine * rate
-    vz = state.hip_vz + length * sine * rate
+    sine, cosine = leg.sine, leg.cosine
+    x = leg.hip_x + length * sine
+    z = leg.hip_z - length * cosine
+    vx = leg.hip_vx + length * cosine * leg.rate
+    vz = leg.hip_vz + length * sine * leg.rate
     return Foot(
         x=x,
         z=z,
@@ -66,9 +68,9 @@ def _foot(
         vz=vz,
         penetration=radius - z,
         penetration_rate=-vz,
-        slip_speed=vx + radius * rate,
-        admitted=scene.clearance.admits(leg, rate),
-        bristle=bristle,
+        slip_speed=vx + radius * leg.rate,
+        admitted=scene.clearance.admits(number, leg.rate),
+        bristle=leg.bristle,
     )
 
 

@@ -1,16 +1,14 @@
 """Forces of the ground on the feet."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet
-from jaxbiped.dynamics._state import State
 from jaxbiped.scene._bristle_law import AbstractBristleLaw
 from jaxbiped.scene._frictionless import Frictionless
-from jaxbiped.scene._scene import Scene
 
 
 class FootForce(NamedTuple):
@@ -25,7 +23,7 @@ class FootForce(NamedTuple):
     tangential: Scalar | None
 
 
-def foot_force(scene: Scene, foot: Foot) -> FootForce:
+def foot_force(scene: Any, foot: Foot) -> FootForce:
     """Force on a foot whose kinematics are known."""
     if foot.admitted is False:
         nothing = jnp.zeros_like(foot.penetration)
@@ -52,7 +50,7 @@ class FootForces(NamedTuple):
     foot_2: FootForce
 
 
-def foot_forces(scene: Scene, state: State) -> FootForces:
+def foot_forces(scene: Any, state: Any) -> FootForces:
     """Forces on both feet at a state; leaves shaped as the state's."""
     both = feet(scene, state)
     return FootForces(foot_force(scene, both.foot_1), foot_force(scene, both.foot_2))

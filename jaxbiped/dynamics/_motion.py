@@ -98,7 +98,8 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
     )
 
 
-def _bristle_rates(law: AbstractBristleLaw, scene: Scene, state: State) -> dict[str, Scalar]:
+def bristle_rates(law: AbstractBristleLaw, scene: Any, state: Any) -> dict[str, Scalar]:
+    """Rates of both feet's bristles by their names in the state [1/s]."""
     rates = {}
     for name, foot in zip(("bristle_1", "bristle_2"), feet(scene, state), strict=True):
         load = foot_force(scene, foot).normal  # refuses a foot without a bristle
@@ -112,7 +113,7 @@ def vector_field(t: Any, state: State, scene: Scene) -> State:
     second = accelerations(scene, state)
     memory = {}
     if isinstance(scene.friction, AbstractBristleLaw):
-        memory = _bristle_rates(scene.friction, scene, state)
+        memory = bristle_rates(scene.friction, scene, state)
     return type(state)(
         **memory,
         hip_x=state.hip_vx,

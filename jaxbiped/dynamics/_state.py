@@ -67,12 +67,22 @@ def checked_state(state: Any, kind: type = State, name: str = "state") -> Any:
         ArgumentError: not a `kind`, an entry that is not finite, or leaves of different shapes.
     """
     check_type(name, state, kind)
-    for field, value in state._asdict().items():
+    return checked_leaves(state, name)
+
+
+def checked_leaves(state: Any, name: str) -> Any:
+    """`state` with every leaf a floating-point array of one shape; None stays.
+
+    Raises:
+        ArgumentError: an entry that is not finite, or leaves of different shapes.
+    """
+    given = {field: value for field, value in state._asdict().items() if value is not None}
+    for field, value in given.items():
         check_finite(f"{name}.{field}", value)
-    leaves = [as_float(value) for value in state]
-    shapes = {leaf.shape for leaf in leaves}
+    leaves = {field: as_float(value) for field, value in given.items()}
+    shapes = {leaf.shape for leaf in leaves.values()}
     if len(shapes) > 1:
         raise ArgumentError(
             f"{name} has leaves of shapes {sorted(shapes)}: all of them must have the same shape."
         )
-    return kind(*leaves)
+    return state._replace(**leaves)

@@ -5,8 +5,6 @@ from typing import Any, NamedTuple
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._forces import foot_force
-from jaxbiped.dynamics._state import State
-from jaxbiped.scene._scene import Scene
 
 
 class Switch(NamedTuple):
@@ -25,7 +23,7 @@ class Switch(NamedTuple):
     force_jumps: bool = False
 
 
-def switches(scene: Scene, state: State) -> tuple[Switch, ...]:
+def switches(scene: Any, state: Any) -> tuple[Switch, ...]:
     """Every switch of a scene: touchdown, reaction leaving zero, slip at ±v0 and 0, clearance rule.
 
     Source: the seed paper, section 2.2, whose laws have these corners.
@@ -39,7 +37,7 @@ def switches(scene: Scene, state: State) -> tuple[Switch, ...]:
     )
 
 
-def _foot_switches(scene: Scene, foot: Foot, rate: Scalar) -> list[Switch]:
+def _foot_switches(scene: Any, foot: Foot, rate: Scalar) -> list[Switch]:
     if foot.admitted is False:
         return []
     below, touching = foot.penetration > 0.0, touches(foot)

@@ -1,12 +1,15 @@
 """A trajectory as a labelled dataset, for files and for other programs."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import feet, touches
 from jaxbiped.dynamics._forces import foot_forces
+from jaxbiped.dynamics._redundant_motion import violation
+from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -43,8 +46,11 @@ def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset"
     both, forces, held = feet(scene, state), foot_forces(scene, state), energies(scene, state)
     variables = {
         name: ("time", np.asarray(value), {"units": _STATE_UNITS[name]})
-        for name, value in state._asdict().items()
+        for name, value in minimal_state(scene, state)._asdict().items()
     }
+    if isinstance(scene, RedundantScene):
+        off = np.asarray(violation(scene, state).position)
+        variables["violation"] = ("time", off, {"units": "m"})
     for name, value in held._asdict().items():
         variables[f"{name}_energy"] = ("time", np.asarray(value), {"units": "J"})
 
@@ -69,10 +75,14 @@ def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset"
     return dataset.assign_attrs(ending=str(trajectory.outcome), **_parameters(scene))
 
 
-def _parameters(scene: Scene) -> dict[str, float | str]:
+def _parameters(scene: Any) -> dict[str, float | str]:
     """Every parameter of a scene, and the names of its laws, by dotted path."""
     found: dict[str, float | str] = {}
-    for part_name, part in vars(scene).items():
+    parts = vars(scene)
+    if isinstance(scene, RedundantScene):
+        parts = vars(scene.scene) | {"method": scene.method}
+        found["orientation"] = scene.orientation
+    for part_name, part in parts.items():
         found[part_name] = type(part).__name__
         for name, value in vars(part).items():
             found[f"{part_name}.{name}"] = float(value)

@@ -18,6 +18,7 @@ def orbit_engine(
     leaves: Any,
     gradient: AbstractGradient | None = None,
     own_system: bool = False,
+    redundant: bool = False,
 ) -> str:
     """The engine that "auto" stands for, or the one that is asked for.
 
@@ -26,12 +27,15 @@ def orbit_engine(
         solver, section: the orbit's.
         leaves: all numbers that are given.
         gradient: how the motion itself is to be differentiated.
+        redundant: whether the motion is solved in redundant coordinates.
         own_system: whether the system is the user's own; nobody knows if lanes can express it.
 
     Raises:
         ArgumentError: an unknown name, or lanes for what they cannot do.
     """
     obstacle = _obstacle(solver, section, leaves)
+    if redundant:
+        obstacle = "redundant coordinates are diffrax's"
     if isinstance(gradient, Reverse):
         obstacle = "gradient = Reverse() goes back through the steps of diffrax"
     return engine_for(engine, obstacle=obstacle, prefers_xla=own_system)

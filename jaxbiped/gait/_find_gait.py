@@ -15,20 +15,24 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._types import as_float
 from jaxbiped.dynamics._bristles import state_for
+from jaxbiped.dynamics._consistent import consistent_state
+from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import State, checked_state
+from jaxbiped.dynamics._state import checked_state
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gait import Gait, described
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._search import Found, Method, search
 from jaxbiped.gait._seed_start import seed_start
-from jaxbiped.gait._system import checked_section, system_of
+from jaxbiped.gait._system import RedundantWalking, checked_section, system_of
 from jaxbiped.gait._turn import Turning
 from jaxbiped.scene._parameters import chosen_parameters
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._passage import Precision
+from jaxbiped.solve._projected import projecting
 from jaxbiped.solve._solvers import solver_named
 
 _RESIDUAL_SHARE = 0.3
@@ -38,8 +42,8 @@ _PATIENCE = 50.0
 
 
 def find_gait(
-    scene: Scene | RigidScene,
-    guess: State | RigidState | None = None,
+    scene: Scene | RigidScene | RedundantScene,
+    guess: Any = None,
     *,
     period: int = 1,
     section: AbstractSection | None = None,
@@ -59,7 +63,9 @@ def find_gait(
     a switch. Works under `jit` and `vmap`, over scenes and over guesses.
 
     Args:
-        scene: the walker, compliant or rigid.
+        scene: the walker, compliant or rigid. In redundant coordinates every passage starts on the
+            constraints, and returns, multipliers and sensitivities are told in minimal ones: the
+            constraint directions are left out. Second derivatives take the minimal equations.
         guess: a start near the gait, on the section or not; unless given, the seed's start, its
             stance foot set down as deep for the scene's own legs and rolling as fast.
         period: footsteps in a cycle.
@@ -83,7 +89,7 @@ def find_gait(
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
     """
-    check_type("scene", scene, Scene, RigidScene)
+    check_type("scene", scene, Scene, RigidScene, RedundantScene)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_choice("method", method, ("newton", "optax"))
     check_positive("period", period)
@@ -99,12 +105,23 @@ def find_gait(
     most = (40 if method == "newton" else 400) if most_turns is None else most_turns
     check_positive("most_turns", most)
     scene = jtu.tree_map(as_float, scene)
-    names, active = chosen_parameters(scene, parameters)
+    # A redundant scene's leaves begin with those of what it models.
+    modelled = scene.scene if isinstance(scene, RedundantScene) else scene
+    names, active = chosen_parameters(modelled, parameters)
     precision = precision_of(accuracy, scene)
     usual = "rodas5p" if rigid else "rodas4"
     method_of_steps = solver_named(usual if solver is None else solver)
     section = checked_section(scene, section)
-    chosen = orbit_engine(engine, solver=method_of_steps, section=section, leaves=(scene, start))
+    chosen = orbit_engine(
+        engine,
+        solver=method_of_steps,
+        section=section,
+        leaves=(scene, start),
+        redundant=isinstance(scene, RedundantScene),
+    )
+    within = None
+    if isinstance(scene, RedundantScene):
+        method_of_steps, within = projecting(scene, method_of_steps), RedundantWalking()
     turning = Turning(
         system=system_of(scene),
         section=section,
@@ -113,6 +130,7 @@ def find_gait(
         steps=int(period),
         max_solver_steps=MOST_SOLVER_STEPS[accuracy],
         engine=chosen,
+        within=within,
     )
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
@@ -122,9 +140,11 @@ def find_gait(
     return _find(turning, scene, start, precision, how, names, active, radius_sensitivities)
 
 
-def _checked_start(scene: Scene | RigidScene, start: Any) -> Any:
+def _checked_start(scene: Any, start: Any) -> Any:
     if isinstance(scene, RigidScene):
         return checked_state(start, RigidState, "guess")
+    if isinstance(scene, RedundantScene):
+        return minimal_state(scene, consistent_state(scene, start).state)
     return state_for(scene, start, "guess")
 
 
@@ -135,7 +155,7 @@ def _adam() -> optax.GradientTransformation:
 
 def _find(
     turning: Turning,
-    scene: Scene | RigidScene,
+    scene: Any,
     start: Any,
     precision: Precision,
     method: Method,

@@ -13,8 +13,6 @@ from jaxbiped.gait._orbit import Orbit, orbit_of
 from jaxbiped.gait._search import Found, Search
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.gait._turn import Turning
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._ending import Ending
 
 _NOTHING = 1e-9
@@ -120,7 +118,7 @@ class Gait(eqx.Module):
 @eqx.filter_jit
 def described(
     turning: Turning,
-    scene: Scene | RigidScene,
+    scene: Any,
     start: Any,
     found: Found,
     names: tuple[str, ...],

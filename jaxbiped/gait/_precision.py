@@ -1,7 +1,8 @@
 """How exactly gaits and return maps are solved."""
 
+from typing import Any
+
 from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._passage import Precision
 
 _PRECISIONS = {"balanced": Precision(3e-7, 3e-6), "tight": Precision(1e-9, 1e-8)}
@@ -13,6 +14,6 @@ MOST_SOLVER_STEPS = {"balanced": 4096, "tight": 32768}
 """Cap on the solver's attempted steps to the next arrival."""
 
 
-def precision_of(accuracy: str, scene: Scene | RigidScene | None = None) -> Precision:
+def precision_of(accuracy: str, scene: Any = None) -> Precision:
     """Tolerances of state and derivatives."""
     return (_OF_RIGID if isinstance(scene, RigidScene) else _PRECISIONS)[accuracy]

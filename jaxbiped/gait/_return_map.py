@@ -9,15 +9,23 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice, check_positive
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gradient import AbstractGradient, Forward, check_anywhere
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._return_by_lanes import forward_by_lanes
 from jaxbiped.gait._return_by_xla import chosen, forward_by_xla, reverse_by_xla
-from jaxbiped.gait._system import AbstractSystem, checked_section, system_of
+from jaxbiped.gait._system import (
+    AbstractSystem,
+    RedundantWalking,
+    checked_section,
+    system_of,
+)
 from jaxbiped.gait._turn import Turning
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.solve._projected import projecting
 from jaxbiped.solve._rodas4 import Rodas4
 from jaxbiped.solve._rodas5p import Rodas5P
 
@@ -56,7 +64,8 @@ def return_map(
 
     Args:
         args: the scene, or the parameters of another `system`.
-        state: start, on the section or not.
+        state: start, on the section or not; for a redundant scene a minimal state too, which then
+            comes back as one.
         section: `MidStance()` unless given, `HeelStrike()` for a rigid walker.
         steps: how many arrivals to follow.
         gradient: `Forward()` (the default) or `Reverse()`.
@@ -77,6 +86,10 @@ def return_map(
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_positive("steps", steps)
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
+    redundant = isinstance(args, RedundantScene) and system is None
+    enters = redundant and not is_redundant(state)
+    if enters:
+        state = redundant_state(args, state)
     rigid = isinstance(args, RigidScene)
     section = checked_section(args, section)
     solver = (Rodas5P() if rigid else Rodas4()) if solver is None else solver
@@ -87,7 +100,10 @@ def return_map(
         leaves=(args, state),
         gradient=gradient,
         own_system=system is not None,
+        redundant=redundant,
     )
+    if redundant:
+        system, solver = RedundantWalking(), projecting(args, solver)
     turning = Turning(
         system=system_of(args) if system is None else system,
         section=section,
@@ -106,4 +122,4 @@ def return_map(
         state = chosen(code == 0, arrived, state)
         time = time + jnp.where(code == 0, lasted, 0.0)
         code = jnp.where(code == 0, came, code)
-    return Return(state, time, code)
+    return Return(minimal_state(args, state) if enters else state, time, code)

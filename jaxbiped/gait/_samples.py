@@ -70,8 +70,8 @@ def at_steps(
 
 def applied(scene: Scene, state: State, function: Callable[[Scene, State], PyTree]) -> PyTree:
     """`function(scene, state)` at states with leaves of shape (n,), as NumPy arrays."""
-    size = len(state.hip_x)
-    states = type(state)(*[jnp.asarray(_padded(np.asarray(leaf))) for leaf in state])
+    size = len(jax.tree_util.tree_leaves(state)[0])
+    states = jax.tree_util.tree_map(lambda leaf: jnp.asarray(_padded(np.asarray(leaf))), state)
     values = _apply(function, _as_arrays(scene), states)
     return jax.tree_util.tree_map(lambda leaf: np.asarray(leaf)[:size], values)
 

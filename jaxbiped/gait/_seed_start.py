@@ -9,12 +9,11 @@ from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import rigid_state
 from jaxbiped.dynamics._state import seed_state
 from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
 
 
-def seed_start(scene: Scene | RigidScene) -> Any:
+def seed_start(scene: Any) -> Any:
     """The seed's start, fitted to the scene's legs; a rigid walker's rates also to its gravity."""
     seed, own = seed_state(), seed_scene()
     if isinstance(scene, RigidScene):

@@ -12,11 +12,13 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._forces import foot_forces
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._motion import vector_field
+from jaxbiped.dynamics._redundant_motion import redundant_field
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling, rolling_field
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.dynamics._switches import Switch, switches
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._ending import WATCHES, ending_events, rigid_ending
@@ -59,8 +61,8 @@ class AbstractSystem(eqx.Module):
         """A quantity whose largest value along the orbit is wanted, or None."""
 
 
-def system_of(scene: Scene | RigidScene) -> AbstractSystem:
-    """The system that a scene describes."""
+def system_of(scene: Scene | RigidScene | RedundantScene) -> AbstractSystem:
+    """The system that a scene describes, in minimal coordinates."""
     return Rolling() if isinstance(scene, RigidScene) else Walking()
 
 
@@ -77,21 +79,54 @@ class Walking(AbstractSystem):
         return switches(args, y)
 
     def ending(self, args: Scene, y: State) -> Scalar:
-        code = jnp.asarray(0)
-        for name, happens in ending_events(WATCHES).items():
-            code = jnp.where(happens(0.0, y, args), int(name), code)
-        return code
+        return _ending(args, y)
 
     def renew(self, args: Scene, y: State) -> State:
         return exchange_legs(y)
 
     def load(self, args: Scene, y: State) -> Scalar:
         """Normal force on the foot that carries more [N]."""
-        forces = foot_forces(args, y)
-        return jnp.maximum(forces.foot_1.normal, forces.foot_2.normal)
+        return _load(args, y)
 
 
-def checked_section(scene: Scene | RigidScene, section: AbstractSection | None) -> AbstractSection:
+class RedundantWalking(AbstractSystem):
+    """The walker in coordinates of each leg. Its constraints leave fewer directions than leaves.
+
+    `find_gait` tells its returns in minimal coordinates; by itself it is for `return_map`.
+    """
+
+    renews_by_symmetry: ClassVar[bool] = True
+
+    def vector_field(self, t: Any, y: Any, args: RedundantScene) -> Any:
+        return redundant_field(t, y, args)
+
+    def switches(self, args: Any, y: Any) -> tuple[Switch, ...]:
+        return switches(args, y)
+
+    def ending(self, args: Any, y: Any) -> Scalar:
+        return _ending(args, y)
+
+    def renew(self, args: Any, y: Any) -> Any:
+        return exchange_legs(y)
+
+    def load(self, args: Any, y: Any) -> Scalar:
+        """Normal force on the foot that carries more [N]."""
+        return _load(args, y)
+
+
+def _ending(args: Any, y: Any) -> Scalar:
+    code = jnp.asarray(0)
+    for name, happens in ending_events(WATCHES).items():
+        code = jnp.where(happens(0.0, y, args), int(name), code)
+    return code
+
+
+def _load(args: Any, y: Any) -> Scalar:
+    forces = foot_forces(args, y)
+    return jnp.maximum(forces.foot_1.normal, forces.foot_2.normal)
+
+
+def checked_section(scene: Any, section: AbstractSection | None) -> AbstractSection:
     """The section asked for, or the one that a scene's cycles begin at unless told otherwise.
 
     Raises:

@@ -9,6 +9,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._system import AbstractSystem
 from jaxbiped.lanes._passage import passage_by_lanes
@@ -32,6 +33,8 @@ class Turning(eqx.Module):
         time_limit: longest time to the next arrival [s].
         max_solver_steps: cap on the attempted steps to the next arrival.
         engine: "xla" or "lanes".
+        within: the system that is solved, where its coordinates are redundant: every passage
+            enters them and leaves them again, so that a turn knows nothing of constraints.
     """
 
     system: AbstractSystem
@@ -41,10 +44,18 @@ class Turning(eqx.Module):
     steps: int = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)
+    within: AbstractSystem | None = None
 
-    def watch(self, args: PyTree, y: PyTree, *, peak: bool = True) -> Watch:
+    def watch(
+        self,
+        args: PyTree,
+        y: PyTree,
+        *,
+        peak: bool = True,
+        of: AbstractSystem | None = None,
+    ) -> Watch:
         """What the solves land on: a section is looked at after the arrival's renewal."""
-        system = self.system
+        system = self.system if of is None else of
         loaded = eqx.filter_eval_shape(system.load, args, y) is not None
         return Watch(
             field=system.vector_field,
@@ -62,7 +73,7 @@ class _Arrival(eqx.Module):
     section: AbstractSection
 
     def __call__(self, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
-        renewed = self.system.renew(args, y)
+        renewed = minimal_state(args, self.system.renew(args, y))
         return self.section.value(args, renewed), self.section.counts(args, renewed)
 
 
@@ -138,14 +149,16 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
     places = recurring_places(turning.system, y)
     count, n = len(jtu.tree_leaves(y)), args.seeds.shape[1]
     start = jnp.zeros((count, n)).at[jnp.asarray(places), jnp.arange(len(places))].set(1.0)
-    watch = turning.watch(args.args, y)
+    watch = _watched(turning, args.args, y)
     limit = jnp.where(idle, 0.0, turning.time_limit)
 
     def one(
         before: tuple[Tangents, Scalar], _: None
     ) -> tuple[tuple[Tangents, Scalar], tuple[Passage, Scalar]]:
         y0, failed = before
+        y0 = _entered(turning, y0, args)
         found = _passed(turning, watch, y0, args, precision, jnp.where(failed != 0, 0.0, limit))
+        found = _left(turning, found, args)
         state, moved = along_columns(lambda s, a: turning.system.renew(a, s), found.y, args)
         on_section = as_columns(moved)
         # At a fixed time the renewal comes earlier or later, and the motion after it with it.
@@ -163,6 +176,32 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
         (end, code), every = jax.lax.scan(one, begin, length=turning.steps)
     passages, on_section = every
     return _turn(turning, y, end, code, passages, on_section[-1])
+
+
+def _watched(turning: Turning, args: PyTree, y: PyTree) -> Watch:
+    """What the passages of a turn land on."""
+    if turning.within is None:
+        return turning.watch(args, y)
+    inside = eqx.filter_eval_shape(redundant_state, args, y)
+    return turning.watch(args, inside, of=turning.within)
+
+
+def _entered(turning: Turning, y: Tangents, args: Seeded) -> Tangents:
+    """The start of a passage in the coordinates that it is solved in."""
+    if turning.within is None:
+        return y
+    state, columns = along_columns(lambda s, a: redundant_state(a, s), y, args)
+    return Tangents(state, as_columns(columns))
+
+
+def _left(turning: Turning, found: Passage, args: Seeded) -> Passage:
+    """A passage told in the turn's own coordinates."""
+    if turning.within is None:
+        return found
+    state, columns = along_columns(lambda s, a: minimal_state(a, s), found.y, args)
+    times, states = found.nodes
+    nodes = (times, minimal_state(args.args, states))
+    return found._replace(y=Tangents(state, as_columns(columns)), nodes=nodes)
 
 
 def _passed(

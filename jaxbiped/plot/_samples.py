@@ -84,7 +84,7 @@ def contacts(scene: Scene, state: State) -> Contacts:
 
 def _contacts(scene: Scene, state: State) -> Contacts:
     both = feet(scene, state)
-    touching = tuple(jnp.broadcast_to(touches(foot), state.hip_x.shape) for foot in both)
+    touching = tuple(jnp.broadcast_to(touches(foot), foot.x.shape) for foot in both)
     return Contacts(both, (touching[0], touching[1]), foot_forces(scene, state))
 
 

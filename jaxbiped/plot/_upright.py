@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped.dynamics._feet import feet
+from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
 
@@ -32,8 +33,9 @@ def upright(scene: Scene, x: np.ndarray, z: np.ndarray) -> np.ndarray:
 def poses(scene: Scene, state: State) -> Pose:
     """The walker at states with leaves of shape (n,)."""
     foot_1, foot_2 = feet(scene, state)
+    hip = minimal_state(scene, state)
     return Pose(
-        hip=upright(scene, np.asarray(state.hip_x), np.asarray(state.hip_z)),
+        hip=upright(scene, np.asarray(hip.hip_x), np.asarray(hip.hip_z)),
         feet=(
             upright(scene, np.asarray(foot_1.x), np.asarray(foot_1.z)),
             upright(scene, np.asarray(foot_2.x), np.asarray(foot_2.z)),

@@ -7,20 +7,24 @@ from typing import Any, TypeVar
 import jax.tree_util as jtu
 
 from jaxbiped._checks import check_choice
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
-SomeScene = TypeVar("SomeScene", bound=Scene | RigidScene)
+SomeScene = TypeVar("SomeScene", bound=Scene | RigidScene | RedundantScene)
 
 _FIRST = ("K", "c", "xi")
 """The parameters that sensitivities are first asked for."""
 
 
-def parameter_names(scene: Scene | RigidScene) -> tuple[str, ...]:
+def parameter_names(scene: Scene | RigidScene | RedundantScene) -> tuple[str, ...]:
     """Names of a scene's parameters: K, c and xi first, the others in the scene's order.
 
-    A name is the parameter's own, `K`; where two parts have one of that name, `normal.K`.
+    A name is the parameter's own, `K`; where two parts have one of that name, `normal.K`. Those of
+    a redundant scene are those of what it models.
     """
+    if isinstance(scene, RedundantScene):
+        return parameter_names(scene.scene)
     names = _names_by_leaf(scene)
     first = [name for name in _FIRST if name in names]
     return (*first, *(name for name in names if name not in first))
@@ -53,6 +57,9 @@ def with_parameters(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
     Raises:
         ArgumentError: a name that the scene does not have, or a value that is not allowed.
     """
+    if isinstance(scene, RedundantScene):
+        modelled = with_parameters(scene.scene, values)
+        return dataclasses.replace(scene, scene=modelled)
     names = _names_by_leaf(scene)
     paths = [path for path, _ in jtu.tree_flatten_with_path(scene)[0]]
     for name, value in values.items():

@@ -12,6 +12,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.lanes._adaptive import Saved, Solve
 from jaxbiped.lanes._end_of_solve import almost
 from jaxbiped.lanes._solve import Setting, compiled_solve, solved, solved_and_saved
+from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._footstep_limit import PATIENCE
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.solve._trajectory import Trajectory
@@ -80,6 +81,7 @@ def _solve(run: "Simulation") -> Solve:
     def number(value: Any) -> Scalar:
         return jnp.asarray(value, dtype=jnp.float64)
 
+    assert isinstance(run.scene, Scene)
     footsteps = 0 if run.steps is None else run.steps
     return Solve(
         scene=run.scene,

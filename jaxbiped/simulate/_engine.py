@@ -22,6 +22,8 @@ def chosen_engine(
     times: Any,
     section: AbstractSection | None,
     extremes: Any,
+    dt: Any = None,
+    redundant: bool = False,
 ) -> str:
     """The engine that "auto" stands for, or the one that is asked for.
 
@@ -30,7 +32,11 @@ def chosen_engine(
     """
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(leaves))
     obstacle = _obstacle(solver, save_steps, adjoint, leaves, times)
-    by_lanes_only = _by_lanes_only(section, extremes)
+    if redundant or dt is not None:
+        what = "redundant coordinates are" if redundant else "steps of one size (dt) are"
+        obstacle = f"{what} diffrax's"
+    by_diffrax = redundant or dt is not None
+    by_lanes_only = _by_lanes_only(section, None if by_diffrax else extremes)
     if by_lanes_only is None:
         return engine_for(engine, obstacle=obstacle, prefers_xla=traced)
     check_choice("engine", engine, ENGINES)

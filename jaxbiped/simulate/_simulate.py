@@ -12,25 +12,26 @@ from jaxtyping import Array, PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._bristles import state_for
-from jaxbiped.dynamics._motion import vector_field
+from jaxbiped.dynamics._consistent import Consistent
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._by_lanes import by_lanes, prepared_lanes
+from jaxbiped.simulate._by_xla import by_xla
 from jaxbiped.simulate._engine import chosen_engine
 from jaxbiped.simulate._saved_times import check_times
-from jaxbiped.solve._accuracy import check_precision, rms_norm, tolerances
-from jaxbiped.solve._ending import WATCHES, Ending, ending_code, ending_events
-from jaxbiped.solve._footstep_limit import PATIENCE, FootstepLimit
+from jaxbiped.simulate._start import check_steps, start_for
+from jaxbiped.solve._accuracy import check_precision, tolerances
+from jaxbiped.solve._ending import WATCHES
+from jaxbiped.solve._footstep_limit import PATIENCE
 from jaxbiped.solve._solvers import solver_named
-from jaxbiped.solve._step_control import first_step, step_control
 from jaxbiped.solve._trajectory import Trajectory
 
 
 def simulate(
-    scene: Scene,
-    state: State,
+    scene: Scene | RedundantScene,
+    state: Any,
     *,
     duration: float | None = None,
     steps: int | None = None,
@@ -38,6 +39,7 @@ def simulate(
     accuracy: str = "balanced",
     rtol: float | None = None,
     atol: float | None = None,
+    dt: float | None = None,
     save: Literal["steps", "end"] | Array | AbstractSection = "steps",
     most_arrivals: int = 64,
     extremes: Callable[[Scene, State], PyTree] | None = None,
@@ -53,23 +55,26 @@ def simulate(
     of `max_solver_steps + 1`, filled with infinities: save only the end of large batches.
 
     Args:
-        scene: what to simulate.
+        scene: what to simulate; a `RedundantScene` for coordinates of each leg.
         state: start, a `State`; where friction has bristles also a `BristleState`, for their
             part (zero unless given). Its dtype is the precision of the solve: 64 bits
-            unless the user says otherwise.
+            unless the user says otherwise. A redundant scene also takes a redundant state, which
+            is put on its constraints first (see `consistent_state`).
         duration: simulated time [s].
         steps: footsteps (heel strikes) after which to end.
         solver: a name (see `SOLVERS`) or any diffrax solver.
         accuracy: "fast", "balanced" or "tight" (see `ACCURACIES`).
         rtol: relative tolerance, in place of the accuracy's.
         atol: absolute tolerance (SI), in place of a hundredth of the relative one.
+        dt: steps of this size [s], in place of tolerances; explicit methods fail on stiff contact
+            unless it is about 1e-6.
         save: "steps" for every step and the continuous solution, "end" for the final state, an
             array of increasing times [s], shape (n,), at which to save, or a section (by lanes
             only), at whose arrivals to save: `HeelStrike()` saves the footsteps. The legs take
             turns there as in `return_map`, but the states saved keep their own names.
         most_arrivals: how many arrivals at a section there is room for.
         extremes: a function of (scene, state) whose least and largest values, number by number,
-            over the ends of all steps are wanted (by lanes only).
+            over the ends of all steps are wanted (by lanes, or of a redundant scene).
         watch: which misfortunes end the solve: any of "fall", "stop", "stumble".
         max_solver_steps: cap on the solver's attempted steps.
         adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
@@ -92,6 +97,7 @@ def simulate(
         accuracy=accuracy,
         rtol=rtol,
         atol=atol,
+        dt=dt,
         save=save,
         most_arrivals=most_arrivals,
         extremes=extremes,
@@ -106,12 +112,14 @@ def simulate(
 class Simulation(eqx.Module):
     """A checked request to simulate. `prepare` it, then `compile` it to run it apart from that."""
 
-    scene: Scene
-    state: State
+    scene: Scene | RedundantScene
+    state: Any
+    correction: Consistent | None
     duration: Scalar
     times: Array | None
     rtol: Scalar
     atol: Scalar
+    dt: Scalar | None
     solver: diffrax.AbstractSolver
     adjoint: diffrax.AbstractAdjoint
     steps: int | None = eqx.field(static=True)
@@ -125,8 +133,8 @@ class Simulation(eqx.Module):
 
     @staticmethod
     def prepare(
-        scene: Scene,
-        state: State,
+        scene: Scene | RedundantScene,
+        state: Any,
         *,
         duration: float | None = None,
         steps: int | None = None,
@@ -134,6 +142,7 @@ class Simulation(eqx.Module):
         accuracy: str = "balanced",
         rtol: float | None = None,
         atol: float | None = None,
+        dt: float | None = None,
         save: Any = "steps",
         most_arrivals: int = 64,
         extremes: Callable[[Scene, State], PyTree] | None = None,
@@ -143,8 +152,8 @@ class Simulation(eqx.Module):
         engine: str = "auto",
     ) -> "Simulation":
         """Checks the arguments, which are those of `simulate`."""
-        check_type("scene", scene, Scene)
-        state = state_for(scene, state)
+        check_type("scene", scene, Scene, RedundantScene)
+        state, correction = start_for(scene, state)
         if duration is None and steps is None:
             raise ArgumentError("duration = None and steps = None: say how long to simulate.")
         if steps is not None:
@@ -163,13 +172,14 @@ class Simulation(eqx.Module):
         if timed:
             check_times(save, time)
         relative, absolute = tolerances(accuracy, rtol, atol)
-        dtype = jnp.result_type(state.hip_z)
+        dtype = jnp.result_type(jtu.tree_leaves(state)[0])
         check_precision(scene, dtype)
+        method = solver_named(solver)
+        check_steps(method, dt, most_steps=max_solver_steps, duration=time)
 
         def cast(leaf: Any) -> Array:
             return jnp.asarray(leaf, dtype=dtype)
 
-        method = solver_named(solver)
         save_steps = isinstance(save, str) and save == "steps"
         chosen = chosen_engine(
             engine,
@@ -177,6 +187,8 @@ class Simulation(eqx.Module):
             save_steps=save_steps,
             adjoint=adjoint,
             leaves=(scene, state, time),
+            dt=dt,
+            redundant=isinstance(scene, RedundantScene),
             times=save,
             section=section,
             extremes=extremes,
@@ -184,10 +196,12 @@ class Simulation(eqx.Module):
         return Simulation(
             scene=jtu.tree_map(cast, scene),
             state=state,
+            correction=correction,
             duration=cast(time),
             times=cast(save) if timed else None,
             rtol=cast(relative),
             atol=cast(absolute),
+            dt=None if dt is None else cast(dt),
             solver=method,
             adjoint=diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint,
             steps=None if steps is None else int(steps),
@@ -202,13 +216,13 @@ class Simulation(eqx.Module):
 
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
-        return by_lanes(self) if self.engine == "lanes" else _trimmed(_solve(self))
+        return by_lanes(self) if self.engine == "lanes" else _trimmed(by_xla(self))
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
         if self.engine == "lanes":
             return CompiledSimulation(prepared_lanes(self), self)
-        program = _solve.lower(self).compile()  # type: ignore[attr-defined]
+        program = by_xla.lower(self).compile()  # type: ignore[attr-defined]
         return CompiledSimulation(program, self)
 
 
@@ -222,63 +236,6 @@ class CompiledSimulation:
     def __call__(self) -> Trajectory:
         """Runs the solve and waits for it."""
         return _trimmed(jax.block_until_ready(self._program(self._request)))
-
-
-@eqx.filter_jit
-def _solve(run: Simulation) -> Trajectory:
-    controller: Any = step_control(run.rtol, run.atol, rms_norm)
-    if run.steps is not None:
-        controller = FootstepLimit.around(controller, run.steps)
-    events = ending_events(run.watch)
-    zero = jnp.zeros_like(run.duration)
-    solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(vector_field),
-        run.solver,
-        t0=zero,
-        t1=run.duration,
-        dt0=first_step(run.duration),
-        y0=run.state,
-        args=run.scene,
-        saveat=_saveat(run),
-        stepsize_controller=controller,
-        event=diffrax.Event(list(events.values())) if events else None,
-        max_steps=run.max_solver_steps,
-        adjoint=run.adjoint,
-        throw=False,
-    )
-    return Trajectory(
-        t=solution.ts,
-        state=solution.ys,
-        ending=_ending(solution, list(events), run),
-        accepted=solution.stats["num_accepted_steps"],
-        rejected=solution.stats["num_rejected_steps"],
-        dense=solution.interpolation if run.save_steps else None,
-    )
-
-
-def _saveat(run: Simulation) -> diffrax.SaveAt:
-    counting = run.steps is not None
-    if run.save_steps:
-        return diffrax.SaveAt(t0=True, steps=True, dense=True, controller_state=counting)
-    if run.times is not None:
-        return diffrax.SaveAt(ts=run.times, controller_state=counting)
-    return diffrax.SaveAt(t1=True, controller_state=counting)
-
-
-def _ending(solution: diffrax.Solution, names: list[Ending], run: Simulation) -> Array:
-    results = diffrax.RESULTS
-    out_of_steps: Any = solution.result == results.max_steps_reached
-    done: Any = solution.result == results.successful
-    if run.steps is not None:
-        counting: Any = solution.controller_state
-        _, _, count = counting
-        # Time ran out before the footsteps came, where only footsteps were asked for.
-        patience_ended = done & (count < run.steps) & (run.duration >= PATIENCE * run.steps)
-        out_of_steps = out_of_steps | patience_ended
-        done = (done & ~patience_ended) | (solution.result == results.event_occurred)
-    masks: Any = solution.event_mask
-    events = dict(zip(names, masks or [], strict=True))
-    return ending_code(events, done=done, out_of_steps=out_of_steps)
 
 
 def _trimmed(trajectory: Trajectory) -> Trajectory:

@@ -1,6 +1,6 @@
 """Accuracy: named tolerances, the norm that errors are measured in, and what float32 can bear."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +10,6 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive
 from jaxbiped._types import Scalar
-from jaxbiped.scene._scene import Scene
 
 
 class Tolerances(NamedTuple):
@@ -53,7 +52,7 @@ def rms_norm(error: PyTree) -> Scalar:
     return jnp.sqrt(total / size)
 
 
-def check_precision(scene: Scene, dtype: np.dtype) -> None:
+def check_precision(scene: Any, dtype: np.dtype) -> None:
     """Refuses a precision too coarse for the scene's contact.
 
     Rounding a position of the order of l moves a foot by ε l. Where that alone changes the

@@ -6,11 +6,13 @@ from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
+import jax.tree_util as jtu
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._motion import accelerations
+from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._clearance import StanceRotation
@@ -153,22 +155,25 @@ WATCHES = ("fall", "stop", "stumble")
 def ending_events(watch: tuple[str, ...]) -> dict[Ending, Callable[..., Any]]:
     """The conditions, for `diffrax.Event`, that end a solve whose `args` is the scene."""
 
-    def fell_forward(t: Any, y: State, args: Scene, **kwargs: Any) -> Any:
+    def fell_forward(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+        y = minimal_state(args, y)
         too_late, _ = is_barred(args, y)
         return too_late | (has_fallen(args, y) & (y.hip_vx >= 0.0))
 
-    def fell_back(t: Any, y: State, args: Scene, **kwargs: Any) -> Any:
+    def fell_back(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+        y = minimal_state(args, y)
         return has_fallen(args, y) & (y.hip_vx < 0.0)
 
-    def stopped(t: Any, y: State, args: Scene, **kwargs: Any) -> Any:
-        return has_stopped(args, y)
+    def stopped(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+        return has_stopped(args, minimal_state(args, y))
 
-    def stumbled(t: Any, y: State, args: Scene, **kwargs: Any) -> Any:
+    def stumbled(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+        y = minimal_state(args, y)
         _, too_short = is_barred(args, y)
         return too_short | has_stumbled(args, y)
 
-    def failed(t: Any, y: State, args: Scene, **kwargs: Any) -> Any:
-        return ~jnp.isfinite(sum(y))
+    def failed(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+        return ~jnp.isfinite(sum(jtu.tree_leaves(y)))
 
     events: dict[Ending, Callable[..., Any]] = {Ending.SOLVER_FAILED: failed}
     if "fall" in watch:

@@ -9,6 +9,7 @@ from jaxtyping import PyTree
 
 from jaxbiped.dynamics._feet import feet, landings, standing_foot
 from jaxbiped.dynamics._state import State
+from jaxbiped.solve._accuracy import rms_norm
 
 PATIENCE = 100.0
 """Time allowed for each footstep asked for [s]."""
@@ -29,16 +30,16 @@ class FootstepLimit(diffrax.AbstractAdaptiveStepSizeController):
     rtol: Any
     atol: Any
     norm: Callable[[PyTree], Any]
-    controller: diffrax.PIDController
+    controller: Any
     limit: Any
 
     @staticmethod
-    def around(controller: diffrax.PIDController, limit: Any) -> "FootstepLimit":
+    def around(controller: Any, limit: Any) -> "FootstepLimit":
         """Wraps a controller."""
         return FootstepLimit(
-            rtol=controller.rtol,
-            atol=controller.atol,
-            norm=controller.norm,
+            rtol=getattr(controller, "rtol", 0.0),  # steps of one size have no tolerances
+            atol=getattr(controller, "atol", 0.0),
+            norm=getattr(controller, "norm", rms_norm),
             controller=controller,
             limit=limit,
         )

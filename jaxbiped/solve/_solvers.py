@@ -29,6 +29,8 @@ SOLVERS: dict[str, Callable[[], diffrax.AbstractSolver]] = {
     "tsit5": diffrax.Tsit5,
     "dopri5": diffrax.Dopri5,
     "dopri8": diffrax.Dopri8,
+    "euler": diffrax.Euler,
+    "runge2": diffrax.Heun,
 }
 
 

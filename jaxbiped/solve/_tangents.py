@@ -16,6 +16,7 @@ from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns
 from jaxbiped.solve._landing import Watch
 from jaxbiped.solve._leap import can_leap, leap_at, leaping_values
+from jaxbiped.solve._projected import Projected
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.solve._rosenbrock_columns import rosenbrock_columns
 
@@ -122,6 +123,11 @@ def _tangent_step(
     solver: TangentSolver, t0: Any, t1: Any, y0: Tangents, args: Seeded
 ) -> tuple[Tangents, Tangents]:
     inner = solver.solver
+    if isinstance(inner, Projected):
+        bare = TangentSolver(solver.watch, inner.solver, solver.columns_only_steer)
+        stepped, errors = _tangent_step(bare, t0, t1, y0, args)
+        state, columns = along_columns(lambda s, a: inner.project(a, s), stepped, args)
+        return Tangents(state, as_columns(columns)), errors
     if isinstance(inner, AbstractRosenbrock):
         found = rosenbrock_columns(inner.tableau, solver.watch.field, t0, t1, y0, args)
         if found is not None:

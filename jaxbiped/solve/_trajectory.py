@@ -25,6 +25,7 @@ class Trajectory(eqx.Module):
         arrivals: how many arrivals at a section there were, where these were saved; those beyond
             the room for them are lost. The times of missing ones are infinite.
         lowest, highest: extremes over the ends of the steps, where they were asked for.
+        correction: how a redundant start was put on its constraints, a `Consistent`.
         engine: what computed it, "xla" or "lanes".
     """
 
@@ -37,6 +38,7 @@ class Trajectory(eqx.Module):
     arrivals: Int[Array, "..."] | None = None
     lowest: PyTree = None
     highest: PyTree = None
+    correction: PyTree = None
     engine: str = eqx.field(static=True, default="xla")
 
     @property

@@ -1,0 +1,126 @@
+"""What the experiments on the hip's constraints share."""
+
+import time
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import jaxbiped as jb
+
+COLOURS = ("#000000", "#E69F00", "#56B4E9", "#009E73", "#D55E00", "#0072B2", "#CC79A7")
+STYLES = ("-", "--", "-.", ":", "-", "--", "-.")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+PROJECTING = ("index1", "index1aug", "described")
+FLOOR = 1e-18
+"""Where a violation of exactly nothing is drawn [m]."""
+
+
+class Curve(NamedTuple):
+    """A violation over time.
+
+    Attributes:
+        t: [s]. position: ‖Φ‖ [m]. ending: of the walk, in words. seconds: of a warm run [s].
+        error: largest difference from the minimal formulation's state at the end (SI units).
+    """
+
+    t: np.ndarray
+    position: np.ndarray
+    ending: str
+    seconds: float
+    error: float
+
+    def largest(self, start: float, stop: float) -> float:
+        """Largest violation between two parts of the whole time, 0 to 1 [m]."""
+        part = (self.t >= start * self.t[-1]) & (self.t <= stop * self.t[-1])
+        return float(self.position[part].max())
+
+
+def curve_of(
+    scene: jb.Scene,
+    method: str,
+    integrator: jb.Integrator,
+    duration: float,
+    truth: np.ndarray,
+    points: int = 1001,
+) -> Curve:
+    """The violation of a method over the seed's walk, timed warm."""
+    held = jb.RedundantScene(scene, method)
+    times = jnp.linspace(0.0, duration, points)
+    steps: dict[str, Any] = (
+        dict(dt=integrator.dt) if integrator.rtol is None else dict(rtol=integrator.rtol)
+    )
+    request = jb.Simulation.prepare(
+        held,
+        jb.seed_state(),
+        duration=duration,
+        solver=integrator.solver,
+        save=times,
+        watch=(),
+        max_solver_steps=1 << 25,
+        **steps,
+    )
+    walk = jax.block_until_ready(request())
+    begin = time.perf_counter()
+    walk = jax.block_until_ready(request())
+    seconds = time.perf_counter() - begin
+    off = np.asarray(jb.violation(held, walk.state).position)
+    final = np.array(jb.minimal_state(held, walk.final))
+    error = float(np.max(np.abs(final - truth)))
+    alive = np.isfinite(off)
+    return Curve(np.asarray(times)[alive], off[alive], str(walk.outcome), seconds, error)
+
+
+def truth_of(scene: jb.Scene, duration: float) -> np.ndarray:
+    """The minimal formulation's state at the end, at a tolerance of 1e-10."""
+    walk = jb.simulate(
+        scene, jb.seed_state(), duration=duration, rtol=1e-10, save="end", max_solver_steps=1 << 22
+    )
+    return np.array(walk.final)
+
+
+def starts(count: int) -> Any:
+    """Starts scattered about the seed's by a thousandth, leaves of shape (count,)."""
+    generator = np.random.default_rng(0)
+    factors = 1.0 + 1e-3 * generator.uniform(-1.0, 1.0, (8, count))
+    state = jb.seed_state()
+    moved = [leaf * jnp.asarray(f) for leaf, f in zip(state, factors, strict=True)]
+    moving = ("theta_1", "omega_1", "omega_2")
+    every = dict(zip(state._fields, moved, strict=True))
+    still = {n: jnp.full(count, v) for n, v in state._asdict().items()}
+    return jb.State(**{n: every[n] if n in moving else still[n] for n in state._fields})
+
+
+def batch_seconds(
+    scene: jb.Scene, method: str, integrator: jb.Integrator, duration: float, count: int
+) -> float:
+    """Time of a warm batch of walks from scattered starts [s]."""
+    held = jb.RedundantScene(scene, method)
+    steps: dict[str, Any] = (
+        dict(dt=integrator.dt) if integrator.rtol is None else dict(rtol=integrator.rtol)
+    )
+
+    @eqx.filter_jit
+    def ends(batch: Any) -> Any:
+        return jax.vmap(
+            lambda start: (
+                jb.simulate(
+                    held,
+                    start,
+                    duration=duration,
+                    solver=integrator.solver,
+                    save="end",
+                    watch=(),
+                    max_solver_steps=1 << 22,
+                    **steps,
+                ).state
+            )
+        )(batch)
+
+    batch = starts(count)
+    jax.block_until_ready(ends(batch))
+    begin = time.perf_counter()
+    jax.block_until_ready(ends(batch))
+    return time.perf_counter() - begin

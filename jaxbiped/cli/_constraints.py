@@ -1,0 +1,118 @@
+"""`jaxbiped constraints`: the constraint methods compared on the seed's walk."""
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+from tyro.conf import OmitArgPrefixes
+
+from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_writable_file
+from jaxbiped.cli._report import Report, table
+from jaxbiped.cli._walk_options import SceneOptions, StartOptions
+from jaxbiped.scene._constraint_methods import CONSTRAINT_METHODS
+from jaxbiped.scene._scene import Scene
+from jaxbiped.simulate._compare_constraints import (
+    ConstraintRun,
+    Integrator,
+    compare_constraints,
+)
+
+_MOST_ROWS = 200
+
+
+@dataclasses.dataclass(frozen=True)
+class Constraints:
+    """Compare the seven ways to hold the hip together: violation, error against the minimal
+    formulation, and time."""
+
+    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
+        default_factory=SceneOptions
+    )
+    start: Annotated[StartOptions, OmitArgPrefixes] = dataclasses.field(
+        default_factory=StartOptions
+    )
+    methods: tuple[str, ...] = tuple(CONSTRAINT_METHODS)
+    """Names of the methods to compare."""
+    integrators: tuple[str, ...] = ("rodas4:1e-6", "euler:dt=1e-6", "runge2:dt=1e-6")
+    """Each SOLVER:TOLERANCE, or SOLVER:dt=STEP for steps of one size [s]."""
+    duration: float = 0.5
+    """Simulated time [s]."""
+    json: Path | None = None
+    """File for the numbers in SI units; - prints only them."""
+
+    def run(self) -> int:
+        """Runs the command; returns the exit code."""
+        scene = self.scene.scene()
+        if not isinstance(scene, Scene):
+            raise ArgumentError(
+                "model or formulation is not allowed here: compliant and minimal are compared."
+            )
+        for name in self.methods:
+            check_choice("methods", name, CONSTRAINT_METHODS)
+        check_positive("duration", self.duration, "s")
+        integrators = [Integrator.read(text) for text in self.integrators]
+        if self.json is not None and str(self.json) != "-":
+            check_writable_file("--json", self.json)
+        runs = compare_constraints(
+            scene,
+            self.start.state(scene),
+            duration=self.duration,
+            integrators=integrators,
+            methods={name: name for name in self.methods},
+        )
+        report = Report(self.json)
+        report.say(run_table(runs))
+        report.say(
+            f"{self.duration:g} s from the start; errors against the minimal formulation at 1e-10"
+        )
+        report.finish({"duration_s": self.duration, "runs": run_numbers(runs)})
+        return 0
+
+
+def run_numbers(runs: list[ConstraintRun]) -> list[dict[str, Any]]:
+    """Runs ready for JSON: None for what is not a finite number."""
+    return [
+        {
+            key: None if isinstance(value, float) and not math.isfinite(value) else value
+            for key, value in run._asdict().items()
+        }
+        for run in runs
+    ]
+
+
+def run_table(runs: list[ConstraintRun]) -> str:
+    """Runs as a table; times also relative to the standard method's with the same integrator."""
+    usual = {
+        (run.integrator, run.rtol_or_dt): run.wall_s_run for run in runs if run.method == "standard"
+    }
+    rows = []
+    for run in runs:
+        base = usual.get((run.integrator, run.rtol_or_dt))
+        rows.append(
+            (
+                run.method,
+                run.integrator,
+                f"{'dt ' if run.fixed else 'rtol '}{run.rtol_or_dt:g}",
+                run.ending,
+                f"{run.max_violation_m:.1e}",
+                f"{run.max_violation_rate:.1e}",
+                f"{run.state_error:.1e}",
+                str(run.steps),
+                f"{run.wall_s_run:.3f}",
+                "" if base is None else f"{run.wall_s_run / base:.2f}",
+            )
+        )
+    head = (
+        "method",
+        "integrator",
+        "by",
+        "ending",
+        "max |Phi| m",
+        "rate m/s",
+        "error",
+        "steps",
+        "run s",
+        "to standard",
+    )
+    return table(head, rows, most=_MOST_ROWS)

@@ -1,0 +1,74 @@
+"""Equations of motion of a linkage, by any of the constraint methods."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._constraints import Heading, constraints_of, masses_of
+from jaxbiped.scene._constraint_method import AbstractConstraintMethod, Constrained
+from jaxbiped.scene._linkage import Linkage
+from jaxbiped.scene._linkage_scene import LinkageScene
+
+
+class LinkageState(NamedTuple):
+    """Coordinates of a linkage and their rates: tuples of n scalar leaves of any batch shape.
+
+    Body by body x, z [m] and θ [rad], or x, z and the Euler parameters cos θ/2, sin θ/2 [–].
+
+    Attributes:
+        q: coordinates, n of them.
+        v: their rates.
+    """
+
+    q: tuple[Scalar, ...]
+    v: tuple[Scalar, ...]
+
+
+class LinkageMotion(NamedTuple):
+    """How a linkage moves and what holds it together.
+
+    Attributes:
+        accelerations: second derivatives of the coordinates, n entries.
+        joint_forces: force (x, z) of each joint on its body 1 [N]; on body 2 it is the opposite.
+        violation: Φ, as `Constraints` has it.
+    """
+
+    accelerations: list[Scalar]
+    joint_forces: list[tuple[Scalar, Scalar]]
+    violation: list[Scalar]
+
+
+def moved_under(
+    linkage: Linkage,
+    method: AbstractConstraintMethod,
+    q: Sequence[Scalar],
+    v: Sequence[Scalar],
+    applied: list[Scalar],
+    headings: Sequence[Heading] | None = None,
+) -> LinkageMotion:
+    """Motion under applied generalised forces Q: M q̈ = Q − Jᵀ λ with the method's λ."""
+    masses, at = masses_of(linkage), constraints_of(linkage, q, v, headings)
+    system = Constrained(masses, applied, at.rows, at.violation, at.rate, at.bias)
+    multipliers = method.multipliers(system) if at.rows else []
+    forces = list(applied)
+    for row, value in zip(at.rows, multipliers, strict=True):
+        for c, entry in row.items():
+            forces[c] = forces[c] - entry * value
+    joints = [(-multipliers[2 * k], -multipliers[2 * k + 1]) for k in range(len(linkage.joints))]
+    accelerations = [force / mass for force, mass in zip(forces, masses, strict=True)]
+    return LinkageMotion(accelerations, joints, at.violation)
+
+
+def linkage_motion(scene: LinkageScene, state: LinkageState) -> LinkageMotion:
+    """Accelerations and joint forces of a linkage in gravity; leaves shaped as the state's."""
+    linkage = scene.linkage
+    applied: list[Scalar] = []
+    for body in linkage.bodies:
+        weight = [body.mass * g for g in scene.gravity]
+        applied += [*weight, *[0.0 * body.mass] * (linkage.coordinates - 2)]
+    return moved_under(linkage, scene.method, state.q, state.v, applied)
+
+
+def linkage_field(t: Any, state: LinkageState, scene: LinkageScene) -> LinkageState:
+    """Time derivative of a linkage's state, in the form that `diffrax.ODETerm` takes."""
+    return LinkageState(state.v, tuple(linkage_motion(scene, state).accelerations))

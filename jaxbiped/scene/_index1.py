@@ -1,0 +1,48 @@
+"""Projection after each step: the paper's "index1"."""
+
+from typing import ClassVar
+
+import equinox as eqx
+
+from jaxbiped._checks import check_at_least
+from jaxbiped._symmetric import factorised, solved
+from jaxbiped._types import Scalar
+from jaxbiped.scene._constraint_method import (
+    AbstractProjectingMethod,
+    Constrained,
+    Row,
+    exact_multipliers,
+    free_residual,
+    gram,
+    inverse_masses,
+    moved_by,
+)
+
+
+class Index1(AbstractProjectingMethod):
+    """`Standard` within the step; after it q and q̇ are projected in the mass metric.
+
+    Δq = −M⁻¹Jᵀ(J M⁻¹ Jᵀ)⁻¹ Φ, repeated, then likewise q̇ with Φ̇.
+
+    Source: the seed paper, section 4, names an "index-1 projection method" and does not define it;
+    this is the usual meaning.
+
+    Attributes:
+        iterations: corrections of the positions after each step.
+
+    Raises:
+        ArgumentError: fewer than one iteration.
+    """
+
+    iterations: int = eqx.field(static=True, default=2)
+    needs_independent: ClassVar[bool] = True
+
+    def __check_init__(self) -> None:
+        check_at_least("iterations", self.iterations, "1", 1)
+
+    def multipliers(self, system: Constrained) -> list[Scalar]:
+        return exact_multipliers(system, free_residual(system))
+
+    def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
+        weights = inverse_masses(masses)
+        return moved_by(rows, weights, solved(factorised(gram(rows, weights)), residual))

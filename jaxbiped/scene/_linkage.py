@@ -1,0 +1,103 @@
+"""Linkages: rigid bodies in a plane and the pins that join them, as data."""
+
+import equinox as eqx
+
+from jaxbiped._checks import (
+    ArgumentError,
+    check_choice,
+    check_finite,
+    check_positive,
+    check_type,
+)
+from jaxbiped._types import Parameter, as_float
+
+ORIENTATIONS = ("angle", "euler")
+"""How a body's orientation is written.
+
+- angle: θ [rad].
+- euler: the planar Euler parameters (cos θ/2, sin θ/2), whose normalisation is a constraint more.
+"""
+
+
+class Body(eqx.Module):
+    """A rigid body in the plane.
+
+    Attributes:
+        mass: [kg].
+        inertia: moment of inertia about its centre of mass [kg·m²].
+
+    Raises:
+        ArgumentError: a mass or an inertia that is not above 0.
+    """
+
+    mass: Parameter = eqx.field(converter=as_float)
+    inertia: Parameter = eqx.field(converter=as_float)
+
+    def __check_init__(self) -> None:
+        check_positive("mass", self.mass, "kg")
+        check_positive("inertia", self.inertia, "kg m^2")
+
+
+class Joint(eqx.Module):
+    """A frictionless pin: a point of one body stays where a point of another one is.
+
+    A body's own frame has its origin in the centre of mass; at θ = 0 it is parallel to the plane's.
+
+    Attributes:
+        point_1: the pin in the first body's own frame, (x, z) [m].
+        point_2: in the second body's own frame; in the plane where that is the ground [m].
+        body_1: position of the first body in the linkage.
+        body_2: of the second one, None for the ground.
+
+    Raises:
+        ArgumentError: a coordinate that is not finite, or a body joined to itself.
+    """
+
+    point_1: tuple[Parameter, Parameter] = eqx.field(converter=lambda p: tuple(map(as_float, p)))
+    point_2: tuple[Parameter, Parameter] = eqx.field(converter=lambda p: tuple(map(as_float, p)))
+    body_1: int = eqx.field(static=True)
+    body_2: int | None = eqx.field(static=True, default=None)
+
+    def __check_init__(self) -> None:
+        for name in ("point_1", "point_2"):
+            for value in getattr(self, name):
+                check_finite(name, value)
+        if self.body_1 == self.body_2:
+            raise ArgumentError(
+                f"body_2 = {self.body_2} is not allowed: a joint needs two bodies, or the ground."
+            )
+
+
+class Linkage(eqx.Module):
+    """Bodies and joints; its coordinates are each body's centre of mass and orientation.
+
+    Attributes:
+        bodies: of which there are n.
+        joints: each takes two degrees of freedom, unless others took them already.
+        orientation: one of `ORIENTATIONS`.
+
+    Raises:
+        ArgumentError: no body, a part of the wrong type, a joint of a body that there is not, or
+            an unknown orientation.
+    """
+
+    bodies: tuple[Body, ...] = eqx.field(converter=tuple)
+    joints: tuple[Joint, ...] = eqx.field(converter=tuple)
+    orientation: str = eqx.field(static=True, default="angle")
+
+    def __check_init__(self) -> None:
+        check_choice("orientation", self.orientation, ORIENTATIONS)
+        if not self.bodies:
+            raise ArgumentError("bodies = () is not allowed: a linkage needs at least one body.")
+        for body in self.bodies:
+            check_type("bodies", body, Body)
+        for joint in self.joints:
+            check_type("joints", joint, Joint)
+            for number in (joint.body_1, joint.body_2):
+                if number is not None:
+                    check_choice("body of a joint", number, range(len(self.bodies)))
+
+    @property
+    def coordinates(self) -> int:
+        """Coordinates of one body: 3, or 4 with Euler parameters."""
+        return 4 if self.orientation == "euler" else 3

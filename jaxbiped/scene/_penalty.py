@@ -1,0 +1,39 @@
+"""The penalty method: the paper's "penalty"."""
+
+from typing import ClassVar
+
+import equinox as eqx
+
+from jaxbiped._symmetric import solved
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.scene._constraint_method import AbstractConstraintMethod, Constrained
+from jaxbiped.scene._penalised import check_penalty, penalty_system
+
+
+class Penalty(AbstractConstraintMethod):
+    """(M + A JᵀJ) q̈ = Q − A Jᵀ(J̇ q̇ + 2 ζ ω Φ̇ + ω² Φ): stiff springs in place of constraints.
+
+    What holds the joint is λ = A (Φ̈ + 2 ζ ω Φ̇ + ω² Φ), so a loaded joint is open by about
+    λ/(A ω²). Constraints that say the same twice share the load.
+
+    Source: the seed paper, section 4, "penalty"; Bayo, García de Jalón and Serna (1988).
+
+    Attributes:
+        A: penalty [kg].
+        omega: ω, the frequency at which a violation decays [1/s].
+        zeta: ζ, its damping [–].
+
+    Raises:
+        ArgumentError: A not above 0, or ω or ζ below 0.
+    """
+
+    A: Parameter = eqx.field(converter=as_float, default=1e7)
+    omega: Parameter = eqx.field(converter=as_float, default=10.0)
+    zeta: Parameter = eqx.field(converter=as_float, default=1.0)
+    needs_independent: ClassVar[bool] = False
+
+    def __check_init__(self) -> None:
+        check_penalty(self.A, self.omega, self.zeta)
+
+    def multipliers(self, system: Constrained) -> list[Scalar]:
+        return solved(*penalty_system(system, self.A, self.omega, self.zeta))

@@ -1,0 +1,97 @@
+"""Simulations run by diffrax, compiled by XLA."""
+
+from typing import TYPE_CHECKING, Any
+
+import diffrax
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array
+
+from jaxbiped.dynamics._motion import vector_field
+from jaxbiped.dynamics._redundant_motion import redundant_field
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve._ending import Ending, ending_code, ending_events
+from jaxbiped.solve._extremes import Extremes
+from jaxbiped.solve._footstep_limit import PATIENCE, FootstepLimit
+from jaxbiped.solve._projected import projecting
+from jaxbiped.solve._step_control import first_step, step_control
+from jaxbiped.solve._trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from jaxbiped.simulate._simulate import Simulation
+
+
+@eqx.filter_jit
+def by_xla(run: "Simulation") -> Trajectory:
+    """Runs a request; see `simulate`. A trajectory saved step by step keeps its full length."""
+    controller: Any = step_control(run.rtol, run.atol, rms_norm)
+    if run.dt is not None:
+        controller = diffrax.ConstantStepSize()
+    if run.steps is not None:
+        controller = FootstepLimit.around(controller, run.steps)
+    if run.extremes is not None:
+        controller = Extremes.around(controller, run.extremes)
+    events = ending_events(run.watch)
+    zero = jnp.zeros_like(run.duration)
+    field: Any = vector_field
+    solver: Any = run.solver
+    if isinstance(run.scene, RedundantScene):
+        field = redundant_field
+        solver = projecting(run.scene, solver)
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(field),
+        solver,
+        t0=zero,
+        t1=run.duration,
+        dt0=first_step(run.duration) if run.dt is None else run.dt,
+        y0=run.state,
+        args=run.scene,
+        saveat=_saveat(run),
+        stepsize_controller=controller,
+        event=diffrax.Event(list(events.values())) if events else None,
+        max_steps=run.max_solver_steps,
+        adjoint=run.adjoint,
+        throw=False,
+    )
+    control, lowest, highest = solution.controller_state, None, None
+    if run.extremes is not None:
+        watched: Any = control
+        control, lowest, highest = watched
+    return Trajectory(
+        t=solution.ts,
+        state=solution.ys,
+        ending=_ending(solution, control, list(events), run),
+        accepted=solution.stats["num_accepted_steps"],
+        rejected=solution.stats["num_rejected_steps"],
+        dense=solution.interpolation if run.save_steps else None,
+        lowest=lowest,
+        highest=highest,
+        correction=run.correction,
+    )
+
+
+def _saveat(run: "Simulation") -> diffrax.SaveAt:
+    keeps = run.steps is not None or run.extremes is not None
+    if run.save_steps:
+        return diffrax.SaveAt(t0=True, steps=True, dense=True, controller_state=keeps)
+    if run.times is not None:
+        return diffrax.SaveAt(ts=run.times, controller_state=keeps)
+    return diffrax.SaveAt(t1=True, controller_state=keeps)
+
+
+def _ending(
+    solution: diffrax.Solution, control: Any, names: list[Ending], run: "Simulation"
+) -> Array:
+    results = diffrax.RESULTS
+    out_of_steps: Any = solution.result == results.max_steps_reached
+    done: Any = solution.result == results.successful
+    if run.steps is not None:
+        _, _, count = control
+        # Time ran out before the footsteps came, where only footsteps were asked for.
+        patience_ended = done & (count < run.steps) & (run.duration >= PATIENCE * run.steps)
+        out_of_steps = out_of_steps | patience_ended
+        done = (done & ~patience_ended) | (solution.result == results.event_occurred)
+    masks: Any = solution.event_mask
+    events = dict(zip(names, masks or [], strict=True))
+    return ending_code(events, done=done, out_of_steps=out_of_steps)

@@ -1,0 +1,193 @@
+"""Constraint methods against each other: violation, error and time."""
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_positive, check_type
+from jaxbiped.dynamics._redundant_motion import violation
+from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.scene._constraint_methods import CONSTRAINT_METHODS, method_named
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.simulate._simulate import Simulation
+from jaxbiped.solve._ending import Ending
+from jaxbiped.solve._solvers import SOLVERS
+from jaxbiped.solve._trajectory import Trajectory
+
+ASTRAY = 0.05
+"""Error of the state (SI units) from which a run that came to its end has still failed."""
+_TRUTH = 1e-10
+_MOST_STEPS = 1 << 25
+
+
+class Integrator(NamedTuple):
+    """How to integrate: a solver's name, and its tolerance or its step.
+
+    Attributes:
+        solver: one of `SOLVERS`.
+        rtol: relative tolerance; None for steps of one size.
+        dt: that size [s]; None under error control.
+    """
+
+    solver: str
+    rtol: float | None = None
+    dt: float | None = None
+
+    @staticmethod
+    def read(text: str) -> "Integrator":
+        """From `rodas4:1e-6` (a tolerance) or `euler:dt=1e-6` (a step [s]).
+
+        Raises:
+            ArgumentError: anything else.
+        """
+        name, _, number = text.partition(":")
+        fixed = number.startswith("dt=")
+        try:
+            value = float(number.removeprefix("dt="))
+        except ValueError:
+            value = -1.0
+        if name not in SOLVERS or not value > 0.0:
+            raise ArgumentError(
+                f"integrator = {text!r} is not allowed: write SOLVER:TOLERANCE or SOLVER:dt=STEP, "
+                f"the solver one of {', '.join(SOLVERS)}."
+            )
+        return Integrator(name, dt=value) if fixed else Integrator(name, rtol=value)
+
+
+class ConstraintRun(NamedTuple):
+    """One method with one integrator.
+
+    Attributes:
+        method: its name.
+        integrator: the solver's name.
+        rtol_or_dt: tolerance, or step [s] where `fixed`.
+        fixed: whether steps have one size.
+        ending: in words; "failed" where the state at the end is off by `ASTRAY` or more.
+        max_violation_m: largest ‖Φ‖ at the end of a step [m].
+        max_violation_rate: largest ‖Φ̇‖ there [m/s].
+        state_error: largest difference from the minimal formulation's state at the end (SI units).
+        wall_s_run: time of a warm run [s].
+        steps: attempted.
+    """
+
+    method: str
+    integrator: str
+    rtol_or_dt: float
+    fixed: bool
+    ending: str
+    max_violation_m: float
+    max_violation_rate: float
+    state_error: float
+    wall_s_run: float
+    steps: int
+
+
+def compare_constraints(
+    scene: Scene,
+    state: Any,
+    *,
+    duration: float,
+    integrators: Sequence[Integrator],
+    methods: Mapping[str, Any] | None = None,
+    orientation: str = "angle",
+    repeats: int = 3,
+) -> list[ConstraintRun]:
+    """Runs every method with every integrator from one start, compiled and timed apart.
+
+    The truth is the minimal formulation's state at the end, at a tolerance of 1e-10.
+
+    Args:
+        scene: what to simulate.
+        state: start, a `State`.
+        duration: simulated time [s].
+        integrators: how to integrate.
+        methods: `AbstractConstraintMethod`s by the names to give them; all seven unless given.
+        orientation: one of `ORIENTATIONS`.
+        repeats: runs of which the fastest counts.
+
+    Raises:
+        ArgumentError: an argument that is not allowed.
+    """
+    check_type("scene", scene, Scene)
+    check_positive("duration", duration, "s")
+    check_positive("repeats", repeats)
+    chosen = {name: name for name in CONSTRAINT_METHODS} if methods is None else methods
+    scenes = {
+        name: RedundantScene(scene, method_named(how), orientation) for name, how in chosen.items()
+    }
+    truth = final_truth(scene, state, duration)
+    return [
+        _run(name, redundant, state, duration, integrator, truth, int(repeats))
+        for name, redundant in scenes.items()
+        for integrator in integrators
+    ]
+
+
+def final_truth(scene: Scene, state: Any, duration: float) -> np.ndarray:
+    """The minimal formulation's state after a time, at a tolerance of 1e-10; (8,) or (10,)."""
+    request = Simulation.prepare(
+        scene, state, duration=duration, rtol=_TRUTH, save="end", max_solver_steps=_MOST_STEPS
+    )
+    return np.array(request().final)
+
+
+def request_of(
+    scene: RedundantScene, state: Any, duration: float, integrator: Integrator, **options: Any
+) -> Simulation:
+    """The request to simulate with an integrator; stops for nothing but a failure."""
+    return Simulation.prepare(
+        scene,
+        state,
+        duration=duration,
+        solver=integrator.solver,
+        rtol=integrator.rtol,
+        dt=integrator.dt,
+        watch=(),
+        max_solver_steps=_MOST_STEPS,
+        **options,
+    )
+
+
+def _run(
+    name: str,
+    scene: RedundantScene,
+    state: Any,
+    duration: float,
+    integrator: Integrator,
+    truth: np.ndarray,
+    repeats: int,
+) -> ConstraintRun:
+    # Not compiled by itself: another tolerance or step size runs the same program.
+    request = request_of(scene, state, duration, integrator, save="end", extremes=violation)
+    found, seconds = timed(request, repeats)
+    final = np.array(minimal_state(scene, found.final))
+    error = float(np.max(np.abs(final - truth)))
+    outcome = found.outcome
+    stood = outcome == Ending.WALKING and error < ASTRAY
+    return ConstraintRun(
+        method=name,
+        integrator=integrator.solver,
+        rtol_or_dt=float(integrator.dt if integrator.rtol is None else integrator.rtol),  # type: ignore[arg-type]
+        fixed=integrator.dt is not None,
+        ending=str(outcome) if stood or outcome != Ending.WALKING else "failed",
+        max_violation_m=float(found.highest.position),
+        max_violation_rate=float(found.highest.rate),
+        state_error=error,
+        wall_s_run=seconds,
+        steps=int(found.accepted) + int(found.rejected),
+    )
+
+
+def timed(request: Simulation, repeats: int) -> tuple[Trajectory, float]:
+    """What a request gives, and the time of its fastest warm run [s]."""
+    found = jax.block_until_ready(request())
+    seconds = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        found = jax.block_until_ready(request())
+        seconds.append(time.perf_counter() - begin)
+    return found, min(seconds)

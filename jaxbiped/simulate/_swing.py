@@ -1,0 +1,145 @@
+"""Simulating a linkage in gravity."""
+
+from typing import Any
+
+import diffrax
+import equinox as eqx
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxbiped._checks import ArgumentError, check_finite, check_positive, check_type
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._constraints import Constraints, constraints_of
+from jaxbiped.dynamics._independence import check_independent
+from jaxbiped.dynamics._linkage_motion import LinkageState, linkage_field
+from jaxbiped.dynamics._projection import nearest, stepped_back
+from jaxbiped.scene._constraint_method import AbstractProjectingMethod
+from jaxbiped.scene._linkage_scene import LinkageScene
+from jaxbiped.simulate._start import check_steps
+from jaxbiped.solve._accuracy import rms_norm, tolerances
+from jaxbiped.solve._projected import Projected
+from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve._step_control import first_step, step_control
+
+
+class Swing(eqx.Module):
+    """How a linkage moved. Under `vmap` every array gains the batch's axes.
+
+    Attributes:
+        t: times that were saved [s], shape (n,).
+        state: states at those times, leaves of shape (n,).
+        violation: ‖Φ‖ at those times [m], shape (n,).
+        corrected: how far the start was from its constraints, ‖Φ‖ [m].
+        attempted: number of the solver's steps.
+        succeeded: whether the solve came to its end with a finite state (boolean).
+    """
+
+    t: Scalar
+    state: LinkageState
+    violation: Scalar
+    corrected: Scalar
+    attempted: Scalar
+    succeeded: Scalar
+
+
+def swing(
+    scene: LinkageScene,
+    state: LinkageState,
+    *,
+    times: Any,
+    solver: str | diffrax.AbstractSolver = "rodas4",
+    accuracy: str = "balanced",
+    rtol: float | None = None,
+    atol: float | None = None,
+    dt: float | None = None,
+    max_solver_steps: int = 65536,
+    adjoint: diffrax.AbstractAdjoint | None = None,
+) -> Swing:
+    """Simulates a linkage from a start, which is first put on its constraints.
+
+    Works under `jit`, `vmap` and differentiation.
+
+    Args:
+        scene: linkage, constraint method and gravity.
+        state: start at time 0, on its constraints or near them.
+        times: when to save, increasing from 0 on [s], shape (n,); the last one ends the solve.
+        solver, accuracy, rtol, atol, dt, max_solver_steps, adjoint: as in `simulate`.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, or constraints that the method cannot hold,
+            before anything is compiled.
+    """
+    check_type("scene", scene, LinkageScene)
+    check_type("state", state, LinkageState)
+    count = scene.linkage.coordinates * len(scene.linkage.bodies)
+    for name in ("q", "v"):
+        values = getattr(state, name)
+        if len(values) != count:
+            raise ArgumentError(
+                f"state.{name} has {len(values)} entries: this linkage has {count} coordinates."
+            )
+        for value in values:
+            check_finite(f"state.{name}", value)
+    state = LinkageState(*(tuple(map(as_float, values)) for values in state))
+    check_finite("times", times)
+    times = as_float(times)
+    check_positive("times[-1]", times[-1], "s")
+    method = solver_named(solver)
+    check_steps(method, dt, most_steps=max_solver_steps, duration=times[-1])
+    check_independent(scene.linkage, scene.method, state.q)
+    relative, absolute = tolerances(accuracy, rtol, atol)
+    control = step_control(relative, absolute, rms_norm) if dt is None else None
+    scene = jtu.tree_map(as_float, scene)
+    chosen = diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint
+    return _swung(scene, state, times, method, control, dt, max_solver_steps, chosen)
+
+
+@eqx.filter_jit
+def _swung(
+    scene: LinkageScene,
+    state: LinkageState,
+    times: Scalar,
+    solver: Any,
+    control: Any,
+    dt: Any,
+    most: int,
+    adjoint: Any,
+) -> Swing:
+    if isinstance(scene.method, AbstractProjectingMethod):
+        solver = Projected(solver, _stepped_back)
+    off = _distance(constraints_of(scene.linkage, *state))
+    start = LinkageState(*map(tuple, nearest(scene.linkage, *state)))
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(linkage_field),
+        solver,
+        t0=jnp.zeros_like(times[0]),
+        t1=times[-1],
+        dt0=first_step(times[-1]) if control is not None else dt,
+        y0=start,
+        args=scene,
+        saveat=diffrax.SaveAt(ts=times),
+        stepsize_controller=diffrax.ConstantStepSize() if control is None else control,
+        max_steps=most,
+        adjoint=adjoint,
+        throw=False,
+    )
+    found: Any = solution.ys
+    finite = jnp.isfinite(sum(leaf[-1] for leaf in jtu.tree_leaves(found)))
+    return Swing(
+        t=jnp.asarray(solution.ts),
+        state=found,
+        violation=_distance(constraints_of(scene.linkage, *found)),
+        corrected=off,
+        attempted=solution.stats["num_steps"],
+        succeeded=finite & jnp.asarray(solution.result == diffrax.RESULTS.successful),
+    )
+
+
+def _stepped_back(scene: LinkageScene, state: LinkageState) -> LinkageState:
+    assert isinstance(scene.method, AbstractProjectingMethod)
+    return LinkageState(*map(tuple, stepped_back(scene.linkage, scene.method, *state)))
+
+
+def _distance(at: Constraints) -> Scalar:
+    squares = [value * value for value in at.violation]
+    return jnp.sqrt(sum(squares[1:], squares[0])) if squares else jnp.zeros(())

@@ -1,0 +1,81 @@
+"""`jaxbiped constraints`, and the flags that choose a formulation."""
+
+import json
+
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.cli import main
+from jaxbiped.cli._walk_options import SceneOptions
+
+
+def _run(*arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main(list(arguments))
+    return stopped.value.code
+
+
+def test_compares_methods_and_integrators(capsys):
+    flags = ("--methods", "standard", "described", "--duration", "0.05")
+    integrators = ("--integrators", "euler:dt=1e-5", "euler:dt=2e-3")
+    assert _run("constraints", *flags, *integrators, "--json", "-") == 0
+    runs = json.loads(capsys.readouterr().out)["runs"]
+    assert [(run["method"], run["rtol_or_dt"]) for run in runs] == [
+        ("standard", 1e-5),
+        ("standard", 2e-3),
+        ("described", 1e-5),
+        ("described", 2e-3),
+    ]
+    for run in runs:
+        assert run["integrator"] == "euler"
+        assert run["wall_s_run"] > 0.0
+    assert runs[0]["ending"] == runs[2]["ending"] == "walking"
+    # A step that the contact's stiffness does not stand is told, not dropped.
+    assert runs[1]["ending"] != "walking"
+    assert runs[2]["max_violation_m"] < 1e-15 < runs[0]["max_violation_m"]
+    assert runs[0]["state_error"] < 1e-2
+    assert runs[0]["steps"] == pytest.approx(5000, abs=2)
+
+
+def test_flags_build_the_scene():
+    scene = SceneOptions(formulation="redundant", method="baumgarte", orientation="euler").scene()
+    assert isinstance(scene, jb.RedundantScene)
+    assert isinstance(scene.method, jb.Baumgarte)
+    assert scene.orientation == "euler"
+    assert isinstance(SceneOptions(formulation="redundant").scene().method, jb.Index1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("walk", "--formulation", "maximal"), "formulation = 'maximal'"),
+        (("walk", "--formulation", "redundant", "--method", "glue"), "method = 'glue'"),
+        (("gait", "--method", "index1"), "method = index1 is not allowed with formulation"),
+        (("gait", "--formulation", "redundant", "--engine", "lanes"), "redundant coordinates are"),
+        (("walk", "--formulation", "redundant", "--model", "rigid"), "formulation = redundant"),
+        (("walk", "--formulation", "redundant", "--orientation", "up"), "orientation = 'up'"),
+        (("constraints", "--integrators", "euler"), "integrator = 'euler'"),
+        (("constraints", "--methods", "glue"), "methods = 'glue'"),
+        (("constraints", "--duration", "-1"), "duration = -1"),
+        (("constraints", "--model", "rigid"), "compliant and minimal are compared"),
+    ],
+)
+def test_bad_flags_are_one_sentence(arguments, said, capsys):
+    assert _run(*arguments) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_walk_tells_of_the_hip(tmp_path):
+    written = tmp_path / "walk.json"
+    flags = ("--formulation", "redundant", "--method", "described", "--duration", "1.3")
+    assert _run("walk", *flags, "--json", str(written), "--out", str(tmp_path)) == 0
+    numbers = json.loads(written.read_text())
+    assert numbers["steps"][0]["period_s"] == pytest.approx(0.4415, abs=5e-4)
+    held = numbers["constraints"]
+    assert held["method"] == "described"
+    assert held["max_violation_m"] < 1e-12
+    assert held["max_hip_force_N"] == pytest.approx(150.0, rel=0.05)
+    assert (tmp_path / "strobe.png").exists()
+    assert (tmp_path / "trajectory.nc").exists()

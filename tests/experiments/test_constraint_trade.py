@@ -1,0 +1,24 @@
+import numpy as np
+
+from tests.experiments.quick import quick_numbers
+
+
+def test_errors_costs_and_maps(tmp_path):
+    numbers = quick_numbers(
+        "constraint_trade",
+        tmp_path,
+        keys={"runs", "maps"},
+        pictures={"trade.png", "constants.png"},
+    )
+    runs = {(run["method"], run["rtol_or_dt"]): run for run in numbers["runs"]}
+    for method in ("standard", "index1"):
+        coarse, fine = runs[method, 1e-4], runs[method, 1e-5]
+        assert fine["state_error"] < 0.3 * coarse["state_error"]
+        assert fine["steps"] == 10 * coarse["steps"]
+    assert runs["index1", 1e-5]["max_violation_m"] < 1e-15
+    found = numbers["maps"]["baumgarte"]
+    off = np.array(found["max_violation_m"], dtype=float)
+    # Faster decay, smaller violation: along a = b, as far as Euler steps stand it.
+    assert off[1, 1] < off[0, 0]
+    # One that is pulled back faster than the steps are short, without damping, explodes.
+    assert found["failed"][0][-1]

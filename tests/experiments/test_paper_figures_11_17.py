@@ -1,0 +1,31 @@
+from tests.experiments.quick import quick_numbers
+
+FIGURES = {
+    "fig11_violation",
+    "fig12_all_methods",
+    "fig13_without_standard",
+    "fig14_time_ratio",
+    "fig15_augmented",
+    "fig16_standard",
+    "fig17_times",
+}
+
+
+def test_judges_the_papers_sentences(tmp_path):
+    numbers = quick_numbers(
+        "paper_figures_11_17",
+        tmp_path,
+        keys={"methods", "integrators", "costs", "verdicts"},
+        pictures={f"{figure}.png" for figure in FIGURES},
+    )
+    methods = numbers["methods"]
+    assert methods["described"]["max_violation_m"] < 1e-14
+    assert methods["standard"]["last_half_m"] > 1.5 * methods["standard"]["first_half_m"]
+    assert methods["augmented"]["max_violation_m"] < methods["standard"]["max_violation_m"]
+    integrators = numbers["integrators"]
+    runge, euler = (integrators[f"augmented {name}"] for name in ("runge2", "euler"))
+    assert runge["max_violation_m"] < 0.1 * euler["max_violation_m"]
+    said = {each["sentence"]: each["confirmed"] for each in numbers["verdicts"]}
+    assert len(said) >= 6
+    assert said["the method that most eliminates the constraints violations is the Runge-Kutta"]
+    assert numbers["costs"]["standard"] == {"euler_single": 1.0, "euler_batch": 1.0}

@@ -1,0 +1,107 @@
+"""Walks in redundant coordinates against the minimal formulation."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+
+FOOTSTEP = 0.440835
+HUNDRED = 100.0 * FOOTSTEP
+PROJECTING = ("index1", "index1aug", "described")
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """A footstep in Euler steps of 4e-6 s by those methods that do not walk for long below."""
+    every = jb.compare_constraints(
+        jb.seed_scene(),
+        jb.seed_state(),
+        duration=0.45,
+        integrators=[jb.Integrator.read("euler:dt=4e-6")],
+        methods={name: name for name in ("baumgarte", "penalty", "index1", "index1aug")},
+        repeats=1,
+    )
+    return {run.method: run for run in every}
+
+
+def test_methods_take_the_seeds_footstep(runs):
+    for name, run in runs.items():
+        assert run.ending == "walking"
+        assert run.steps == pytest.approx(0.45 / 4e-6, abs=2)
+        assert run.state_error < 5e-3
+        if name in PROJECTING:
+            assert run.max_violation_m < 1e-14
+            assert run.max_violation_rate < 1e-14
+        else:
+            assert 1e-9 < run.max_violation_m < 1e-5
+
+
+@pytest.fixture(scope="module")
+def long_walks():
+    """Ten and a hundred footsteps' time by three methods, at the usual settings."""
+
+    def walks(name):
+        scene = jb.RedundantScene(jb.seed_scene(), name)
+        how = dict(save="end", watch=(), extremes=jb.violation)
+        return [
+            jb.simulate(scene, jb.seed_state(), duration=t, **how) for t in (0.1 * HUNDRED, HUNDRED)
+        ]
+
+    return {name: walks(name) for name in ("standard", "augmented", "described")}
+
+
+def test_drift_over_a_hundred_footsteps(long_walks):
+    """The standard method's grows with time; a penalty bounds it; a projection leaves none."""
+    ten, hundred = (
+        {name: float(walks[k].highest.position) for name, walks in long_walks.items()}
+        for k in (0, 1)
+    )
+    assert hundred["standard"] > 4.0 * ten["standard"] > 1e-8
+    assert hundred["augmented"] < 1.5 * ten["augmented"]
+    assert hundred["augmented"] < 0.1 * hundred["standard"]
+    assert hundred["described"] < 1e-12
+
+
+def test_all_walk_at_the_minimal_ones_pace(long_walks):
+    truth = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=HUNDRED, save="end").final
+    for walks in long_walks.values():
+        assert walks[1].outcome is jb.Ending.WALKING
+        assert walks[1].correction is not None
+        final = jb.minimal_state(jb.RedundantScene(jb.seed_scene()), walks[1].final)
+        assert float(final.hip_x) == pytest.approx(float(truth.hip_x), rel=1e-3)
+        # A step's length lost or won over all of them would be 1e-2 of each.
+        assert abs(float(final.theta_2 - truth.theta_2)) < 1e-2
+
+
+def test_what_is_not_allowed_is_one_sentence():
+    scene, start = jb.RedundantScene(jb.seed_scene()), jb.seed_state()
+    for change, said in (
+        (dict(engine="lanes", save="end"), "redundant coordinates are diffrax's"),
+        (dict(solver="euler"), "dt = None is not allowed for solver = euler"),
+        (dict(dt=0.0), "dt = 0 is not allowed"),
+        (dict(dt=1e-9), "more than max_solver_steps = 65536"),
+        (dict(save=jb.HeelStrike()), "save = HeelStrike() is not allowed here"),
+    ):
+        with pytest.raises(jb.ArgumentError) as refused:
+            jb.simulate(scene, start, duration=1.0, **change)
+        assert said in str(refused.value)
+    with pytest.raises(jb.ArgumentError, match="write SOLVER:TOLERANCE or SOLVER:dt=STEP"):
+        jb.Integrator.read("euler:fast")
+
+
+def test_projected_walks_differentiate_and_batch():
+    """By the contact's damping, through 20 projected steps, against central differences."""
+
+    def end(change):
+        scene = jb.with_parameters(jb.seed_scene(), {"c": 1e7 * (1.0 + change)})
+        held = jb.RedundantScene(scene, "described")
+        how = dict(solver="euler", dt=1e-6, save="end", watch=(), max_solver_steps=64)
+        walk = jb.simulate(held, jb.seed_state(), duration=2e-5, **how)
+        return 1e3 * walk.final.vz_2
+
+    slope = float(jax.jit(jax.grad(end))(jnp.asarray(0.0)))
+    values = np.asarray(jax.jit(jax.vmap(end))(jnp.asarray([-1e-4, 0.0, 1e-4])))
+    assert slope == pytest.approx((values[2] - values[0]) / 2e-4, rel=1e-5)
+    assert abs(slope) > 0.1

@@ -1,0 +1,145 @@
+"""Linkages in gravity: every method, redundant joints, derivatives."""
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import jaxbiped as jb
+from tests.linkages import (
+    four_bar,
+    four_bar_state,
+    hanging,
+    pinned_pendulum,
+    with_euler_parameters,
+)
+
+TIMES = jnp.linspace(0.0, 2.0, 201)
+START = hanging(0.5, -0.8, rates=(1.0, 2.0))
+PROJECTING = ("index1", "index1aug", "described")
+
+
+@pytest.fixture(scope="module")
+def angles():
+    """The pendulum's angles after 2 s by SciPy: two legs that do not feel each other at one pin."""
+    inertia = 0.0096 + 0.1**2
+
+    def rates(t, y):
+        return [y[2], y[3], *(-9.8 * 0.1 / inertia * np.sin(y[:2]))]
+
+    return solve_ivp(rates, (0.0, 2.0), [0.5, -0.8, 1.0, 2.0], rtol=1e-11, atol=1e-12).y[:2, -1]
+
+
+@pytest.fixture(scope="module")
+def swings():
+    """The pinned pendulum by every method in explicit Euler steps of 1e-4 s."""
+    return {
+        name: jb.swing(
+            jb.LinkageScene(pinned_pendulum(), kind()), START, times=TIMES, solver="euler", dt=1e-4
+        )
+        for name, kind in jb.CONSTRAINT_METHODS.items()
+    }
+
+
+def test_the_pendulum_by_seven_methods(swings, angles):
+    worst = {name: float(jnp.max(each.violation)) for name, each in swings.items()}
+    for name, each in swings.items():
+        assert bool(each.succeeded)
+        assert int(each.attempted) == 20000
+        error = np.abs(np.array([each.state.q[2][-1], each.state.q[5][-1]]) - angles).max()
+        assert error < 0.02, name
+    for name in PROJECTING:
+        assert worst[name] < 1e-14
+    for name in ("baumgarte", "penalty", "augmented"):
+        assert 1e-8 < worst[name] < 0.5 * worst["standard"]
+
+
+def test_projected_steps_agree_with_scipy(angles):
+    scene = jb.LinkageScene(pinned_pendulum("euler"), jb.Index1())
+    found = jb.swing(scene, with_euler_parameters(START), times=TIMES, solver="dopri5", rtol=1e-8)
+    for k, expected in enumerate(angles):
+        cosine, sine = (found.state.q[4 * k + i][-1] for i in (2, 3))
+        assert float(2.0 * jnp.arctan2(sine, cosine)) == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_four_bar_keeps_its_energy_and_its_joints():
+    linkage = four_bar()
+    scene = jb.LinkageScene(linkage, jb.DirectCorrection())
+    found = jb.swing(scene, four_bar_state(1.1, 3.0), times=TIMES, solver="dopri5", rtol=1e-9)
+    assert float(jnp.max(found.violation[-1])) < 1e-14
+    energy = jnp.zeros_like(found.t)
+    for k, body in enumerate(linkage.bodies):
+        (_, z, _), (vx, vz, rate) = (part[3 * k : 3 * k + 3] for part in found.state)
+        energy = energy + 0.5 * (body.mass * (vx**2 + vz**2) + body.inertia * rate**2)
+        energy = energy + 9.8 * body.mass * z
+    assert float(jnp.ptp(energy)) < 1e-5 * float(jnp.max(jnp.abs(energy)))
+    assert float(jnp.ptp(found.state.q[2])) > 1.0
+
+
+@pytest.mark.parametrize("name", jb.CONSTRAINT_METHODS)
+def test_a_joint_said_twice(name, angles):
+    """Singular: methods with a penalty share the load between the two, the others say so."""
+    method = jb.CONSTRAINT_METHODS[name]()
+    scene = jb.LinkageScene(pinned_pendulum(twice=True), method)
+    how = dict(times=TIMES[:11], solver="euler", dt=1e-3)
+    if method.needs_independent:
+        with pytest.raises(jb.ArgumentError, match="2 of 6 constraints say what others say"):
+            jb.swing(scene, START, **how)
+        return
+    once = jb.linkage_motion(jb.LinkageScene(pinned_pendulum(), method), as_arrays(START))
+    twice = jb.linkage_motion(scene, as_arrays(START))
+    np.testing.assert_allclose(
+        np.array(twice.accelerations), np.array(once.accelerations), rtol=1e-5, atol=1e-5
+    )
+    shared = np.array(twice.joint_forces)
+    np.testing.assert_allclose(shared[1], shared[2], rtol=1e-6)
+    np.testing.assert_allclose(shared[1] + shared[2], np.array(once.joint_forces)[1], rtol=1e-5)
+
+
+def as_arrays(state):
+    return jax.tree.map(jnp.asarray, state)
+
+
+def test_projected_solves_differentiate_and_batch():
+    """The derivative of a projected solve by a length, against central differences."""
+
+    def end(distance):
+        body, hip = jb.Body(1.0, 0.0096), (0.0, distance)
+        joints = (jb.Joint(hip, (0.0, 0.0), 0), jb.Joint(hip, hip, 0, 1))
+        scene = jb.LinkageScene(jb.Linkage((body, body), joints), jb.Index1())
+        # A start that has to be put on the constraints of the length.
+        found = jb.swing(
+            scene,
+            START,
+            times=TIMES[:51],
+            solver="runge2",
+            dt=1e-3,
+            adjoint=diffrax.ForwardMode(),
+        )
+        return found.state.q[2][-1]
+
+    value, slope = jax.jvp(end, (jnp.asarray(0.101),), (jnp.asarray(1.0),))
+    several = jax.vmap(end)(jnp.asarray([0.101 - 1e-6, 0.101, 0.101 + 1e-6]))
+    assert float(several[1]) == pytest.approx(float(value), abs=1e-13)
+    assert float(slope) == pytest.approx(float(several[2] - several[0]) / 2e-6, rel=1e-6)
+    assert abs(float(slope)) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (dict(dt=None), "dt = None is not allowed for solver = euler"),
+        (dict(dt=-1e-3), "dt = -0.001 is not allowed"),
+        (dict(dt=1e-9), "more than max_solver_steps"),
+        (dict(times=jnp.asarray([0.0, jnp.nan])), "times = nan"),
+        (dict(state=jb.LinkageState((0.0,), (0.0,))), "this linkage has 6 coordinates"),
+    ],
+)
+def test_what_is_not_allowed_is_one_sentence(change, said):
+    scene = jb.LinkageScene(pinned_pendulum(), jb.Standard())
+    options = dict(state=START, times=TIMES, solver="euler", dt=1e-3) | change
+    with pytest.raises(jb.ArgumentError) as refused:
+        jb.swing(scene, options.pop("state"), **options)
+    assert said in str(refused.value)
