@@ -13,11 +13,12 @@ import xarray as xr
 from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
-from jaxbiped._checks import check_positive
+from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.cli._basin_options import StartsOptions
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions
 from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._cluster import cluster_executor, local_executor
@@ -83,6 +84,11 @@ class Basin:
     def run(self) -> int:
         """Runs the command; returns the exit code."""
         scene = self.scene.scene()
+        if isinstance(scene, RedundantScene):
+            raise ArgumentError(
+                'formulation = "redundant" is not allowed for a basin: starts are labelled in '
+                "minimal coordinates."
+            )
         starts = self.starts.chosen(scene)
         how: dict[str, Any] = dict(
             footsteps=self.sweep.footsteps,

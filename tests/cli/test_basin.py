@@ -103,6 +103,7 @@ def test_samples_over_a_rigid_walker_and_its_slope(capsys):
         (("--model", "rigid", "--x", "hip_z=0:1:3"), "coordinate = 'hip_z' is not known"),
         (("--starts", "nowhere.csv"), "starts = 'nowhere.csv' cannot be read"),
         (("--starts", "nowhere.csv", "--x", "g=1:2:3"), "name either"),
+        (("--formulation", "redundant"), 'formulation = "redundant" is not allowed for a basin'),
         (("--footsteps", "0"), "footsteps = 0"),
         (("--accuracy", "high"), "accuracy = 'high' is not known"),
         (("--workers", "0"), "workers = 0"),
