@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm, qmc
 
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -12,6 +11,7 @@ from jaxbiped.sweep._broadcast import repeated
 from jaxbiped.sweep._follow import Effort, follow
 from jaxbiped.sweep._goals import Goals
 from jaxbiped.sweep._label import Label
+from jaxbiped.sweep._sphere import spread_directions
 
 _SHELLS = 1e-5 * 1.5 ** np.arange(30)
 """Distances that are tried."""
@@ -27,15 +27,15 @@ _SHARE = 0.7
 def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort) -> Attractor:
     """The attractor with its radius measured: all starts of one shell after another, one cycle.
 
-    On each shell starts lie in many directions (a Sobol sequence's). The radius is a share of the
+    On each shell starts lie in many directions. The radius is a share of the
     last distance up to which every one of them returned and had come nearer.
     """
     size = len(attractor.state) - 1
-    directions = _sphere(_DIRECTIONS, size - 1)
+    directions = spread_directions(_DIRECTIONS, size - 1)
     # The metric maps the section one to one: offsets whose images lie on shells.
     tangents = section_tangents(scene, attractor.state)
     back = tangents @ np.linalg.inv(attractor.metric @ tangents)
-    offsets = (_SHELLS[:, None, None] * directions[None]).reshape(-1, size - 1) @ back.T
+    offsets = (_SHELLS[:, None, None] * directions).reshape(-1, size - 1) @ back.T
     states = _moved(attractor.state, offsets)
     count = len(offsets)
     strikes = attractor.period + (0 if isinstance(scene, RigidScene) else 1)
@@ -54,13 +54,6 @@ def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort)
     nearer = (returned & (after <= allowed)).reshape(len(_SHELLS), _DIRECTIONS).all(axis=1)
     good = len(_SHELLS) if nearer.all() else int(np.argmin(nearer))
     return attractor._replace(radius=_SHARE * float(_SHELLS[good - 1]) if good else -1.0)
-
-
-def _sphere(count: int, size: int) -> np.ndarray:
-    """Directions spread evenly, shape (count, size)."""
-    uniform = qmc.Sobol(size, scramble=True, rng=0).random(count)
-    normal = norm.ppf(uniform)
-    return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
 def _moved(state: Any, offsets: np.ndarray) -> Any:

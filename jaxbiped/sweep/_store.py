@@ -131,8 +131,7 @@ class Store:
 
 def check_store(path: Path) -> None:
     """Raises `ArgumentError` where no store can be made or continued at this path."""
-    if path.exists() and not path.is_dir():
-        raise ArgumentError(f"store = {str(path)!r} is a file: it must be a directory.")
+    _is_new(path)
     home = next(each for each in [path, *path.absolute().parents] if each.is_dir())
     if not os.access(home, os.W_OK | os.X_OK):
         raise ArgumentError(
