@@ -117,7 +117,7 @@ def costs_of(
 def numbers(curve: Curve) -> dict[str, Any]:
     return {
         "ending": curve.ending,
-        "max_violation_m": curve.largest(0.0, 1.0),
+        "max_violation_m": curve.at_steps if np.isfinite(curve.at_steps) else None,
         "first_half_m": curve.largest(0.0, 0.5),
         "last_half_m": curve.largest(0.5, 1.0),
         "state_error": curve.error if np.isfinite(curve.error) else None,
@@ -133,7 +133,7 @@ def judged(
     growth = {
         name: c.largest(0.5, 1.0) / max(c.largest(0.0, 0.5), FLOOR) for name, c in curves.items()
     }
-    worst = {name: c.largest(0.0, 1.0) for name, c in by_method.items()}
+    worst = {name: c.at_steps for name, c in by_method.items()}
     held = [name for name in growth if name not in ("standard", *PROJECTING)]
     integrators = sorted({name for _, name in by_integrator})
     augmented = {name: by_integrator["augmented", name] for name in integrators}
@@ -215,11 +215,12 @@ def say(
         ("a hundred footsteps by rodas4", long),
     ):
         if curves:
-            options.say(f"{title}: largest violation in the first and last half, error, time")
+            options.say(f"{title}: violation in the first and last half, at steps, error, time")
         for name, curve in curves.items():
             options.say(
                 f"  {name:<20} {curve.ending:<14} {curve.largest(0.0, 0.5):.1e} m "
-                f"{curve.largest(0.5, 1.0):.1e} m  {curve.error:.1e}  {curve.seconds:.3f} s"
+                f"{curve.largest(0.5, 1.0):.1e} m  {curve.at_steps:.1e} m  "
+                f"{curve.error:.1e}  {curve.seconds:.3f} s"
             )
     options.say("time relative to the standard method: " + ", ".join(next(iter(costs.values()))))
     for name, row in costs.items():
@@ -261,7 +262,9 @@ def draw_all(options: Options, name: str, curves: dict[str, Curve], title: str) 
     dress(logarithmic, "logarithmic", "time (s)", "violation (m)")
     figure.suptitle(title, fontsize=10)
     handles, labels = linear.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), frameon=False)
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=min(len(labels), 4), frameon=False
+    )
     return saved(options, figure, name)
 
 

@@ -38,7 +38,7 @@ def by_xla(run: "Simulation") -> Trajectory:
     solver: Any = run.solver
     if isinstance(run.scene, RedundantScene):
         field = redundant_field
-        solver = projecting(run.scene, solver)
+        solver = projecting(run.scene, solver, run.adjoint)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(field),
         solver,

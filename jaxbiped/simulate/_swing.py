@@ -17,7 +17,7 @@ from jaxbiped.scene._constraint_method import AbstractProjectingMethod
 from jaxbiped.scene._linkage_scene import LinkageScene
 from jaxbiped.simulate._start import check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
-from jaxbiped.solve._projected import Projected
+from jaxbiped.solve._projected import wrapped
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._step_control import first_step, step_control
 
@@ -106,7 +106,7 @@ def _swung(
     adjoint: Any,
 ) -> Swing:
     if isinstance(scene.method, AbstractProjectingMethod):
-        solver = Projected(solver, _stepped_back)
+        solver = wrapped(solver, _stepped_back, adjoint)
     off = _distance(constraints_of(scene.linkage, *state))
     start = LinkageState(*map(tuple, nearest(scene.linkage, *state)))
     solution = diffrax.diffeqsolve(

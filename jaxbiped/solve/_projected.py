@@ -1,5 +1,6 @@
 """A solver whose steps end on the constraints."""
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -37,6 +38,11 @@ class Projected(diffrax.AbstractWrappedSolver):
         """The solver's."""
         return self.solver.interpolation_cls
 
+    @property
+    def scan_kind(self) -> Any:
+        """The solver's, where it has one: diffrax asks Runge–Kutta methods."""
+        return getattr(self.solver, "scan_kind", None)
+
     def order(self, terms: Any) -> int | None:
         """The solver's."""
         return self.solver.order(terms)
@@ -72,7 +78,16 @@ class Projected(diffrax.AbstractWrappedSolver):
         return y1, error, dense | ({"y1": y1} if "y1" in dense else {}), state, result
 
 
-def projecting(scene: RedundantScene, solver: Any) -> Any:
+def wrapped(solver: Any, project: Callable[[PyTree, PyTree], PyTree], adjoint: Any = None) -> Any:
+    """A `Projected` solver, ready for what will differentiate it."""
+    unset = getattr(solver, "scan_kind", "none") is None
+    if isinstance(adjoint, diffrax.ForwardMode) and unset:
+        # diffrax would set it, but cannot through a wrapper.
+        solver = dataclasses.replace(solver, scan_kind="lax")
+    return Projected(solver, project)
+
+
+def projecting(scene: RedundantScene, solver: Any, adjoint: Any = None) -> Any:
     """The solver, wrapped where the scene's method projects after each step."""
     projects = isinstance(scene.method, AbstractProjectingMethod)
-    return Projected(solver, projected) if projects else solver
+    return wrapped(solver, projected, adjoint) if projects else solver
