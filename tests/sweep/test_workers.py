@@ -4,6 +4,7 @@ import concurrent.futures
 import os
 import pickle
 import signal
+import sys
 import threading
 
 import distributed
@@ -17,7 +18,7 @@ from jaxbiped.lanes._engine import THREADS_VARIABLE, default_threads
 from jaxbiped.sweep._layout import Layout
 from jaxbiped.sweep._workers import _AHEAD, computed
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
-from tests.sweep.walkers import gaitless, same, same_results, simplest_grid
+from tests.sweep.walkers import gaitless, same, same_results, simplest_grid, with_attractor
 
 SCENE = simplest_walker(0.009)
 LABELLING = gaitless(SCENE, simplest_state(*STABLE))
@@ -38,13 +39,15 @@ def test_threads(expected):
         same_results(_swept(executor=pool, workers=3), expected)
 
 
-def test_labellings_and_layouts_travel(simplest):
-    for thing in (simplest, Layout.of(STARTS, 8)):
+def test_labellings_and_layouts_travel():
+    known = with_attractor(LABELLING)
+    for thing in (known, Layout.of(STARTS, 8)):
         copy = pickle.loads(pickle.dumps(thing))
         assert jtu.tree_structure(copy) == jtu.tree_structure(thing)
         same(copy, thing)
-    states = STARTS.batch(simplest, 0, 64).states
-    same(pickle.loads(pickle.dumps(simplest))(states), simplest(states))
+    found = known(STARTS.batch(known, 0, 64).states)
+    assert jb.Label.WALKING in found.label
+    same(pickle.loads(pickle.dumps(known))(STARTS.batch(known, 0, 64).states), found)
 
 
 def _killing(scene, states):
@@ -167,6 +170,14 @@ def test_a_cluster_one_of_whose_workers_is_killed(tmp_path):
     same_results(found, expected)
 
 
+def test_a_cluster_without_workers_is_told():
+    options = {"host": "127.0.0.1", "port": 0, "dashboard": False}
+    scheduler = {"cls": distributed.Scheduler, "options": options}
+    cluster = distributed.SpecCluster(workers={}, scheduler=scheduler)
+    with cluster, pytest.raises(jb.ArgumentError, match="has no workers: start at least one"):
+        jb.cluster_executor(cluster.scheduler_address)
+
+
 def test_a_cluster_that_is_not_there_is_told(monkeypatch):
     with pytest.raises(jb.ArgumentError) as raised:
         jb.cluster_executor("tcp://127.0.0.1:9", timeout=0.5)
@@ -177,6 +188,6 @@ def test_a_cluster_that_is_not_there_is_told(monkeypatch):
         jb.cluster_executor("nowhere", timeout=0.5)
     with pytest.raises(jb.ArgumentError, match="timeout = 0 is not allowed"):
         jb.cluster_executor("tcp://127.0.0.1:9", timeout=0)
-    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(jb.ArgumentError, match=r"pip install jaxbiped\[sweep\]"):
         jb.cluster_executor("tcp://127.0.0.1:9")
