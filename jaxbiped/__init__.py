@@ -134,6 +134,8 @@ from jaxbiped.simulate._simulate import simulate as simulate
 from jaxbiped.solve._solvers import SOLVERS as SOLVERS
 from jaxbiped.solve._trajectory import Trajectory as Trajectory
 from jaxbiped.sweep._attractor import Attractor as Attractor
+from jaxbiped.sweep._cluster import cluster_executor as cluster_executor
+from jaxbiped.sweep._cluster import local_executor as local_executor
 from jaxbiped.sweep._coordinates import coordinate_names as coordinate_names
 from jaxbiped.sweep._dimension import Dimension as Dimension
 from jaxbiped.sweep._dimension import boundary_dimension as boundary_dimension

@@ -1,6 +1,7 @@
 """Labelling by lanes: on every core's vectors, each lane going on to the next start."""
 
 import functools
+import threading
 from typing import Any
 
 import jax
@@ -12,12 +13,17 @@ from jaxbiped.lanes._engine import CompiledProgram
 from jaxbiped.lanes._program import Program
 from jaxbiped.sweep._course import AbstractCourse, Outcome, Start
 
+_MAKING = threading.Lock()
+"""Held while a program is made: of many threads one makes it, the others wait for it."""
+
 
 def labelled_by_lanes(course: AbstractCourse, starts: Start) -> Outcome:
     """Follows n starts until each is certain; NumPy's arrays (n, …) in and out."""
     leaves, structure = jtu.tree_flatten(starts)
     shapes = tuple(np.shape(leaf)[1:] for leaf in leaves)
-    outcome: Outcome = _compiled(course, structure, shapes).run(starts).outputs
+    with _MAKING:
+        program = _compiled(course, structure, shapes)
+    outcome: Outcome = program.run(starts).outputs
     return outcome
 
 

@@ -20,7 +20,7 @@ class Family(NamedTuple):
         table: their values, shape (P, q).
         rows: the gaits of each combination, P tuples; any may be empty.
         states: for each combination, a state on the section where starts take what they are not
-            told: its first gait's, else a neighbour's.
+            told: that of the gait that was found first, else a neighbour's, else the guess.
         scales: size of each component of the state, shape (P, m).
     """
 
@@ -57,6 +57,13 @@ class Family(NamedTuple):
         rows = self.row_of(parameters)
         columns = zip(*tables, strict=True)
         return Goals(*[np.stack(column)[rows] for column in columns]), periods
+
+    def places_in(self, other: "Family") -> np.ndarray:
+        """Where another family, with more gaits, has what this one has at each position."""
+        own, new = self.periods, other.periods
+        if not any(self.rows):
+            return np.zeros(1, dtype=int)
+        return np.array([new.index(p) + i - own.index(p) for i, p in enumerate(own)])
 
     def row_of(self, parameters: Mapping[str, np.ndarray]) -> np.ndarray:
         """The combination that each start has, shape (n,).

@@ -72,7 +72,8 @@ def with_gaits(
             ]
             # Stable by period, so that positions follow from the cycles' lengths.
             rows[k] = tuple(sorted([*rows[k], *new], key=lambda gait: gait.period))
-    return _family(scene, family.names, family.table, tuple(rows), family.states[0])
+    # What starts take that they are not told stays, else they would be other starts.
+    return family._replace(rows=tuple(rows))
 
 
 def scene_with(scene: Any, names: Sequence[str], values: np.ndarray) -> Any:

@@ -1,6 +1,7 @@
 """Many starts of many scenes followed until each is certain, by either engine."""
 
 import functools
+import threading
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -22,6 +23,8 @@ _LONGEST = 1e6
 """Simulated time [s] that no start takes: its footsteps or its patience end it before."""
 _PATIENCE = 50.0
 """Longest time between two footsteps, in units of √(l/g)."""
+
+_MAKING = threading.Lock()
 
 
 class Effort(NamedTuple):
@@ -70,7 +73,8 @@ def follow(
         solve = Solve(**common, almost=last, atol=atol, patience=same(np.inf))
     waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
-    course = _course(isinstance(scene, RigidScene), effort.solver, periods, effort.engine)
+    with _MAKING:
+        course = _course(isinstance(scene, RigidScene), effort.solver, periods, effort.engine)
     if not count:
         return _nothing(len(states) - 1)
     run = labelled_by_lanes if effort.engine == "lanes" else labelled_by_xla

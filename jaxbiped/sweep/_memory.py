@@ -23,14 +23,17 @@ class Memory:
     def missing(self) -> np.ndarray:
         return np.arange(self.layout.chunks)
 
-    def write(self, chunk: int, fields: dict[str, np.ndarray]) -> None:
+    def unsettled(self) -> np.ndarray:
+        return self.missing()
+
+    def write(self, chunk: int, fields: dict[str, np.ndarray], *, settled: bool = False) -> None:
         region, shape = self.layout.region(chunk), self.layout.shape_of(chunk)
         for name, values in fields.items():
             self._dataset[name].data[region] = np.reshape(values, shape)
 
     def read(self, chunk: int, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         region = self.layout.region(chunk)
-        return {name: self._dataset[name].data[region].ravel() for name in names}
+        return {name: self._dataset[name].data[region].flatten() for name in names}
 
     def note(self, attributes: dict[str, Any]) -> None:
         self._dataset.attrs.update(attributes)

@@ -20,6 +20,8 @@ SETTINGS = "settings"
 GAITS = "gaits"
 """Of the settings, what a run finds for itself."""
 _DONE = "done"
+_SETTLED = 2
+"""Mark of a chunk that was gone over again after gaits were found late."""
 _CLOSE = 1e-6
 """Relative difference of two gaits' numbers that counts as none."""
 
@@ -81,8 +83,12 @@ class Store:
         """Numbers of the chunks that are not complete."""
         return np.flatnonzero(self._done == 0)
 
-    def write(self, chunk: int, fields: Mapping[str, np.ndarray]) -> None:
-        """Writes a chunk, then marks it as complete.
+    def unsettled(self) -> np.ndarray:
+        """Numbers of the chunks that were not written with all gaits known."""
+        return np.flatnonzero(self._done < _SETTLED)
+
+    def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, settled: bool = False) -> None:
+        """Writes a chunk, then marks it as complete; `settled` where all gaits are known by now.
 
         Raises:
             ArgumentError: it cannot be written; what was written before stays.
@@ -95,7 +101,7 @@ class Store:
                 self._mark(chunk, 0)
             for name, values in fields.items():
                 self._group[name][region] = np.reshape(values, shape)
-            self._mark(chunk, 1)
+            self._mark(chunk, _SETTLED if settled else 1)
         except OSError as error:
             raise unwritable(self.path, error) from None
 
@@ -106,7 +112,7 @@ class Store:
     def read(self, chunk: int, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         """These fields of one chunk, flat."""
         region = self.layout.region(chunk)
-        return {name: np.asarray(self._group[name][region]).ravel() for name in names}
+        return {name: np.array(self._group[name][region]).ravel() for name in names}
 
     def note(self, attributes: Mapping[str, Any]) -> None:
         """Sets attributes.
@@ -180,7 +186,7 @@ def _create(
             )
             if not own:
                 array[:] = variable.values
-        done: Any = {"long_name": "whether the chunk is complete"}
+        done: Any = {"long_name": "whether the chunk is complete; 2 after gaits were found late"}
         group.create_array(
             _DONE,
             shape=(layout.chunks,),

@@ -14,7 +14,7 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped.sweep._arguments import check_whole
 from jaxbiped.sweep._label import Label
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._layout import Layout, fields_of
+from jaxbiped.sweep._layout import FIELDS, Layout, fields_of
 from jaxbiped.sweep._memory import Memory
 from jaxbiped.sweep._prepare import Guesses, guesses_among, with_gaits_met, with_guesses
 from jaxbiped.sweep._provenance import provenance
@@ -109,7 +109,7 @@ def sweep(
 
 
 def _resolved(labelling: Labelling, layout: Layout, sink: Any) -> Labelling:
-    """Seeks gaits from starts that are unresolved but repeat a cycle, and labels those anew.
+    """Seeks gaits from starts that are unresolved but repeat a cycle; labels the unresolved anew.
 
     Where they were sought is noted first: a run that is killed here finds the same ones again,
     whatever is labelled anew by then.
@@ -123,17 +123,19 @@ def _resolved(labelling: Labelling, layout: Layout, sink: Any) -> Labelling:
     known = with_guesses(labelling, guesses)
     if [len(row) for row in known.family.rows] == [len(row) for row in labelling.family.rows]:
         return labelling
-    for chunk in range(layout.chunks):
-        places = _open(sink, chunk)
+    moved = labelling.family.places_in(known.family)
+    for chunk in map(int, sink.unsettled()):
+        fields = sink.read(chunk, (*FIELDS, *(f"start_{x}" for x in layout.starts.own_columns)))
+        places = np.flatnonzero(fields["label"] == int(Label.UNRESOLVED))
+        met = fields["gait"] >= 0
+        fields["gait"][met] = moved[fields["gait"][met]]
         if len(places):
-            numbers = layout.numbers(chunk)[0] + places
-            batch = layout.starts.at(known, numbers)
+            batch = layout.starts.at(known, layout.numbers(chunk)[0] + places)
             found = known(batch.states, parameters=batch.parameters)
-            new = fields_of(layout.starts, found, batch)
-            fields = {name: np.array(old) for name, old in sink.read(chunk, tuple(new)).items()}
-            for name, values in new.items():
+            for name, values in fields_of(layout.starts, found, batch).items():
                 fields[name][places] = values
-            sink.write(chunk, fields)
+        if len(places) or met.any():
+            sink.write(chunk, fields, settled=True)
     return known
 
 

@@ -79,52 +79,21 @@ def test_a_killed_run_continues_where_it_was(tmp_path):
     same_results(found, _swept(starts=starts, chunk=100_000))
 
 
-class _Killed(BaseException):
-    pass
-
-
-@pytest.mark.parametrize("writes", [0, 1])
-def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, writes):
-    """After the labels comes a second round; wherever it is cut off, the results are the same."""
-    path = tmp_path / "store"
-    # No start is looked at beforehand, so that the gait is found from the unresolved ones.
-    monkeypatch.setattr(SWEEP, "with_gaits_met", lambda labelling, starts: labelling)
-    expected = jb.sweep(LABELLING, STARTS, chunk=8)
-    assert jb.Label.WALKING in expected.label
-    assert len(json.loads(expected.attrs["gaits"])[0]["gaits"]) == 1
-    write, count = Store.write, []
-
-    def killing(self, chunk, fields):
-        count.append(chunk)
-        if len(count) > self.layout.chunks + writes:
-            # As if amid its arrays: some are new, others old, and the chunk is not complete.
-            self._mark(chunk, 0)
-            self._group["label"][self.layout.region(chunk)] = 77
-            raise _Killed
-        write(self, chunk, fields)
-
-    monkeypatch.setattr(Store, "write", killing)
-    with pytest.raises(_Killed):
-        jb.sweep(LABELLING, STARTS, store=path, chunk=8)
-    monkeypatch.setattr(Store, "write", write)
-    same_results(jb.sweep(LABELLING, STARTS, store=path, chunk=8), expected)
-
-
-def _scene(slope):
-    return gaitless(simplest_walker(slope), simplest_state(*STABLE))
+_SLOPE = simplest_walker(0.01)
+_GUESS = simplest_state(*STABLE)
 
 
 @pytest.mark.parametrize(
     ("other", "difference"),
     [
-        (dict(labelling=gaitless(SCENE, simplest_state(*STABLE), rtol=1e-5)), "effort.rtol = 1e-06 there, 1e-05 here"),
-        (dict(labelling=gaitless(SCENE, simplest_state(*STABLE), footsteps=9)), "effort.footsteps = 12 there, 9 here"),
-        (dict(labelling=_scene(0.01)), "scene.slope = 0.009 there, 0.01 here"),
+        (dict(labelling=gaitless(SCENE, _GUESS, rtol=1e-5)), "effort.rtol = 1e-06 there, 1e-05"),
+        (dict(labelling=gaitless(SCENE, _GUESS, footsteps=9)), "footsteps = 12 there, 9 here"),
+        (dict(labelling=gaitless(_SLOPE, _GUESS)), "scene.slope = 0.009 there, 0.01 here"),
         (dict(starts=simplest_grid(SCENE, 9)), r"starts.grid.theta_stance = \["),
-        (dict(starts=jb.sample(SCENE, {"theta_stance": (0.1, 0.2)}, 4)), "starts.sample is not in the store"),
+        (dict(starts=jb.sample(SCENE, {"theta_stance": (0.1, 0.2)}, 4)), "starts.sample is not in"),
         (dict(chunk=8), r"chunk_shape\[0\] = 2 there, 1 here"),
     ],
-)  # fmt: skip
+)
 def test_other_settings_are_refused_by_name(tmp_path, other, difference):
     _swept(tmp_path / "store")
     with pytest.raises(jb.ArgumentError, match=f"made with other settings: .*{difference}"):
@@ -135,7 +104,7 @@ def test_other_settings_are_refused_before_gaits_are_sought(tmp_path, monkeypatc
     _swept(tmp_path / "store")
     monkeypatch.setattr(SWEEP, "with_gaits_met", None)
     with pytest.raises(jb.ArgumentError, match="other settings"):
-        jb.sweep(_scene(0.01), STARTS, store=tmp_path / "store", chunk=16)
+        jb.sweep(gaitless(_SLOPE, _GUESS), STARTS, store=tmp_path / "store", chunk=16)
 
 
 def test_a_directory_of_something_else_is_refused(tmp_path):
@@ -212,7 +181,7 @@ def test_a_directory_without_permission_is_told(tmp_path, monkeypatch):
 
 
 def test_memory_is_bounded_by_the_chunk(tmp_path, monkeypatch):
-    """A grid of four hundred million starts: what is made of it at once, and what a store of it takes."""
+    """A grid of 400 million starts: what is made of it at once, and what a store of it takes."""
     axes = {
         "theta_stance": np.linspace(0.1, 0.3, 20_000),
         "omega_stance": np.linspace(-0.3, -0.1, 20_000),

@@ -4,6 +4,7 @@ import concurrent.futures
 import os
 import pickle
 import signal
+import sys
 import threading
 
 import distributed
@@ -14,11 +15,10 @@ import zarr
 
 import jaxbiped as jb
 from jaxbiped.lanes._engine import THREADS_VARIABLE, default_threads
-from jaxbiped.sweep._cluster import cluster_executor, local_executor
 from jaxbiped.sweep._layout import Layout
 from jaxbiped.sweep._workers import _AHEAD, computed
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
-from tests.sweep.walkers import gaitless, same, same_results, simplest_grid
+from tests.sweep.walkers import gaitless, same, same_results, simplest_grid, with_attractor
 
 SCENE = simplest_walker(0.009)
 LABELLING = gaitless(SCENE, simplest_state(*STABLE))
@@ -39,13 +39,15 @@ def test_threads(expected):
         same_results(_swept(executor=pool, workers=3), expected)
 
 
-def test_labellings_and_layouts_travel(simplest):
-    for thing in (simplest, Layout.of(STARTS, 8)):
+def test_labellings_and_layouts_travel():
+    known = with_attractor(LABELLING)
+    for thing in (known, Layout.of(STARTS, 8)):
         copy = pickle.loads(pickle.dumps(thing))
         assert jtu.tree_structure(copy) == jtu.tree_structure(thing)
         same(copy, thing)
-    states = STARTS.batch(simplest, 0, 64).states
-    same(pickle.loads(pickle.dumps(simplest))(states), simplest(states))
+    found = known(STARTS.batch(known, 0, 64).states)
+    assert jb.Label.WALKING in found.label
+    same(pickle.loads(pickle.dumps(known))(STARTS.batch(known, 0, 64).states), found)
 
 
 def _killing(scene, states):
@@ -57,7 +59,7 @@ def _killing(scene, states):
 
 def test_spawned_processes_and_one_that_dies(tmp_path, expected):
     killing = jb.grid(SCENE, STARTS.values, follow=_killing)
-    with local_executor(2) as pool:
+    with jb.local_executor(2) as pool:
         assert pool.submit(os.getenv, THREADS_VARIABLE).result() == str(
             max(1, default_threads() // 2)
         )
@@ -76,7 +78,7 @@ def test_spawned_processes_and_one_that_dies(tmp_path, expected):
 def test_what_cannot_be_sent_to_processes_is_refused():
     starts = jb.grid(SCENE, {"theta_stance": [0.2]}, follow=lambda scene, states: states)
     with (
-        local_executor(1) as pool,
+        jb.local_executor(1) as pool,
         pytest.raises(jb.ArgumentError, match="must be a module's own"),
     ):
         _swept(starts=starts, executor=pool)
@@ -85,7 +87,7 @@ def test_what_cannot_be_sent_to_processes_is_refused():
 @pytest.mark.parametrize("workers", [0, 1.5, None])
 def test_workers_are_counted(workers):
     with pytest.raises(jb.ArgumentError, match=f"workers = {workers} is not allowed"):
-        local_executor(workers)
+        jb.local_executor(workers)
     with pytest.raises(jb.ArgumentError, match=f"workers = {workers} is not allowed"):
         _swept(workers=workers)
 
@@ -147,7 +149,7 @@ def test_a_cluster_one_of_whose_workers_is_killed(tmp_path):
         2, processes=True, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
     )
     with cluster:
-        executor, threads = cluster_executor(cluster.scheduler_address)
+        executor, threads = jb.cluster_executor(cluster.scheduler_address)
         assert threads == 2
         watch = _Watch(tmp_path / "store", cluster.workers[0].pid, 10)
         watch.start()
@@ -168,16 +170,24 @@ def test_a_cluster_one_of_whose_workers_is_killed(tmp_path):
     same_results(found, expected)
 
 
+def test_a_cluster_without_workers_is_told():
+    options = {"host": "127.0.0.1", "port": 0, "dashboard": False}
+    scheduler = {"cls": distributed.Scheduler, "options": options}
+    cluster = distributed.SpecCluster(workers={}, scheduler=scheduler)
+    with cluster, pytest.raises(jb.ArgumentError, match="has no workers: start at least one"):
+        jb.cluster_executor(cluster.scheduler_address)
+
+
 def test_a_cluster_that_is_not_there_is_told(monkeypatch):
     with pytest.raises(jb.ArgumentError) as raised:
-        cluster_executor("tcp://127.0.0.1:9", timeout=0.5)
+        jb.cluster_executor("tcp://127.0.0.1:9", timeout=0.5)
     sentence = str(raised.value)
     assert sentence.startswith("scheduler = 'tcp://127.0.0.1:9' does not answer (")
     assert "\n" not in sentence
     with pytest.raises(jb.ArgumentError, match="scheduler = 'nowhere' does not answer"):
-        cluster_executor("nowhere", timeout=0.5)
+        jb.cluster_executor("nowhere", timeout=0.5)
     with pytest.raises(jb.ArgumentError, match="timeout = 0 is not allowed"):
-        cluster_executor("tcp://127.0.0.1:9", timeout=0)
-    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+        jb.cluster_executor("tcp://127.0.0.1:9", timeout=0)
+    monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(jb.ArgumentError, match=r"pip install jaxbiped\[sweep\]"):
-        cluster_executor("tcp://127.0.0.1:9")
+        jb.cluster_executor("tcp://127.0.0.1:9")

@@ -20,6 +20,15 @@ def gaitless(scene, state, **options):
     return jb.Labelling(scene, jb.Family((), np.zeros((1, 0)), ((),), (state,), scales), effort)
 
 
+def with_attractor(labelling):
+    """A labelling told that its own state is a gait's, which draws in whatever comes near."""
+    (state,) = labelling.family.states
+    metric = np.linalg.qr(np.random.default_rng(0).standard_normal((4, 4)))[0][:3]
+    gait = jb.Attractor(1, 3.88, 0.398, state, np.full(3, 0.5), metric, 0.75, 1e-2)
+    family = labelling.family._replace(rows=((gait,),))
+    return jb.Labelling(labelling.scene, family, labelling.effort)
+
+
 def stacked(states):
     """Single states as one with leaves of shape (n,)."""
     columns = zip(*states, strict=True)

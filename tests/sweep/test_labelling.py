@@ -1,0 +1,285 @@
+"""Labels against an independent truth, whatever else is in the batch."""
+
+import jax.tree_util as jtu
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import jaxbiped as jb
+from jaxbiped.sweep._by_xla import labelled_by_xla
+from tests.rigid_walkers import FIRST_DOUBLING, STABLE, simplest_state, simplest_walker
+from tests.sweep.truth import rigid_fate, seed_fate
+from tests.sweep.walkers import gaitless, rows, same, simplest_grid, stacked
+
+SEED_STARTS = [
+    *[(0.0, -0.8), (0.02, -0.7), (-0.01, -0.65)],
+    *[(0.05, -1.5), (0.11, -1.8), (0.11, -1.5), (0.17, -1.8)],
+    *[(0.17, -0.4), (0.23, -0.7), (0.29, -0.6), (0.35, -1.2), (0.3, -1.0)],
+]
+"""Angle and rate of the stance leg: some that walk, some that fall, some that stop."""
+
+
+def _seed_batch(labelling):
+    parts = [
+        jb.grid(labelling.scene, {"theta_stance": [a], "omega_stance": [w]}, place=True)
+        for a, w in SEED_STARTS
+    ]
+    return stacked([rows(part.batch(labelling, 0, 1).states, 0) for part in parts])
+
+
+def test_the_seed_by_radau(seed):
+    states = _seed_batch(seed)
+    found = seed(states)
+    point = seed.family.rows[0][0].point
+    fates = []
+    for i in range(len(SEED_STARTS)):
+        start = np.array([leaf[i] for leaf in states])
+        walks = found.label[i] == jb.Label.WALKING
+        fate, time, met = seed_fate(start, 3.0 if walks else found.time[i] + 1.0)
+        fates.append(fate)
+        assert found.names[i] == ("walking period-1" if fate == "walking" else fate)
+        if fate == "walking":
+            off = np.linalg.norm((met - point) / seed.family.scales[0], axis=1)
+            assert off[-1] < 0.5 * off[1]
+            assert np.linalg.norm((met[-1] - met[-2]) / seed.family.scales[0]) < 0.1 * off[0] + 0.02
+        else:
+            # A fall is noticed at the end of a step.
+            assert found.time[i] == pytest.approx(time, abs=0.05)
+    assert {"walking", "fell forward", "stopped"} == set(fates)
+
+
+def test_the_simplest_walker_by_its_own_equations(simplest):
+    starts = simplest_grid(simplest.scene, 4)
+    states = starts.batch(simplest, 0, 16).states
+    found = simplest(states)
+    fates = []
+    for i in range(16):
+        fate, count, met = rigid_fate(simplest.scene, rows(states, i), 12)
+        fates.append(fate)
+        assert found.names[i] == ("walking period-1" if fate == "walking" else fate)
+        if fate == "walking":
+            assert abs(met[-1, 1] - STABLE[0]) < 1e-2
+            assert abs(met[-1, 3] - STABLE[1]) < 1e-2
+        elif fate == "fell forward":
+            # A walker that falls back may swing its leg past the ground before it is down.
+            assert found.footsteps[i] == count
+    assert {"walking", "fell forward", "fell back"} == set(fates)
+
+
+def test_a_walker_without_friction_slides():
+    seed = jb.seed_scene()
+    scene = jb.Scene(
+        walker=seed.walker,
+        ground=seed.ground,
+        normal=jb.Hertz(K=1e6),
+        friction=jb.Frictionless(),
+        clearance=jb.AlwaysTouching(),
+    )
+    labelling = gaitless(scene, jb.seed_state(), accuracy="fast")
+    axes = {"theta_stance": [0.0], "theta_swing": [0.0], "omega_stance": [0.0], "hip_vx": [4.0]}
+    axes["omega_swing"] = [0.0]
+    found = labelling(jb.grid(scene, axes, place=True).batch(labelling, 0, 1).states)
+    assert found.names[0] == "slid"
+    # It is over as soon as a foot has slid by a leg's length.
+    assert found.distance[0] == pytest.approx(float(scene.walker.l), rel=0.3)
+    assert found.time[0] == pytest.approx(float(scene.walker.l) / 4.0, rel=0.3)
+
+
+def test_a_start_without_any_verdict_is_unresolved_and_a_cap_is_told(simplest):
+    state = stacked([simplest_state(*STABLE)])
+    none = gaitless(simplest.scene, simplest_state(*STABLE), footsteps=2)(state)
+    assert (none.names[0], none.footsteps[0], none.period[0]) == ("unresolved", 2, 0)
+    again = gaitless(simplest.scene, simplest_state(*STABLE))(state)
+    assert (again.names[0], again.period[0], again.gait[0]) == ("unresolved", 1, -1)
+    assert again.footsteps[0] < 12
+    capped = gaitless(simplest.scene, simplest_state(*STABLE), max_solver_steps=5)(state)
+    assert (capped.names[0], capped.attempts[0]) == ("out of steps", 5)
+
+
+def test_the_gait_itself_walks_and_its_rate_is_not_made_up(simplest, seed):
+    for labelling in (simplest, seed):
+        found = labelling(labelling.base({}, 1))
+        assert found.names[0] == "walking period-1"
+        assert found.gait[0] == 0
+        assert found.closest[0] < 1e-3
+        assert not found.rate[0] >= 1.0
+        assert found.rate[0] != 0.0
+
+
+def test_starts_just_within_the_radius_converge(simplest, seed):
+    for labelling in (simplest, seed):
+        gait = labelling.family.rows[0][0]
+        tangents = np.linalg.pinv(gait.metric)
+        directions = np.random.default_rng(3).standard_normal((16, len(gait.point) - 1))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        points = gait.point + 0.99 * gait.radius * directions @ tangents.T
+        np.testing.assert_allclose(gait.distance(points), 0.99 * gait.radius, rtol=1e-9)
+        states = type(gait.state)(np.zeros(16), *points.T)
+        # Without a gait to compare with, all of 30 footsteps are walked.
+        walked = gaitless(labelling.scene, gait.state, footsteps=30)
+        walked = jb.Labelling(walked.scene, walked.family, walked.effort._replace(gap=0.0))
+        final = walked(states)
+        assert np.all(final.footsteps == 30)
+        assert np.all(gait.distance(final.final) < 1e-2 * gait.radius)
+        assert np.all(labelling(states).label == jb.Label.WALKING)
+
+
+POISON = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-310, 50.0]
+
+
+@given(st.sampled_from(POISON), st.integers(0, 7), st.integers(0, 15), st.booleans())
+@settings(max_examples=12, deadline=None)
+def test_a_poisoned_lane_changes_no_other(seed, value, leaf, lane, everything):
+    states = rows(_seed_batch(seed), np.resize(np.arange(len(SEED_STARTS)), 16))
+    good = seed(states)
+    bad = [np.array(each) for each in states]
+    for i, each in enumerate(bad):
+        if i == leaf or everything:
+            each[lane] = value
+    found = seed(jb.State(*bad))
+    others = np.arange(16) != lane
+    same(rows(found, others), rows(good, others))
+    assert int(found.label[lane]) in set(jb.Label) - {jb.Label.PENDING}
+    if not np.isfinite(value) and leaf > 0:
+        assert found.names[lane] == "solver failed"
+
+
+def test_a_lone_start_is_labelled_as_in_any_batch(seed, simplest, monkeypatch):
+    for labelling, states in (
+        (seed, _seed_batch(seed)),
+        (simplest, simplest_grid(simplest.scene, 4).batch(simplest, 0, 16).states),
+    ):
+        whole = labelling(states)
+        count = len(whole.label)
+        for i in (0, count // 2, count - 1):
+            same(labelling(rows(states, [i])), rows(whole, [i]))
+        same(labelling(rows(states, slice(None, None, -1))), rows(whole, slice(None, None, -1)))
+        monkeypatch.setenv("JAXBIPED_THREADS", "3")
+        same(labelling(states), whole)
+        monkeypatch.delenv("JAXBIPED_THREADS")
+
+
+def test_both_engines_give_the_same_labels(simplest, monkeypatch):
+    monkeypatch.setattr(labelled_by_xla, "__kwdefaults__", {"slots": 24})
+    effort = simplest.effort._replace(engine="xla")
+    # More starts than slots, so that slots are filled anew.
+    states = simplest_grid(simplest.scene, 7).batch(simplest, 0, 49).states
+    states = states._replace(theta_2=np.where(np.arange(49) == 11, np.nan, states.theta_2))
+    ours, theirs = simplest(states), jb.Labelling(simplest.scene, simplest.family, effort)(states)
+    for name in ("label", "gait", "period", "footsteps"):
+        np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), err_msg=name)
+    walks = ours.label == jb.Label.WALKING
+    assert walks.sum() > 3
+    np.testing.assert_allclose(ours.time[walks], theirs.time[walks], rtol=1e-6)
+    np.testing.assert_allclose(ours.closest[walks], theirs.closest[walks], rtol=1e-3)
+
+
+@pytest.fixture(scope="module")
+def beyond_doubling():
+    """A labelling beyond the slope at which the walker's gait of one footstep loses stability."""
+    guess = simplest_state(0.235, -0.235)
+    scene = simplest_walker(0.0152)
+    assert float(scene.ground.slope) > FIRST_DOUBLING
+    return jb.labelling(scene, guess=guess, accuracy="balanced", footsteps=60)
+
+
+def test_a_gait_of_two_footsteps_is_met_and_named(beyond_doubling):
+    assert beyond_doubling.family.rows == ((),)
+    states = stacked([simplest_state(0.23 + 0.001 * i, -0.23 - 0.001 * i) for i in range(3)])
+    before = beyond_doubling(states)
+    assert (before.names[0], before.period[0]) == ("unresolved", 2)
+    known = jb.with_gaits_met(beyond_doubling, jb.GivenStarts(states))
+    (gait,) = known.family.rows[0]
+    assert gait.period == 2
+    radius = abs(gait.multipliers[0])
+    assert 0.5 < radius < 1.0
+    found = known(states)
+    assert found.names[0] == "walking period-2"
+    assert (found.gait[0], found.period[0]) == (0, 2)
+    # The last cycle of a walk that ends near a gait shrinks as its largest multiplier says.
+    assert found.rate[0] == pytest.approx(np.sqrt(radius), rel=5e-3)
+
+
+def test_gaits_are_those_of_each_parameter(simplest):
+    slopes = [0.008, 0.009]
+    guess = simplest.family.states[0]
+    own = jb.labelling(
+        simplest.scene, parameters={"slope": slopes}, guess=guess, accuracy="balanced"
+    )
+    assert len(own.family.rows) == 2
+    low, high = (row[0] for row in own.family.rows)
+    np.testing.assert_allclose(high.point, simplest.family.rows[0][0].point, atol=1e-7)
+    assert low.point[1] < high.point[1] - 5e-3
+    starts = jb.grid(simplest.scene, {"slope": slopes, "omega_swing": [-0.17, -0.18]})
+    found = jb.sweep(own, starts)
+    assert np.all(found.label == jb.Label.WALKING)
+    # Starts take from the gait of their own slope what they are not told.
+    np.testing.assert_array_equal(
+        starts.batch(own, 0, 4).states.theta_2,
+        low.point[[1] * 2].tolist() + high.point[[1] * 2].tolist(),
+    )
+    with pytest.raises(jb.ArgumentError, match=r"slope = 0\.0085 is not allowed: no gait was"):
+        jb.sweep(own, jb.grid(simplest.scene, {"slope": [0.0085]}))
+    with pytest.raises(jb.ArgumentError, match="the gaits are known for"):
+        own(starts.batch(own, 0, 4).states)
+    # Without gaits for its parameters a sample is labelled by what repeats itself.
+    sampled = jb.sweep(simplest, jb.sample(simplest.scene, {"slope": (0.0085, 0.0095)}, 4))
+    assert np.all(sampled.label == jb.Label.WALKING)
+    assert np.all(sampled.gait == -1)
+    assert np.all(sampled.period == 1)
+
+
+def _states(*shapes):
+    return jb.State(*[np.zeros(shape) for shape in shapes])
+
+
+@pytest.mark.parametrize(
+    ("call", "reason"),
+    [
+        (lambda it: jb.labelling(it.scene, footsteps=0), "footsteps = 0 .* whole number"),
+        (lambda it: jb.labelling(it.scene, footsteps=2.5), "footsteps = 2.5 .* whole number"),
+        (lambda it: jb.labelling(it.scene, accuracy="best"), "accuracy = 'best' .* fast"),
+        (lambda it: jb.labelling(it.scene, rtol=-1.0), "rtol = -1 .* above 0"),
+        (lambda it: jb.labelling(it.scene, engine="gpu"), "engine = 'gpu'"),
+        (lambda it: jb.labelling(it.scene, solver="kvaerno3"), "rodas3p to rodas5p"),
+        (lambda it: jb.labelling("walker"), "scene = 'walker' .* Scene"),
+        (lambda it: jb.labelling(it.scene, parameters={"hip_vx": [1.0]}), "'hip_vx' is not known"),
+        (lambda it: jb.labelling(it.scene, parameters={"K": [1e6, -1.0]}), "K = -1 .* above 0"),
+        (lambda it: jb.labelling(it.scene, parameters={"K": []}), r"K has values of shape \(0,\)"),
+        (lambda it: jb.labelling(it.scene, parameters={"K": [np.nan]}), "K = nan"),
+        (lambda it: it(simplest_state(*STABLE)), "states = .* must be a State"),
+        (lambda it: it(_states(*[2] * 7, 3)), r"states has leaves of shapes \[\(2,\), \(3,\)\]"),
+        (lambda it: it(jb.seed_state()), r"all of them must be \(n,\)"),
+        (lambda it: it(_states(*[2] * 8), parameters={"K": [1e6]}), r"parameters\['K'\] has shape"),
+        (lambda it: it(_states(*[1] * 8), parameters={"K": [-1.0]}), "K = -1"),
+        (lambda it: it(_states(*[1] * 8), parameters={"k": [1.0]}), "parameter = 'k' is not"),
+        (lambda it: jb.sweep(it, jb.grid(it.scene, {"hip_vx": [0.5]}), chunk=0), "chunk = 0"),
+        (lambda it: jb.sweep(it, [1.0]), "starts = .* AbstractStarts"),
+        (lambda it: jb.sweep(it, jb.GivenStarts(_states(*[0] * 8))), "starts is empty"),
+        (lambda it: jb.with_gaits_met(it, None, count=0), "count = 0"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_refused_in_one_sentence(call, reason):
+    labelling = gaitless(jb.seed_scene(), jb.seed_state())
+    with pytest.raises(jb.ArgumentError, match=reason) as raised:
+        call(labelling)
+    assert str(raised.value).endswith(".")
+
+
+def test_bristles_start_straight():
+    seed = jb.seed_scene()
+    scene = jb.Scene(
+        walker=seed.walker,
+        ground=seed.ground,
+        normal=seed.normal,
+        friction=jb.LuGre(mu_static=0.5, mu_kinetic=0.4, v_s=1e-3, sigma_0=5e4, sigma_1=100.0),
+        clearance=seed.clearance,
+    )
+    straight = jb.BristleState(*jb.seed_state(), *[np.zeros(())] * 2)
+    labelling = gaitless(scene, straight, accuracy="fast", footsteps=1)
+    short, full = (stacked([state] * 2) for state in (jb.seed_state(), straight))
+    same(labelling(short), labelling(full))
+    found = jb.sweep(labelling, jb.GivenStarts(short), look_for_gaits=False)
+    assert found.start_hip_z.shape == (2,)
+    assert jtu.tree_leaves(labelling.settings()["scene"])
