@@ -9,6 +9,8 @@ FELL = 1.0
 """Angle of the stance leg [rad] from upright at which the hip has fallen."""
 WAIT = 50.0
 """Longest time between two strikes, in units of √(l/g)."""
+DEPARTING = 1e-3
+"""Time in which the foot behind leaves the ground."""
 STABLE = {0.004: (0.153389, -0.156080), 0.009: (0.200310900544287, -0.199832473004977)}
 """Stance angle and rate of the gait after a strike: published at 0.009, a guess at 0.004."""
 
@@ -49,25 +51,27 @@ def strike_map(point: np.ndarray, slope: float) -> tuple[np.ndarray, str]:
         ]
 
     def strike(t: float, y: np.ndarray) -> float:
-        # A leg behind (φ above 0), and the moment of departure, are no strikes.
-        return y[1] - 2.0 * y[0] if y[1] < 0.0 and t > 1e-3 else -1.0
+        return y[1] - 2.0 * y[0]
 
     def fall(t: float, y: np.ndarray) -> float:
         return FELL - abs(y[0])
 
     strike.terminal = fall.terminal = True  # type: ignore[attr-defined]
     strike.direction = 1.0  # type: ignore[attr-defined]
+    options: dict[str, Any] = dict(rtol=1e-10, atol=1e-12, max_step=0.05, method="DOP853")
     theta, rate = point
-    start = [theta, 2.0 * theta, rate, rate * (1.0 - np.cos(2.0 * theta))]
-    options: dict[str, Any] = dict(events=(strike, fall), rtol=1e-10, atol=1e-12, max_step=0.05)
-    found = solve_ivp(rates, (0.0, WAIT), start, method="DOP853", **options)
-    last = found.y[:, -1]
-    if found.t_events[0].size:
-        theta, _, rate, _ = found.y_events[0][0]
-        return np.array([-theta, np.cos(2.0 * theta) * rate]), "strike"
-    if found.t_events[1].size:
-        return last[[0, 2]], "fell forward" if last[0] < 0.0 else "fell back"
-    return last[[0, 2]], "out of steps"
+    time, y = 0.0, np.array([theta, 2.0 * theta, rate, rate * (1.0 - np.cos(2.0 * theta))])
+    while time < WAIT:
+        # Departing, and with the leg behind, a foot on the ground is no strike.
+        y = solve_ivp(rates, (time, time + DEPARTING), y, **options).y[:, -1]
+        time += DEPARTING
+        found = solve_ivp(rates, (time, WAIT + 1.0), y, events=(strike, fall), **options)
+        time, y = float(found.t[-1]), found.y[:, -1]
+        if found.t_events[1].size:
+            return y[[0, 2]], "fell forward" if y[0] < 0.0 else "fell back"
+        if found.t_events[0].size and y[1] < 0.0:
+            return np.array([-y[0], np.cos(2.0 * y[0]) * y[2]]), "strike"
+    return y[[0, 2]], "out of steps"
 
 
 def walks(point: np.ndarray, gait: np.ndarray, slope: float, *, footsteps: int) -> bool:

@@ -20,7 +20,7 @@ SLOPES = (0.004, 0.009)
 SIDES, QUICK_SIDES = (200, 400), (100, 200)
 TOLERANCES = {"fast": 1e-4, "balanced": 1e-6}
 DRAWN, QUICK_DRAWN = 400, 100
-CHECKED, QUICK_CHECKED = 100, 12
+CHECKED, QUICK_CHECKED = 300, 40
 """Starts that SciPy walks too, at each slope."""
 
 

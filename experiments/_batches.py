@@ -1,0 +1,50 @@
+"""Batches of starts to label, and how long that takes."""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import _basin_slice
+import numpy as np
+
+import jaxbiped as jb
+
+RIGID = {"theta_stance": (0.1, 0.4), "omega_stance": (-2.4, -0.6)}
+"""Starts of the rigid walker just after a strike: stance angle [rad] and its rate [rad/s]."""
+
+
+def rolling_on(scene: jb.RigidScene, states: jb.RigidState) -> jb.RigidState:
+    """Both feet on the ground."""
+    return states._replace(theta_1=-states.theta_2)
+
+
+def labelling_of(model: str, **options: Any) -> jb.Labelling:
+    """Of the seed's walker, "compliant" or "rigid"."""
+    seed = jb.seed_scene()
+    rigid = jb.RigidScene(walker=seed.walker, ground=seed.ground)
+    return jb.labelling(rigid if model == "rigid" else seed, **options)
+
+
+def starts_of(scene: Any, count: int) -> jb.Sample:
+    """So many random starts: of the compliant walker in the slice of basin_seed.py."""
+    if isinstance(scene, jb.RigidScene):
+        return jb.sample(scene, RIGID, count, method="uniform", follow=rolling_on)
+    bounds = {"theta_swing": _basin_slice.THETA, "omega_swing": _basin_slice.OMEGA}
+    return jb.sample(scene, bounds, count, method="uniform")
+
+
+def swept(labelling: jb.Labelling, count: int, chunk: int = 16384) -> Callable[[], Any]:
+    """A sweep in memory, to be run and timed."""
+    starts = starts_of(labelling.scene, count)
+    return lambda: jb.sweep(labelling, starts, chunk=chunk, look_for_gaits=False)
+
+
+def seconds_of(work: dict[Any, Callable[[], Any]], rounds: int) -> dict[Any, float]:
+    """Least seconds of runs that take turns."""
+    seconds = {name: np.inf for name in work}
+    for _ in range(rounds):
+        for name, run in work.items():
+            began = time.perf_counter()
+            run()
+            seconds[name] = min(seconds[name], time.perf_counter() - began)
+    return seconds

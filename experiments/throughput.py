@@ -1,0 +1,235 @@
+"""Labelled starts per second: sizes of batches, chunks, threads, models, engines, and peers.
+
+Writes throughput.png. Runs that are compared take turns in one process, on two cores.
+"""
+
+# ruff: noqa: E402 (the cores are settled before JAX is imported)
+import os
+
+CORES = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+if CORES:
+    os.sched_setaffinity(0, CORES[-2:])
+os.environ.setdefault("NUMBA_NUM_THREADS", str(min(2, len(CORES) or 2)))
+
+import contextlib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import _batches
+import _classify
+import _independent
+import matplotlib.pyplot as plt
+import numpy as np
+from _options import Options, parse
+
+import jaxbiped as jb
+from jaxbiped.plot._style import new_figure
+
+SIZES, QUICK_SIZES = (1000, 10_000, 100_000, 1_000_000), (500, 2000)
+CHUNKS, QUICK_CHUNKS = (1024, 4096, 16384, 65536), (512, 2048)
+COMPARED, QUICK_COMPARED = 4096, 256
+"""Starts that peers label too."""
+FEW = 8
+"""Starts that SciPy labels."""
+THREADS = "JAXBIPED_THREADS"
+TOLERANCES = {"ours": 1e-5, "numbalsoda": 1e-5, "numbalsoda, finer": 1e-6}
+
+
+def main() -> None:
+    options = parse(__doc__ or "")
+    quick = options.quick
+    rounds = 1 if quick else 3
+    labellings = {model: _batches.labelling_of(model) for model in ("compliant", "rigid")}
+    for labelling in labellings.values():
+        _batches.swept(labelling, 256)()
+    sizes = QUICK_SIZES if quick else SIZES
+    numbers: dict[str, Any] = {"threads": len(CORES[-2:])}
+    numbers["sizes"] = by_size(options, labellings, sizes, rounds)
+    chunks = QUICK_CHUNKS if quick else CHUNKS
+    numbers["chunks"] = by_chunk(options, labellings, chunks, rounds)
+    numbers["by_threads"] = by_threads(options, labellings, sizes[1], rounds)
+    count = QUICK_COMPARED if quick else COMPARED
+    numbers["peers"] = by_peer(options, labellings["compliant"], count, rounds)
+    numbers["engines"] = [] if quick else by_engine(options, 512)
+    options.finish(numbers | {"picture": draw(options, numbers)})
+
+
+def by_size(
+    options: Options, labellings: dict[str, jb.Labelling], sizes: tuple[int, ...], rounds: int
+) -> list[dict[str, Any]]:
+    """Costs of a start, and what is left of them less the time of a sweep of a single start."""
+    options.say("model      starts     starts/s   µs each  less the fixed cost")
+    rows = []
+    for model, labelling in labellings.items():
+        fixed = _batches.seconds_of({0: _batches.swept(labelling, 1)}, 3)[0]
+        for size in sizes:
+            often = rounds if size <= 100_000 else 1
+            seconds = _batches.seconds_of({0: _batches.swept(labelling, size)}, often)[0]
+            row = {
+                "model": model,
+                "size": size,
+                "fixed_s": fixed,
+                "starts_per_s": size / seconds,
+                "us_each": 1e6 * seconds / size,
+                "us_less_fixed": 1e6 * (seconds - fixed) / size,
+            }
+            rows.append(row)
+            options.say(
+                f"{model:<9} {size:8} {row['starts_per_s']:12.0f} {row['us_each']:9.2f}  "
+                f"{row['us_less_fixed']:9.2f}"
+            )
+    return rows
+
+
+def by_chunk(
+    options: Options, labellings: dict[str, jb.Labelling], chunks: tuple[int, ...], rounds: int
+) -> list[dict[str, Any]]:
+    options.say("\nmodel       chunk     starts/s")
+    rows, size = [], chunks[-1]
+    for model, labelling in labellings.items():
+        work = {chunk: _batches.swept(labelling, size, chunk) for chunk in chunks}
+        for chunk, seconds in _batches.seconds_of(work, rounds).items():
+            rows.append({"model": model, "chunk": chunk, "starts_per_s": size / seconds})
+            options.say(f"{model:<9} {chunk:7} {size / seconds:12.0f}")
+    return rows
+
+
+def by_threads(
+    options: Options, labellings: dict[str, jb.Labelling], size: int, rounds: int
+) -> list[dict[str, Any]]:
+    options.say("\nmodel     threads     starts/s")
+    rows = []
+    for model, labelling in labellings.items():
+        run = _batches.swept(labelling, size)
+        work = {threads: with_threads(threads, run) for threads in (1, 2)}
+        for threads, seconds in _batches.seconds_of(work, rounds).items():
+            rows.append({"model": model, "threads": threads, "starts_per_s": size / seconds})
+            options.say(f"{model:<9} {threads:7} {size / seconds:12.0f}")
+    return rows
+
+
+def with_threads(threads: int, run: Callable[[], Any]) -> Callable[[], Any]:
+    def limited() -> None:
+        with environment(THREADS, str(threads)):
+            run()
+
+    return limited
+
+
+@contextlib.contextmanager
+def environment(name: str, value: str) -> Iterator[None]:
+    before = os.environ.get(name)
+    os.environ[name] = value
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
+def by_peer(
+    options: Options, labelling: jb.Labelling, count: int, rounds: int
+) -> list[dict[str, Any]]:
+    """The same starts by us, numbalsoda and SciPy: how fast, and how often the labels are equal.
+
+    Of all the starts, then of those that walk, whose labels all ways are sure of equally soon.
+    """
+    batch = _batches.starts_of(labelling.scene, count).batch(labelling, 0, count)
+    states = np.stack(list(map(np.asarray, batch.states)), axis=1)
+    codes = labelling(batch.states).label
+    walking = np.flatnonzero(codes == int(jb.Label.WALKING))
+    rows = peers_on(labelling, "all", states, rounds, scipy=False)
+    rows += peers_on(labelling, "that walk", states[walking], rounds, scipy=True)
+    options.say(
+        "\nway                starts               starts/s  of ours  fates  walking agrees"
+    )
+    for row in rows:
+        options.say(
+            f"{row['way']:<18} {row['starts']:6} {row['which']:<10} {row['starts_per_s']:11.0f}  "
+            f"{row['of_ours']:7.4f}  {row['fates_agree']:6.1%}  {row['walking_agrees']:13.1%}"
+        )
+    return rows
+
+
+def peers_on(
+    labelling: jb.Labelling, which: str, states: np.ndarray, rounds: int, *, scipy: bool
+) -> list[dict[str, Any]]:
+    """Rows of a table; SciPy labels a few of the starts."""
+    attractor = labelling.family.rows[0][0]
+    columns = jb.State(*states.T.copy())
+    ours = labelling(columns).label.astype(int)
+    work: dict[str, Callable[[], np.ndarray]] = {"ours": lambda: labelling(columns).label}
+    if _independent.lsoda_address() is not None:
+        for name in ("numbalsoda", "numbalsoda, finer"):
+            work[name] = lambda rtol=TOLERANCES[name]: _classify.by_numbalsoda(
+                states, attractor, rtol
+            )
+        _classify.by_numbalsoda(states[:2], attractor, 1e-5)
+    seconds = _batches.seconds_of(work, rounds)
+    rows = [compared(way, which, ours, work[way](), seconds[way]) for way in work]
+    if scipy:
+        few: dict[Any, Any] = {0: lambda: _classify.by_scipy(states[:FEW], attractor, 1e-5)}
+        slow = _batches.seconds_of(few, 1)[0]
+        rows.append(compared("SciPy LSODA", which, ours[:FEW], few[0](), slow))
+    return [row | {"of_ours": row["starts_per_s"] / rows[0]["starts_per_s"]} for row in rows]
+
+
+def compared(
+    way: str, which: str, ours: np.ndarray, theirs: np.ndarray, seconds: float
+) -> dict[str, Any]:
+    walks, walked = ours == int(jb.Label.WALKING), theirs == int(jb.Label.WALKING)
+    return {
+        "way": way,
+        "which": which,
+        "starts": len(ours),
+        "starts_per_s": len(ours) / seconds,
+        "fates_agree": float((fate(ours) == fate(theirs)).mean()),
+        "walking_agrees": float((walks == walked).mean()),
+    }
+
+
+def fate(codes: np.ndarray) -> np.ndarray:
+    """Labels, a stumble counted as a fall forward: from sampled states it looks like one."""
+    stumbled = np.asarray(codes) == int(jb.Label.STUMBLED)
+    return np.where(stumbled, int(jb.Label.FELL_FORWARD), codes)
+
+
+def by_engine(options: Options, size: int) -> list[dict[str, Any]]:
+    options.say("\nengine      starts/s")
+    rows = []
+    for engine in ("lanes", "xla"):
+        run = _batches.swept(_batches.labelling_of("compliant", engine=engine), size)
+        run()
+        seconds = _batches.seconds_of({0: run}, 2)[0]
+        rows.append({"engine": engine, "starts": size, "starts_per_s": size / seconds})
+        options.say(f"{engine:<9} {size / seconds:10.0f}")
+    return rows
+
+
+def draw(options: Options, numbers: dict[str, Any]) -> str:
+    figure = new_figure(9.0, 3.8)
+    left, right = figure.subplots(1, 2)
+    for model, marker in (("compliant", "o"), ("rigid", "s")):
+        picked = [row for row in numbers["sizes"] if row["model"] == model]
+        costs = [row["us_each"] for row in picked]
+        left.loglog([row["size"] for row in picked], costs, marker + "-", label=model)
+    left.set_xlabel("starts in the batch")
+    left.set_ylabel("time for a start (µs)")
+    left.set_ylim(bottom=0.5 * min(row["us_each"] for row in numbers["sizes"]))
+    left.grid(color="#DDDDDD")
+    left.legend(frameon=False)
+    peers = [row for row in numbers["peers"] if row["which"] == "that walk"]
+    right.barh([row["way"] for row in peers], [row["starts_per_s"] for row in peers])
+    right.set_xscale("log")
+    right.set_xlabel("labelled starts that walk, a second")
+    right.invert_yaxis()
+    path = options.path("throughput.png")
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+    return str(path)
+
+
+if __name__ == "__main__":
+    main()

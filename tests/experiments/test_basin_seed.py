@@ -1,0 +1,32 @@
+import pytest
+
+from tests.experiments.quick import quick_numbers
+
+
+def test_the_seeds_basin(tmp_path):
+    numbers = quick_numbers(
+        "basin_seed",
+        tmp_path,
+        keys={"fractions", "boundary", "refined", "tolerances", "pushes", "along"},
+        pictures={"basin_seed.png", "basin_seed_refined.png", "basin_seed_along.png"},
+    )
+    fractions = numbers["fractions"]
+    assert sum(part["estimate"] for part in fractions.values()) == pytest.approx(1.0)
+    walking = fractions["walking period-1"]
+    assert walking["low"] < numbers["refined"]["walking"] < walking["high"]
+    # Whether it walks is parted by a curve that is less folded than which misfortune comes.
+    folds = {name: each["dimension"] for name, each in numbers["boundary"].items()}
+    assert 1.0 < folds["walking or not"] < folds["all labels"] < 2.0
+    # What a tolerance changes, it changes beside boundaries.
+    for row in numbers["tolerances"]:
+        assert row["changed"] < 0.02
+        assert row["changed_beside_boundary"] in (None, pytest.approx(1.0, abs=0.2))
+    # Rays turned to the boundary's normal find a smaller push, by either kind of normal.
+    rays, secants, gradients = numbers["pushes"]
+    assert gradients["distance"] < rays["distance"]
+    assert gradients["distance"] == pytest.approx(secants["distance"], rel=1e-3)
+    assert gradients["asked"] < secants["asked"]
+    assert gradients["angle"] < 0.01
+    # Damping shrinks the basin.
+    low, _, high = numbers["along"]["c"]["walking"]
+    assert low[0] > high[0]
