@@ -23,18 +23,6 @@ def codes_on_grid(labelling: jb.Labelling, side: int) -> tuple[np.ndarray, np.nd
     return found["label"].values, found["period"].values
 
 
-def labels_at(labelling: jb.Labelling) -> Any:
-    """A function that labels points (n, 2) of the slice: angle and rate."""
-
-    def label_of(points: np.ndarray) -> np.ndarray:
-        base = labelling.base({}, len(points))
-        leaves = [np.broadcast_to(leaf, len(points)) for leaf in base]
-        states = jb.State(*leaves)._replace(theta_1=points[:, 0], omega_1=points[:, 1])
-        return labelling(states).label.astype(int)
-
-    return label_of
-
-
 def in_words(fractions: dict[str, jb.Fraction]) -> dict[str, dict[str, float]]:
     """Fractions ready for JSON."""
     return {
@@ -68,7 +56,12 @@ def refined(labelling: jb.Labelling, cells: int, levels: int) -> jb.RefinedBound
     """The slice's boundaries, halved so many times from a coarse grid."""
     lower, upper = zip(THETA, OMEGA, strict=True)
     return jb.refined_boundary(
-        labels_at(labelling), lower, upper, (cells, cells), levels=levels, batch=16384
+        jb.label_at(labelling, ("theta_swing", "omega_swing")),
+        lower,
+        upper,
+        (cells, cells),
+        levels=levels,
+        batch=16384,
     )
 
 

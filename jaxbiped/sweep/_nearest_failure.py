@@ -17,6 +17,8 @@ from jaxbiped.sweep._ray_turning import Normal
 
 _MOST_FOOTSTEPS = 6
 """After which the distance from the gait is differentiated."""
+_AT_ONCE = 8
+"""Points whose derivatives are taken at once, always as many: every other number compiles anew."""
 
 
 def nearest_failure(
@@ -89,7 +91,7 @@ def boundary_normal(scene: Any, attractor: Attractor) -> Normal:
     many = jax.jit(jax.vmap(jax.jacfwd(arrival, has_aux=True)))
     squared = attractor.metric.T @ attractor.metric
 
-    def normal(points: np.ndarray) -> np.ndarray:
+    def some(points: np.ndarray) -> np.ndarray:
         at, on = np.array(points), np.ones(len(points), dtype=bool)
         slopes = np.broadcast_to(np.eye(at.shape[1]), (*at.shape, at.shape[1])).copy()
         walked = np.zeros(len(points), dtype=int)
@@ -101,5 +103,11 @@ def boundary_normal(scene: Any, attractor: Attractor) -> Normal:
             walked += on
         gradients = np.einsum("ni,nij->nj", (at - attractor.point) @ squared, slopes)
         return np.where(walked[:, None] > 0, gradients, np.nan)
+
+    def normal(points: np.ndarray) -> np.ndarray:
+        count = len(points)
+        padded = np.resize(points, (-(-count // _AT_ONCE) * _AT_ONCE, points.shape[1]))
+        blocks = [some(padded[k : k + _AT_ONCE]) for k in range(0, count, _AT_ONCE)]
+        return np.concatenate(blocks)[:count] if count else np.array(points)
 
     return normal
