@@ -39,7 +39,7 @@ def main() -> None:
     say_tolerances(options, rows)
     numbers |= {"tolerances": rows, "pushes": _basin_push.pushes(labelling)}
     say_pushes(options, numbers["pushes"])
-    names = ["slope", "c"] if quick else list(_basin_along.UNITS)
+    names = ["c"] if quick else list(_basin_along.UNITS)
     sizes = QUICK_ALONG if quick else ALONG
     changes = {name: _basin_along.along(name, *sizes) for name in names}
     numbers["along"] = {name: of_change(options, name, each) for name, each in changes.items()}

@@ -39,7 +39,8 @@ def main() -> None:
     options = parse(__doc__ or "")
     quick = options.quick
     rounds = 1 if quick else 3
-    labellings = {model: _batches.labelling_of(model) for model in ("compliant", "rigid")}
+    models = ("compliant",) if quick else ("compliant", "rigid")
+    labellings = {model: _batches.labelling_of(model) for model in models}
     for labelling in labellings.values():
         _batches.swept(labelling, 256)()
     sizes = QUICK_SIZES if quick else SIZES
