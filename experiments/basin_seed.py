@@ -148,8 +148,9 @@ def draw_refined(options: Options, labelling: jb.Labelling, boundary: jb.Refined
 
 
 def draw_along(options: Options, changes: dict[str, Any]) -> str:
-    figure = new_figure(13.0, 3.6 * ((len(changes) + 1) // 2))
-    grid = figure.subplots((len(changes) + 1) // 2, 2, squeeze=False)
+    rows, columns = (len(changes) + 1) // 2, min(2, len(changes))
+    figure = new_figure(6.5 * columns, 3.6 * rows)
+    grid = figure.subplots(rows, columns, squeeze=False)
     for ax, (name, found) in zip(grid.ravel(), changes.items(), strict=True):
         plot.basin_fractions(
             found["values"],
