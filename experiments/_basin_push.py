@@ -1,5 +1,6 @@
 """The smallest push that takes the seed's walker off its gait, with and without gradients."""
 
+import math
 import time
 from typing import Any
 
@@ -26,7 +27,7 @@ def pushes(labelling: jb.Labelling) -> list[dict[str, Any]]:
             {
                 "way": way,
                 "distance": found.distance,
-                "angle": found.angle,
+                "angle": None if math.isnan(found.angle) else found.angle,
                 "asked": found.asked,
                 "seconds": seconds,
                 "direction": found.direction.tolist(),

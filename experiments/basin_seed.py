@@ -93,7 +93,7 @@ def say_pushes(options: Options, rows: list[dict[str, Any]]) -> None:
     options.say("\nsmallest fatal push       distance  angle     labels  seconds")
     for row in rows:
         options.say(
-            f"{row['way']:<24} {row['distance']:9.6f}  {row['angle']:.1e}  {row['asked']:6d}  "
+            f"{row['way']:<24} {row['distance']:9.6f}  {_shown(row['angle'])}  {row['asked']:6d}  "
             f"{row['seconds']:7.2f}"
         )
     nearest = min(rows, key=lambda row: row["distance"])
@@ -168,6 +168,10 @@ def saved(options: Options, figure: Any, name: str) -> str:
     figure.savefig(path, dpi=150)
     plt.close(figure)
     return str(path)
+
+
+def _shown(angle: float | None) -> str:
+    return "unknown" if angle is None else f"{angle:.1e}"
 
 
 if __name__ == "__main__":
