@@ -111,6 +111,11 @@ def find_gait(
     precision = precision_of(accuracy, scene)
     usual = "rodas5p" if rigid else "rodas4"
     method_of_steps = solver_named(usual if solver is None else solver)
+    if not isinstance(method_of_steps, diffrax.AbstractAdaptiveSolver):
+        raise ArgumentError(
+            f"solver = {type(method_of_steps).__name__} is not allowed: it does not estimate its "
+            "errors, by which a search chooses its steps."
+        )
     section = checked_section(scene, section)
     chosen = orbit_engine(
         engine,
