@@ -1,5 +1,6 @@
 """What made some results."""
 
+import functools
 import platform
 import subprocess
 from importlib.metadata import PackageNotFoundError, version
@@ -14,6 +15,7 @@ def provenance() -> dict[str, str]:
     return found | {"version_python": platform.python_version(), "git_revision": _revision()}
 
 
+@functools.cache
 def _version(name: str) -> str:
     try:
         return version(name)
@@ -21,6 +23,7 @@ def _version(name: str) -> str:
         return "unknown"
 
 
+@functools.cache  # what runs is what was imported
 def _revision() -> str:
     """Of the source that runs, "unknown" where it is not a checkout."""
     here = Path(__file__).parent
