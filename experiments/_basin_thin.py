@@ -50,13 +50,7 @@ def upright(theta: np.ndarray, slope: float) -> np.ndarray:
 
 def labels_at(labelling: jb.Labelling) -> Any:
     """A function that labels points (n, 2): stance angle and rate just after a strike."""
-
-    def label_of(points: np.ndarray) -> np.ndarray:
-        theta, rate = np.asarray(points, dtype=float).T
-        states = jb.RigidState(np.zeros(len(theta)), -theta, theta, rate, rate)
-        return labelling(just_struck(labelling.scene, states)).label.astype(int)
-
-    return label_of
+    return jb.label_at(labelling, ("theta_stance", "omega_stance"), follow=just_struck)
 
 
 def strip(labelling: jb.Labelling, slope: float, side: int) -> tuple[np.ndarray, ...]:

@@ -103,18 +103,20 @@ class Basin:
         executor, workers = self.sweep.executor()
         known = labelling(scene, parameters=starts.parameters, **how)
         began = time.perf_counter()
-        found = sweep(
-            known,
-            starts,
-            store=self.sweep.store,
-            chunk=self.sweep.chunk,
-            executor=executor,
-            workers=workers,
-            progress=True,
-        )
+        try:
+            found = sweep(
+                known,
+                starts,
+                store=self.sweep.store,
+                chunk=self.sweep.chunk,
+                executor=executor,
+                workers=workers,
+                progress=True,
+            )
+        finally:
+            if executor is not None:
+                executor.shutdown()
         seconds = time.perf_counter() - began
-        if executor is not None:
-            executor.shutdown()
         numbers = basin_numbers(found, seconds) | {"engine": effort.engine}
         if isinstance(starts, GivenStarts):
             numbers["labels"] = _names(found).tolist()

@@ -23,7 +23,6 @@ class Trace(NamedTuple):
     """What is remembered; scalars, but for tuples of them.
 
     Attributes:
-        arrivals: how many there were.
         recent: states at the last `DEPTH` of them, the latest first, without hip_x.
         distances: of each gait's point, at as many of the last ones as its cycle has.
         closest: smallest distance of any.
@@ -34,7 +33,6 @@ class Trace(NamedTuple):
         period: footsteps in the cycle that it converges to, 0 for none.
     """
 
-    arrivals: Scalar
     recent: tuple[tuple[Scalar, ...], ...]
     distances: tuple[tuple[Scalar, ...], ...]
     closest: Scalar
@@ -50,7 +48,6 @@ def first_trace(zero: Scalar, size: int, periods: tuple[int, ...]) -> Trace:
     none = jnp.zeros((), dtype=jnp.int64)
     far = zero + jnp.inf
     return Trace(
-        arrivals=none,
         recent=tuple([tuple([far] * size)] * DEPTH),
         distances=tuple(tuple([far] * period) for period in periods),
         closest=far,
@@ -109,7 +106,6 @@ def arrived(
         left = jnp.where(distances[g][0] < trace.distances[g][-1], rates[g], jnp.nan)
         rate = jnp.where(certain[g], left, rate)
     return Trace(
-        arrivals=trace.arrivals + 1,
         recent=(state, *trace.recent[:-1]),
         distances=tuple(distances),
         closest=jnp.minimum(trace.closest, nearest),
