@@ -25,6 +25,7 @@ from jaxbiped.gait._gait import Gait, described
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._search import Found, Method, search
 from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._system import RedundantWalking, checked_section, system_of
 from jaxbiped.gait._turn import Turning
 from jaxbiped.scene._parameters import chosen_parameters
@@ -33,7 +34,6 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._passage import Precision
 from jaxbiped.solve._projected import projecting
-from jaxbiped.solve._solvers import solver_named
 
 _RESIDUAL_SHARE = 0.3
 """Residual that counts as none, in units of the state's tolerance."""
@@ -109,13 +109,7 @@ def find_gait(
     modelled = scene.scene if isinstance(scene, RedundantScene) else scene
     names, active = chosen_parameters(modelled, parameters)
     precision = precision_of(accuracy, scene)
-    usual = "rodas5p" if rigid else "rodas4"
-    method_of_steps = solver_named(usual if solver is None else solver)
-    if not isinstance(method_of_steps, diffrax.AbstractAdaptiveSolver):
-        raise ArgumentError(
-            f"solver = {type(method_of_steps).__name__} is not allowed: it does not estimate its "
-            "errors, by which a search chooses its steps."
-        )
+    method_of_steps = orbit_solver(solver, rigid=rigid)
     section = checked_section(scene, section)
     chosen = orbit_engine(
         engine,

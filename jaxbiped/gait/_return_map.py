@@ -16,6 +16,7 @@ from jaxbiped.gait._gradient import AbstractGradient, Forward, check_anywhere
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._return_by_lanes import forward_by_lanes
 from jaxbiped.gait._return_by_xla import chosen, forward_by_xla, reverse_by_xla
+from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._system import (
     AbstractSystem,
     RedundantWalking,
@@ -26,8 +27,6 @@ from jaxbiped.gait._turn import Turning
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.solve._projected import projecting
-from jaxbiped.solve._rodas4 import Rodas4
-from jaxbiped.solve._rodas5p import Rodas5P
 
 
 class Return(NamedTuple):
@@ -54,7 +53,7 @@ def return_map(
     gradient: AbstractGradient | None = None,
     accuracy: str = "balanced",
     system: AbstractSystem | None = None,
-    solver: diffrax.AbstractAdaptiveSolver | None = None,
+    solver: str | diffrax.AbstractSolver | None = None,
     time_limit: Any = 10.0,
     engine: str = "auto",
 ) -> Return:
@@ -71,7 +70,8 @@ def return_map(
         gradient: `Forward()` (the default) or `Reverse()`.
         accuracy: "balanced" or "tight".
         system: the walker unless given.
-        solver: `Rodas4()` unless given, `Rodas5P()` for a rigid walker.
+        solver: a name (see `SOLVERS`) or any diffrax solver that estimates its errors; unless
+            given "rodas4", for a rigid walker "rodas5p".
         time_limit: longest time to an arrival [s].
         engine: "xla", "lanes" or "auto" (see `ENGINES`), which here is "xla" for a system of your
             own and for `Reverse()`. By lanes all directions of `jax.jacfwd` share one solve.
@@ -90,12 +90,11 @@ def return_map(
     enters = redundant and not is_redundant(state)
     if enters:
         state = redundant_state(args, state)
-    rigid = isinstance(args, RigidScene)
     section = checked_section(args, section)
-    solver = (Rodas5P() if rigid else Rodas4()) if solver is None else solver
+    method = orbit_solver(solver, rigid=isinstance(args, RigidScene))
     by = orbit_engine(
         engine,
-        solver=solver,
+        solver=method,
         section=section,
         leaves=(args, state),
         gradient=gradient,
@@ -103,11 +102,11 @@ def return_map(
         redundant=redundant,
     )
     if redundant:
-        system, solver = RedundantWalking(), projecting(args, solver)
+        system, method = RedundantWalking(), projecting(args, method)
     turning = Turning(
         system=system_of(args) if system is None else system,
         section=section,
-        solver=solver,
+        solver=method,
         time_limit=time_limit,
         steps=1,
         max_solver_steps=MOST_SOLVER_STEPS[accuracy],

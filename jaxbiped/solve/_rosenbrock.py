@@ -275,7 +275,7 @@ def _repeats(tableau: RosenbrockTableau, i: int) -> bool:
 def _sum(weights: Sequence[float] | np.ndarray, values: list[Any]) -> Any:
     """Σ weights_j values_j, zero weights left out and units not multiplied by."""
     terms = [v if w == 1.0 else float(w) * v for w, v in zip(weights, values, strict=False) if w]
-    return functools.reduce(operator.add, terms)
+    return functools.reduce(operator.add, terms) if terms else jnp.zeros_like(values[0])
 
 
 def _plus(a: Components, b: Components) -> Components:

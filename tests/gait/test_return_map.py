@@ -141,6 +141,25 @@ def test_damped_oscillator_over_a_turn(mode):
     )
 
 
+@pytest.mark.parametrize("engine", ["xla", "lanes"])
+@pytest.mark.parametrize("solver", ["rodas3p", "rodas4p", "rodas5p"])
+def test_every_solver_carries_derivatives(solver, engine):
+    omega, zeta = 2.0, 0.1
+    root = math.sqrt(1.0 - zeta**2)
+    factor = math.exp(-2 * math.pi * zeta / root)
+
+    def turned(v):
+        start = (jnp.asarray(0.0), v)
+        how = dict(section=DOWN, system=Oscillator(), gradient=jb.Forward())
+        args = (jnp.asarray(omega), jnp.asarray(zeta))
+        r = jb.return_map(args, start, solver=solver, engine=engine, **how)
+        return r.state[1]
+
+    reached, slope = jax.jvp(turned, (jnp.asarray(-1.5),), (jnp.asarray(1.0),))
+    assert float(reached) == pytest.approx(-1.5 * factor, rel=1e-5)
+    assert float(slope) == pytest.approx(factor, rel=1e-4)
+
+
 def _orbit(turning, args, guess):
     found = search(turning, args, (0,), guess, precision_of("tight"), Method(None, 40, 1e-10))
     return orbit_of(turning, args, (0,), guess, found, radius=True)
