@@ -1,10 +1,7 @@
 """Steps of the rigid walker: explicit Runge–Kutta in single support, ended by impacts."""
 
-import functools
-import operator
 from typing import Any, NamedTuple
 
-import diffrax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
@@ -12,13 +9,11 @@ from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._rolling import rolling_rates
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.solve._ending import Ending, rigid_ending
 from jaxbiped.solve._quintic import Quintic
+from jaxbiped.solve._rolling_step import ORDER, Rates, accelerations, moved, rolling_step
 
-_TABLEAU = diffrax.Dopri8.tableau
-_ORDER = 8
 _SAFETY, _MOST_SHRINK, _MOST_GROWTH = 0.8, 0.2, 5.0
 _FIRST_STEP = 0.03
 """First step, in units of √(l/g)."""
@@ -26,9 +21,11 @@ _ROUNDING = 1e-14
 """Shortest step, as a share of the time."""
 _CLOSED = 1e-12
 """Sum of the leg angles [rad] up to which the feet have not opened since the last strike."""
-_NEAR = 3e-2
+_NEAR = 0.1
 """Sum of the leg angles from which one Euler step leads onto a strike, in units of √rtol: the
 square of what is left is far below the tolerance."""
+_STRETCH = 1.15
+"""By how much a step may be longer than chosen to end where a strike is due."""
 _MOST_LANDINGS = 12
 """Newton steps onto a heel strike, after which it counts as missed."""
 
@@ -61,6 +58,8 @@ class RigidProgress(NamedTuple):
         rates: angular accelerations of both legs there [rad/s²].
         step: to attempt next [s]; negative while a heel strike is landed on from beyond.
         pace: the last free step, with which the next footstep begins.
+        strike, period: time of the last heel strike, and since the one before it [s].
+        due: when the next one is expected [s]; infinite while footsteps differ in their periods.
         landing: number of Newton steps onto a heel strike, 0 in free motion.
         struck: whether the last attempt ended by a heel strike.
         footsteps: how many so far.
@@ -73,6 +72,9 @@ class RigidProgress(NamedTuple):
     rates: tuple[Scalar, Scalar]
     step: Scalar
     pace: Scalar
+    strike: Scalar
+    period: Scalar
+    due: Scalar
     landing: Scalar
     struck: Scalar
     footsteps: Scalar
@@ -87,9 +89,24 @@ def begun(walk: RigidWalk) -> RigidProgress:
     step = _FIRST_STEP * jnp.sqrt(walk.scene.walker.l / walk.scene.ground.g)
     step = jnp.minimum(step, walk.duration)
     no = jnp.asarray(False)
-    rates = _accelerations(walk, walk.state)
+    rates = accelerations(walk.scene, walk.state)
     upright = walk.state._replace(hip_x=walk.state.hip_x + _rolled(walk, walk.state.theta_2))
-    return RigidProgress(zero, upright, rates, step, step, none, no, none, none, none)
+    never = jnp.full_like(zero, jnp.inf)
+    return RigidProgress(
+        t=zero,
+        state=upright,
+        rates=rates,
+        step=step,
+        pace=step,
+        strike=zero,
+        period=never,
+        due=never,
+        landing=none,
+        struck=no,
+        footsteps=none,
+        attempts=none,
+        code=none,
+    )
 
 
 def whole(walk: RigidWalk, now: RigidProgress) -> RigidState:
@@ -106,18 +123,16 @@ def _rolled(walk: RigidWalk, angle: Scalar) -> Scalar:
 
 def attempted(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Scalar]:
     """One attempted step further, and whether the walk is over (boolean)."""
-    stages = _stages(walk, now)
-    trial = _moved(now.state, now.step, _TABLEAU.b_sol[:-1], stages)
+    trial, error, roughly = rolling_step(walk.scene, now.state, now.rates, now.step, walk.rtol)
+    strike = _strike(walk, trial, roughly)
+    free, kept = _free(walk, now, trial, error, roughly, strike)
     landing = now.landing > 0
-    landed = _landing(walk, now, trial, stages[-1])
+    after = _where(landing, _landing(walk, now, trial, strike), free)
+    after = _where(after.struck, _struck(walk, after, strike), after)
     # The last stage is the first one of the next step, after an impact from the new state.
-    state = _where(landing, landed.state, trial)
-    rates = _accelerations(walk, state)
-    last = (trial.omega_1, trial.omega_2, *rates)
-    free = _free(walk, now, trial, stages[-1], _error(walk, now, trial, [*stages, last]))
-    after = _where(landing, landed, free)
-    kept = landing | (after.t > now.t)
-    after = after._replace(rates=_where(kept, rates, now.rates), attempts=now.attempts + 1)
+    rates = accelerations(walk.scene, _where(after.struck, strike.state, trial))
+    rates = _where(landing | kept, rates, now.rates)
+    after = after._replace(rates=rates, attempts=now.attempts + 1)
     enough = (walk.footsteps > 0.0) & (after.footsteps.astype(after.t.dtype) >= walk.footsteps)
     done = enough | ((after.landing == 0) & (after.t >= walk.duration))
     tired = after.attempts.astype(after.t.dtype) >= walk.most_attempts
@@ -132,119 +147,117 @@ def ending_of(walk: RigidWalk, now: RigidProgress, waits: Scalar) -> Scalar:
     return jnp.where(late, int(Ending.OUT_OF_STEPS), now.code)
 
 
+class _Strike(NamedTuple):
+    """The heel strike that a trial step ends beside, if it does.
+
+    Attributes:
+        near: whether one Euler step leads onto it.
+        rest: from the trial to the strike [s], which may lie behind.
+        state: after it.
+    """
+
+    near: Scalar
+    rest: Scalar
+    state: RigidState
+
+
+def _strike(walk: RigidWalk, trial: RigidState, rates: Rates) -> _Strike:
+    """`rates` are those of the trial, roughly."""
+    opening, rate = _opening(trial)
+    rest = -opening / jnp.where(rate == 0.0, 1.0, rate)
+    nearer = moved(trial, rest, [1.0], [rates])
+    # The hip stays where it is, over another leg.
+    rolled = _rolled(walk, nearer.theta_1) - _rolled(walk, nearer.theta_2)
+    after = impact(walk.scene, nearer).state._replace(hip_x=nearer.hip_x + rolled)
+    near = (jnp.abs(opening) <= _NEAR * jnp.sqrt(walk.rtol)) & (rate < 0.0)
+    return _Strike(near, rest, after)
+
+
+def _struck(walk: RigidWalk, trial: RigidProgress, strike: _Strike) -> RigidProgress:
+    """After the strike beside a trial. Where footsteps last alike, the next one is known."""
+    t = trial.t + strike.rest
+    period = t - trial.strike
+    drift = jnp.abs(period - trial.period) * jnp.abs(_opening(trial.state)[1])
+    steady = drift <= 2.0 * _NEAR * jnp.sqrt(walk.rtol)
+    due = jnp.where(steady, t + period, jnp.inf)
+    return trial._replace(
+        t=t,
+        state=strike.state,
+        step=_step(walk, t, trial.pace, due, period),
+        strike=t,
+        period=period,
+        due=due,
+        landing=jnp.zeros_like(trial.landing),
+        footsteps=trial.footsteps + 1,
+    )
+
+
+def _step(walk: RigidWalk, t: Scalar, pace: Scalar, due: Scalar, period: Scalar) -> Scalar:
+    """The next step: the pace, or what ends it where a strike is due or the walk ends [s]."""
+    left = due - t
+    hits = (left > 1e-6 * period) & (left <= _STRETCH * pace)
+    return jnp.minimum(jnp.where(hits, left, pace), walk.duration - t)
+
+
 def _free(
     walk: RigidWalk,
     now: RigidProgress,
     trial: RigidState,
-    rates: tuple[Scalar, ...],
     error: Scalar,
-) -> RigidProgress:
-    """After a step in single support: kept or not, and whether a heel strike lies behind it."""
+    rates: Rates,
+    strike: _Strike,
+) -> tuple[RigidProgress, Scalar]:
+    """After a step in single support: whether a heel strike lies beside it or behind it.
+
+    Also whether the step is kept. `rates` are those of the trial, roughly.
+    """
     old, old_rate = _opening(now.state)
     new, new_rate = _opening(trial)
     course = Quintic.of(
         now.step, (old, old_rate, now.rates[0] + now.rates[1]), (new, new_rate, rates[2] + rates[3])
     )
-    ahead = (trial.theta_1 > trial.theta_2) & (new <= 0.0)
+    passed = trial.theta_1 > trial.theta_2
+    ahead = passed & (new <= 0.0)
     # A step so long that the legs open and close within it is tried again at half the length.
     turn = old_rate / jnp.where(old_rate == new_rate, 1.0, old_rate - new_rate)
     bulges = (old_rate > 0.0) & (new_rate < 0.0)
     bulges = bulges & (course.value(turn) > 0.0)
     skips = ahead & (old <= _CLOSED) & bulges
     keep = (error <= 1.0) & ~skips
-    closes = keep & ahead & (old > _CLOSED)
-    factor = _SAFETY * jnp.maximum(error, 1e-10) ** (-1.0 / _ORDER)
+    t = jnp.where(keep, now.t + now.step, now.t)
+    struck = keep & passed & strike.near & (old > _CLOSED) & (t + strike.rest <= walk.duration)
+    closes = keep & ahead & (old > _CLOSED) & ~struck
+    factor = _SAFETY * jnp.maximum(error, 1e-10) ** (-1.0 / ORDER)
     pace = now.step * jnp.clip(factor, _MOST_SHRINK, _MOST_GROWTH)
     pace = jnp.where(skips, 0.5 * now.step, pace)
     back = now.step * (course.root() - 1.0)
-    t = jnp.where(keep, now.t + now.step, now.t)
-    code = jnp.where(keep & ~closes, rigid_ending(trial), 0)
+    code = jnp.where(keep & ~closes & ~struck, rigid_ending(trial), 0)
     lost = ~jnp.isfinite(pace) | (pace <= _ROUNDING * t)
-    return RigidProgress(
+    after = now._replace(
         t=t,
         state=_where(keep, trial, now.state),
-        rates=now.rates,
-        step=jnp.where(closes, back, jnp.minimum(pace, walk.duration - t)),
+        step=jnp.where(closes, back, _step(walk, t, pace, now.due, now.period)),
         pace=pace,
         landing=jnp.where(closes, 1, 0),
-        struck=jnp.asarray(False),
-        footsteps=now.footsteps,
-        attempts=now.attempts,
+        struck=struck,
         code=jnp.where(lost, int(Ending.SOLVER_FAILED), code).astype(now.code.dtype),
     )
+    return after, keep
 
 
 def _landing(
-    walk: RigidWalk, now: RigidProgress, trial: RigidState, rates: tuple[Scalar, ...]
+    walk: RigidWalk, now: RigidProgress, trial: RigidState, strike: _Strike
 ) -> RigidProgress:
-    """After a step back towards a heel strike: Newton's method goes on, or the foot strikes.
-
-    `rates` are those of the trial, roughly.
-    """
-    opening, rate = _opening(trial)
-    rest = -opening / jnp.where(rate == 0.0, 1.0, rate)
-    struck = (jnp.abs(opening) <= _NEAR * jnp.sqrt(walk.rtol)) & (rate < 0.0)
-    missed = ~struck & (now.landing >= _MOST_LANDINGS)
-    t = now.t + now.step + jnp.where(struck, rest, 0.0)
-    nearer = _moved(trial, rest, [1.0], [rates])
-    # The hip stays where it is, over another leg.
-    rolled = _rolled(walk, nearer.theta_1) - _rolled(walk, nearer.theta_2)
-    after = impact(walk.scene, nearer).state._replace(hip_x=nearer.hip_x + rolled)
-    return RigidProgress(
-        t=t,
-        state=_where(struck, after, trial),
-        rates=now.rates,
-        step=jnp.where(struck, jnp.minimum(now.pace, walk.duration - t), rest),
-        pace=now.pace,
-        landing=jnp.where(struck, 0, now.landing + 1),
-        struck=struck,
-        footsteps=now.footsteps + jnp.where(struck, 1, 0),
-        attempts=now.attempts,
+    """After a step back towards a heel strike: Newton's method goes on, or the foot strikes."""
+    missed = ~strike.near & (now.landing >= _MOST_LANDINGS)
+    return now._replace(
+        t=now.t + now.step,
+        state=trial,
+        step=strike.rest,
+        landing=now.landing + 1,
+        struck=strike.near,
         code=jnp.where(missed, int(Ending.SOLVER_FAILED), now.code),
     )
-
-
-def _stages(walk: RigidWalk, now: RigidProgress) -> list[tuple[Scalar, ...]]:
-    """Rates of the angles and of their rates at the stages of a step, without the last."""
-    state = now.state
-    stages: list[tuple[Scalar, ...]] = [(state.omega_1, state.omega_2, *now.rates)]
-    for row in _TABLEAU.a_lower[:-1]:
-        at = _moved(state, now.step, row, stages)
-        stages.append((at.omega_1, at.omega_2, *_accelerations(walk, at)))
-    return stages
-
-
-def _error(
-    walk: RigidWalk, now: RigidProgress, trial: RigidState, stages: list[tuple[Scalar, ...]]
-) -> Scalar:
-    """Error of a step in units of the tolerance, root mean square over the components."""
-    share = jnp.zeros_like(now.t)
-    for i, (a, b) in enumerate(zip(now.state[1:], trial[1:], strict=True)):
-        error = now.step * _weighted(_TABLEAU.b_error, stages, i)
-        size = walk.rtol * (0.01 + jnp.maximum(jnp.abs(a), jnp.abs(b)))
-        share = share + (error / size) ** 2
-    error = jnp.sqrt(0.25 * share)
-    return jnp.where(jnp.isnan(error), jnp.inf, error)
-
-
-def _accelerations(walk: RigidWalk, state: RigidState) -> tuple[Scalar, Scalar]:
-    motion = rolling_rates(walk.scene, state)
-    return motion.alpha_1, motion.alpha_2
-
-
-def _moved(
-    state: RigidState, step: Scalar, weights: Any, stages: list[tuple[Scalar, ...]]
-) -> RigidState:
-    """The state a step further, at weighted rates of its angles and of their rates."""
-    old = state[1:]
-    new = (leaf + step * _weighted(weights, stages, i) for i, leaf in enumerate(old))
-    return RigidState(state.hip_x, *new)
-
-
-def _weighted(weights: Any, stages: list[tuple[Scalar, ...]], i: int) -> Scalar:
-    pairs = zip(weights, stages, strict=True)
-    terms = [float(weight) * stage[i] for weight, stage in pairs if weight != 0.0]
-    return functools.reduce(operator.add, terms)
 
 
 def _opening(state: RigidState) -> tuple[Scalar, Scalar]:
