@@ -5,7 +5,6 @@ from typing import Any
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
-from jaxbiped.gait._gradient import AbstractGradient, Reverse
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 
@@ -16,7 +15,6 @@ def orbit_engine(
     solver: Any,
     section: Any,
     leaves: Any,
-    gradient: AbstractGradient | None = None,
     own_system: bool = False,
     redundant: bool = False,
 ) -> str:
@@ -26,7 +24,6 @@ def orbit_engine(
         engine: one of `ENGINES`.
         solver, section: the orbit's.
         leaves: all numbers that are given.
-        gradient: how the motion itself is to be differentiated.
         redundant: whether the motion is solved in redundant coordinates.
         own_system: whether the system is the user's own; nobody knows if lanes can express it.
 
@@ -36,8 +33,6 @@ def orbit_engine(
     obstacle = _obstacle(solver, section, leaves)
     if redundant:
         obstacle = "redundant coordinates are diffrax's"
-    if isinstance(gradient, Reverse):
-        obstacle = "gradient = Reverse() goes back through the steps of diffrax"
     return engine_for(engine, obstacle=obstacle, prefers_xla=own_system)
 
 

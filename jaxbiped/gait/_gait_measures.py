@@ -16,7 +16,7 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
-from jaxbiped.gait._gradient import AbstractGradient, Implicit, Reverse
+from jaxbiped.gait._gradient import AbstractGradient, Implicit
 from jaxbiped.gait._return_map import Return, return_map
 from jaxbiped.scene._parameters import chosen_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -72,7 +72,6 @@ def gait_measures(
         return _by_theorem(scene, gait)
 
     def turn(state: State | RigidState) -> Return:
-        reverse = isinstance(gradient, Reverse)
         return return_map(
             scene,
             state,
@@ -80,8 +79,7 @@ def gait_measures(
             steps=period,
             gradient=gradient,
             accuracy=accuracy,
-            # Only the search can be by lanes where the motion is differentiated in reverse.
-            engine="xla" if reverse else engine,
+            engine=engine,
         )
 
     return _by_correction(gait, turn)

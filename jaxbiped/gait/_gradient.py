@@ -32,7 +32,8 @@ class AbstractGradient(eqx.Module):
 class Forward(AbstractGradient):
     """Tangents carried along the motion, their errors controlled: for few directions.
 
-    Every direction is one solve of its own under `jax.jacfwd`, in lockstep.
+    Through XLA every direction is one solve of its own under `jax.jacfwd`, in lockstep; by lanes
+    all share one.
     """
 
     forward: ClassVar[bool] = True
@@ -41,10 +42,12 @@ class Forward(AbstractGradient):
 
 
 class Reverse(AbstractGradient):
-    """Reverse mode through the solver's steps, with checkpoints: for many parameters.
+    """Reverse mode, for many parameters.
 
-    The steps are chosen so that the derivatives by the whole state keep the derivatives'
-    tolerance; reverse mode then is those derivatives' transpose.
+    Through XLA it goes back over the solver's steps, with checkpoints; they are chosen so that the
+    derivatives by the whole state keep the derivatives' tolerance, and reverse mode is those
+    derivatives' transpose. By lanes the derivatives by all that is differentiated are carried
+    along the motion, as `Forward` does, and transposed.
     """
 
     forward: ClassVar[bool] = False

@@ -51,6 +51,71 @@ def _forward_by_lanes_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
     return forward_by_lanes(turning, precision, args, state), (end_dot, time_dot, None)
 
 
+@eqx.filter_custom_vjp
+def _reversible(
+    given: tuple[PyTree, PyTree], turning: Turning, precision: Precision
+) -> tuple[PyTree, Scalar, Scalar]:
+    args, state = given
+    return forward_by_lanes(turning, precision, args, state)
+
+
+def reverse_by_lanes(
+    turning: Turning, precision: Precision, args: PyTree, state: PyTree
+) -> tuple[PyTree, Scalar, Scalar]:
+    """In reverse mode: the columns, of just what is differentiated, are known and transposed."""
+    return _reversible((args, state), turning, precision)
+
+
+@_reversible.def_fwd
+def _reversible_fwd(
+    perturbed: Any, given: tuple[PyTree, PyTree], turning: Turning, precision: Precision
+) -> tuple[Any, Crossed]:
+    args, state = given
+    active, places = (_places(part) for part in perturbed)
+    found = _crossed(turning, precision, args, state, places, active)
+    return renewed(turning, args, found.state, found.t, found.code), found
+
+
+@_reversible.def_bwd
+def _reversible_bwd(
+    found: Crossed,
+    cotangents: Any,
+    perturbed: Any,
+    given: tuple[PyTree, PyTree],
+    turning: Turning,
+    precision: Precision,
+) -> tuple[PyTree, PyTree]:
+    del precision
+    args, state = given
+    active, places = (_places(part) for part in perturbed)
+    end_bar, time_bar, _ = cotangents
+
+    def renew(args: PyTree, y: PyTree) -> PyTree:
+        return renewed(turning, args, y, found.t, found.code)[0]
+
+    _, pull = jax.vjp(renew, args, found.state)
+    args_bar, arrived_bar = pull(full_tangents(end_bar, state))
+    along = found.columns @ jnp.stack(jtu.tree_leaves(arrived_bar))
+    if time_bar is not None:
+        along = along + found.time_columns * time_bar
+    by_state = dict(zip(places, along, strict=False))
+    by_args = zip(active, along[len(places) :], _sizes(args, active), strict=True)
+    own = jtu.tree_leaves(args_bar)
+    by_parameter = {i: own[i] + bar / size for i, bar, size in by_args}
+    return _only(args, by_parameter), _only(state, by_state)
+
+
+def _places(perturbed: PyTree) -> tuple[int, ...]:
+    """Positions of the leaves that are differentiated."""
+    return tuple(i for i, is_so in enumerate(jtu.tree_leaves(perturbed)) if is_so)
+
+
+def _only(like: PyTree, known: dict[int, Scalar]) -> PyTree:
+    """These leaves, and None for the others."""
+    leaves, structure = jtu.tree_flatten(like)
+    return jtu.tree_unflatten(structure, [known.get(i) for i in range(len(leaves))])
+
+
 def _crossed(
     turning: Turning,
     precision: Precision,

@@ -1,5 +1,6 @@
 """The return map as a function that JAX can differentiate."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import diffrax
@@ -12,9 +13,9 @@ from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._engine import orbit_engine
-from jaxbiped.gait._gradient import AbstractGradient, Forward, check_anywhere
+from jaxbiped.gait._gradient import AbstractGradient, Forward, Reverse, check_anywhere
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
-from jaxbiped.gait._return_by_lanes import forward_by_lanes
+from jaxbiped.gait._return_by_lanes import forward_by_lanes, reverse_by_lanes
 from jaxbiped.gait._return_by_xla import chosen, forward_by_xla, reverse_by_xla
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._system import (
@@ -74,7 +75,7 @@ def return_map(
             given "rodas4", for a rigid walker "rodas5p".
         time_limit: longest time to an arrival [s].
         engine: "xla", "lanes" or "auto" (see `ENGINES`), which here is "xla" for a system of your
-            own and for `Reverse()`. By lanes all directions of `jax.jacfwd` share one solve.
+            own. By lanes all directions of a derivative share one solve.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
@@ -97,7 +98,6 @@ def return_map(
         solver=method,
         section=section,
         leaves=(args, state),
-        gradient=gradient,
         own_system=system is not None,
         redundant=redundant,
     )
@@ -112,8 +112,7 @@ def return_map(
         max_solver_steps=MOST_SOLVER_STEPS[accuracy],
         engine=by,
     )
-    forward = forward_by_lanes if by == "lanes" else forward_by_xla
-    follow = forward if isinstance(gradient, Forward) else reverse_by_xla
+    follow = _FOLLOW[by, type(gradient)]
     precision = precision_of(accuracy, args)
     time, code = jnp.zeros(()), jnp.asarray(0)
     for _ in range(int(steps)):
@@ -122,3 +121,11 @@ def return_map(
         time = time + jnp.where(code == 0, lasted, 0.0)
         code = jnp.where(code == 0, came, code)
     return Return(minimal_state(args, state) if enters else state, time, code)
+
+
+_FOLLOW: dict[tuple[str, type[AbstractGradient]], Callable[..., Any]] = {
+    ("xla", Forward): forward_by_xla,
+    ("xla", Reverse): reverse_by_xla,
+    ("lanes", Forward): forward_by_lanes,
+    ("lanes", Reverse): reverse_by_lanes,
+}

@@ -26,14 +26,20 @@ def forwards(point, direction):
     return jax.jvp(lambda p: measured(p, jb.Forward()), (point,), (direction,))
 
 
+@jax.jit
+def in_reverse(point):
+    return jax.jacrev(lambda p: measured(p, jb.Reverse()))(point)
+
+
 @settings(max_examples=3, deadline=None)
 @given(st.lists(st.floats(-0.03, 0.03, allow_subnormal=False), min_size=3, max_size=3))
-def test_forward_and_implicit_gradients_agree_on_random_scenes(changes):
+def test_all_gradient_modes_agree_on_random_scenes(changes):
     point, direction = jnp.array(changes), jnp.array([1.0, -0.5, 0.2])
     value, jacobian = implicitly(point)
     again, slope = forwards(point, direction)
     assert np.asarray(again) == pytest.approx(np.asarray(value), abs=1e-5)
     assert np.asarray(slope) == pytest.approx(np.asarray(jacobian @ direction), rel=5e-4, abs=1e-6)
+    assert np.asarray(in_reverse(point)) == pytest.approx(np.asarray(jacobian), rel=5e-4, abs=1e-6)
 
 
 def test_gradient_must_be_a_mode():

@@ -1,5 +1,6 @@
 """Analytic truths: an oscillator, a bouncing ball with drag, van der Pol's orbit."""
 
+import functools
 import math
 
 import jax
@@ -82,8 +83,9 @@ def flight(drag, v):
     return t, (v + g / drag) * math.exp(-drag * t) - g / drag
 
 
+@pytest.mark.parametrize("engine", ["xla", "lanes"])
 @pytest.mark.parametrize("mode", MODES)
-def test_bouncing_ball_with_drag(mode):
+def test_bouncing_ball_with_drag(mode, engine):
     v, args = 3.0, (0.3, 0.8, 1.0)
 
     def bounce(v, drag):
@@ -94,6 +96,7 @@ def test_bouncing_ball_with_drag(mode):
             system=Ball(),
             gradient=MODES[mode],
             accuracy="tight",
+            engine=engine,
         )
         return jnp.stack([r.state[1], r.time])
 
@@ -222,17 +225,19 @@ def test_bouncing_ball_in_a_cycle_of_two():
 def test_modes_that_do_not_fit_are_refused():
     state, args = (jnp.asarray(0.0), jnp.asarray(3.0)), (0.3, 0.8, 1.0)
 
-    def bounce(v, gradient):
+    def bounce(v, gradient, engine="auto"):
         start = (state[0], v)
-        found = jb.return_map(args, start, section=DOWN, system=Ball(), gradient=gradient)
-        return found.time
+        how = dict(section=DOWN, system=Ball(), engine=engine)
+        return jb.return_map(args, start, gradient=gradient, **how).time
 
     with pytest.raises(jb.ArgumentError, match="Implicit"):
         bounce(state[1], jb.Implicit())
     with pytest.raises(RuntimeError, match="no reverse mode"):
         jax.grad(lambda v: bounce(v, jb.Forward()))(state[1])
-    with pytest.raises(TypeError, match="forward-mode"):
-        jax.jvp(lambda v: bounce(v, jb.Reverse()), (state[1],), (state[1],))
+    for engine in ("xla", "lanes"):
+        reversible = functools.partial(bounce, gradient=jb.Reverse(), engine=engine)
+        with pytest.raises(TypeError, match="forward-mode"):
+            jax.jvp(reversible, (state[1],), (state[1],))
 
 
 def test_what_does_not_return_says_so():
@@ -255,7 +260,8 @@ class Step(Flowing):
 
 
 @pytest.mark.parametrize(
-    ("mode", "engine"), [("forward", "xla"), ("forward", "lanes"), ("reverse", "xla")]
+    ("mode", "engine"),
+    [("forward", "xla"), ("forward", "lanes"), ("reverse", "xla"), ("reverse", "lanes")],
 )
 def test_derivatives_leap_where_the_force_jumps(mode, engine):
     """Dropped from y, it turns (y − s) a/b below the ground, after (1 + a/b) √(2 (y − s)/a)."""

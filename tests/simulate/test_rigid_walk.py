@@ -84,6 +84,14 @@ def test_error_follows_the_tolerance():
     assert errors[2] < errors[1] < errors[0]
 
 
+def test_steady_footsteps_need_no_search_for_their_strikes():
+    few, many = (jb.rigid_walk(rigid_seed(), GAIT, steps=steps, rtol=1e-4) for steps in (3, 23))
+    assert int(many.attempts - few.attempts) / 20 <= int(few.attempts) / 3 - 0.5
+    exact = jb.rigid_walk(rigid_seed(), GAIT, steps=23, rtol=1e-12)
+    assert float(many.t) == pytest.approx(float(exact.t), rel=1e-5)
+    np.testing.assert_allclose(np.array(many.state[1:]), np.array(exact.state[1:]), atol=1e-4)
+
+
 def test_batches_and_bad_lanes():
     """A lane that is no number fails alone; the others' bits are those of a single walk."""
     count = 37
