@@ -6,11 +6,12 @@ import pytest
 import jaxbiped as jb
 from tests.orbit_reference import (
     SEED,
-    gait,
+    gait_of_the_seed,
     jacobian,
     parameters,
     sensitivities,
-    turn_derivative,
+    turn,
+    turn_by_scipy,
 )
 
 MEASURES = ("period", "step_length", "speed", "peak_normal", "spectral_radius")
@@ -64,8 +65,7 @@ def start(tight):
 @pytest.fixture(scope="module")
 def multipliers(start):
     """Of the reference: eigenvalues of its return map, with 0 in the trivial one's place."""
-    x, measures = gait(start, parameters())
-    return sorted_eigenvalues(turn_derivative(x, parameters(), measures[0]))
+    return sorted_eigenvalues(gait_of_the_seed(start)[2])
 
 
 def sorted_eigenvalues(matrix):
@@ -80,15 +80,26 @@ def test_tight_gait(tight):
 
 
 def test_gait_of_the_reference_is_ours(tight, start):
-    state, measures = gait(start, parameters())
+    state, measures, _ = gait_of_the_seed(start)
     assert state == pytest.approx(np.array(start), abs=2e-9)
     ours = [float(getattr(tight.measures, name)) for name in MEASURES[:4]]
     assert measures == pytest.approx(np.array(ours), rel=1e-8)
 
 
+@pytest.mark.parametrize("changes", [{}, dict(K=1.1e6, l=0.402, xi=900.0, hip=0.1)])
+def test_the_reference_turns_as_scipy_does(changes, start):
+    """Two integrators of one motion: SciPy's, to 2e-12, and one that ends steps on switches."""
+    x, p = np.array(start), parameters(**changes)
+    x[0] += p[2] - SEED["l"]
+    expected, period, step_length = turn_by_scipy(x, p)
+    reached, _, measures = turn(x, p)
+    assert reached == pytest.approx(expected, abs=1e-10)
+    assert measures[:3] == pytest.approx([period, step_length, step_length / period], abs=1e-11)
+
+
 def test_derivative_of_the_reference_is_that_of_its_differences(start, multipliers):
-    """The variational equation and plain differences of turns, which are good to some 1e-5."""
-    differences = sorted_eigenvalues(jacobian(start))
+    """The variational equation and plain differences of turns."""
+    differences = sorted_eigenvalues(jacobian(start, parameters()))
     assert differences[:3] == pytest.approx(multipliers[:3], rel=3e-5)
     assert differences[3] == pytest.approx(multipliers[3], abs=1e-7)
 
