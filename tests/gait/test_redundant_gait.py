@@ -97,6 +97,19 @@ def test_the_command_finds_it_too(gaits, monkeypatch, tmp_path, capsys):
     assert "0.4408" in capsys.readouterr().out
 
 
+def test_return_map_takes_tangents_in_redundant_coordinates():
+    """Traced, not run: bristles that a state lacks have no tangents, and nothing asks for any."""
+
+    def lasting(stiffness):
+        scene = jb.with_parameters(jb.RedundantScene(jb.seed_scene()), {"K": stiffness})
+        return jb.return_map(scene, jb.seed_state())
+
+    one = jnp.asarray(1.0)
+    arrived, slope = jax.eval_shape(lambda k: jax.jvp(lasting, (k,), (one,)), 1e6 * one)
+    assert isinstance(arrived.state, jb.State)
+    assert slope.time.shape == slope.state.hip_x.shape == ()
+
+
 def test_other_engines_are_refused():
     with pytest.raises(jb.ArgumentError, match="redundant coordinates are diffrax's"):
         jb.find_gait(jb.RedundantScene(jb.seed_scene()), engine="lanes")
