@@ -129,7 +129,10 @@ def relative_costs(
     scenes: dict[str, Any] = {"minimal": scene}
     scenes |= {name: jb.RedundantScene(scene, name) for name in methods}
     one, many = jb.seed_state(), starts(count)
-    alone = {name: (_ends(held, integrator, single), one) for name, held in scenes.items()}
+    alone = {
+        name: (eqx.filter_jit(_ends(held, integrator, single)), one)
+        for name, held in scenes.items()
+    }
     together = {
         name: (eqx.filter_jit(jax.vmap(_ends(held, integrator, batch))), many)
         for name, held in scenes.items()
