@@ -1,6 +1,7 @@
 """What the experiments on the hip's constraints share."""
 
 import time
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -102,34 +103,83 @@ def starts(count: int) -> Any:
     return jb.State(**{n: every[n] if n in moving else still[n] for n in state._fields})
 
 
-def batch_seconds(
-    scene: jb.Scene, method: str, integrator: jb.Integrator, duration: float, count: int
-) -> float:
-    """Time of a warm batch of walks from scattered starts [s]."""
-    held = jb.RedundantScene(scene, method)
-    steps: dict[str, Any] = (
-        dict(dt=integrator.dt) if integrator.rtol is None else dict(rtol=integrator.rtol)
-    )
+def relative_costs(
+    scene: jb.Scene,
+    methods: tuple[str, ...],
+    integrator: jb.Integrator,
+    *,
+    single: float,
+    batch: float,
+    count: int,
+    turns: int,
+) -> dict[str, dict[str, float]]:
+    """What each method costs beside the standard one: for one walk, and in a batch.
 
-    @eqx.filter_jit
-    def ends(batch: Any) -> Any:
-        return jax.vmap(
-            lambda start: (
-                jb.simulate(
-                    held,
-                    start,
-                    duration=duration,
-                    solver=integrator.solver,
-                    save="end",
-                    watch=(),
-                    max_solver_steps=1 << 22,
-                    **steps,
-                ).state
-            )
-        )(batch)
+    Medians over runs that the methods, and the minimal formulation, take in turns, so that a
+    machine that is busy for a while is busy for all of them.
 
-    batch = starts(count)
-    jax.block_until_ready(ends(batch))
-    begin = time.perf_counter()
-    jax.block_until_ready(ends(batch))
-    return time.perf_counter() - begin
+    Args:
+        single, batch: simulated time of the one walk and of those in a batch [s].
+        count: walks in a batch.
+        turns: runs of each.
+
+    Returns:
+        By method, and `minimal`: seconds of a run, and the same relative to the standard method's.
+    """
+    scenes: dict[str, Any] = {"minimal": scene}
+    scenes |= {name: jb.RedundantScene(scene, name) for name in methods}
+    one, many = jb.seed_state(), starts(count)
+    alone = {
+        name: (eqx.filter_jit(_ends(held, integrator, single)), one)
+        for name, held in scenes.items()
+    }
+    together = {
+        name: (eqx.filter_jit(jax.vmap(_ends(held, integrator, batch))), many)
+        for name, held in scenes.items()
+    }
+    seconds = {"single": in_turns(alone, turns), "batch": in_turns(together, turns)}
+    return {
+        name: {f"{key}_s": found[name] for key, found in seconds.items()}
+        | {key: found[name] / found["standard"] for key, found in seconds.items()}
+        for name in scenes
+    }
+
+
+def _ends(scene: Any, integrator: jb.Integrator, duration: float) -> Callable[[Any], Any]:
+    def end(start: Any) -> Any:
+        return jb.simulate(
+            scene,
+            start,
+            duration=duration,
+            solver=integrator.solver,
+            rtol=integrator.rtol,
+            dt=integrator.dt,
+            save="end",
+            watch=(),
+            max_solver_steps=1 << 22,
+            engine="xla",
+        ).state
+
+    return end
+
+
+def in_turns(runs: dict[str, tuple[Callable[[Any], Any], Any]], turns: int) -> dict[str, float]:
+    """Median time of each function on its argument, warm [s]: one run of each, then another."""
+    for function, argument in runs.values():
+        jax.block_until_ready(function(argument))
+    seconds: dict[str, list[float]] = {name: [] for name in runs}
+    for _ in range(turns):
+        for name, (function, argument) in runs.items():
+            begin = time.perf_counter()
+            jax.block_until_ready(function(argument))
+            seconds[name].append(time.perf_counter() - begin)
+    return {name: float(np.median(values)) for name, values in seconds.items()}
+
+
+def cost_lines(costs: dict[str, dict[str, float]]) -> list[str]:
+    """The costs as a table."""
+    head = f"{'':<12}{'one walk s':>12}{'to standard':>12}{'batch s':>12}{'to standard':>12}"
+    keys = ("single_s", "single", "batch_s", "batch")
+    return [head] + [
+        f"{name:<12}" + "".join(f"{row[key]:>12.3g}" for key in keys) for name, row in costs.items()
+    ]

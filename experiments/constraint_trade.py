@@ -1,7 +1,8 @@
 """What each way to hold the hip costs for its accuracy, and what its constants do.
 
 Error against the minimal formulation over cost, every method × integrator × tolerance; maps of
-Baumgarte's a and b and of the penalty's A, ω and ζ.
+Baumgarte's a and b and of the penalty's A, ω and ζ; and each method's time beside the standard
+one's, for one walk and in a batch.
 """
 
 from typing import Any
@@ -10,7 +11,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from _held import COLOURS, FLOOR, MARKERS, truth_of
+from _held import COLOURS, FLOOR, MARKERS, cost_lines, relative_costs, truth_of
 from _options import Options, parse
 
 import jaxbiped as jb
@@ -18,6 +19,7 @@ from jaxbiped.plot._style import dress, new_figure
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 STEPS = (1e-4, 1e-5, 1e-6)
+COSTED = jb.Integrator("rodas4", rtol=1e-6)
 DURATION, QUICK_DURATION = 1.0, 0.1
 
 
@@ -46,16 +48,26 @@ def main() -> None:
     }
     if not quick:
         maps["damping"] = damping_map(scene, duration, count, quick)
-    say(options, runs, maps)
+    costs = costs_of(scene, methods, quick)
+    say(options, runs, maps, costs)
     pictures = [draw_trade(options, runs), draw_maps(options, maps)]
     options.finish(
         {
             "duration_s": duration,
             "runs": [run._asdict() | {"state_error": finite(run.state_error)} for run in runs],
             "maps": maps,
+            "costs": costs,
             "pictures": pictures,
         }
     )
+
+
+def costs_of(scene: jb.Scene, methods: tuple[str, ...], quick: bool) -> dict[str, Any]:
+    if quick:
+        how, size = jb.Integrator("euler", dt=1e-5), dict(single=2e-3, batch=2e-4, count=8, turns=3)
+    else:
+        how, size = COSTED, dict(single=2.0, batch=0.4408, count=1024, turns=7)
+    return relative_costs(scene, methods, how, **size)  # type: ignore[arg-type]
 
 
 def finite(value: float) -> float | None:
@@ -132,7 +144,9 @@ def damping_map(scene: jb.Scene, duration: float, count: int, quick: bool) -> di
     }
 
 
-def say(options: Options, runs: list[jb.ConstraintRun], maps: dict[str, Any]) -> None:
+def say(
+    options: Options, runs: list[jb.ConstraintRun], maps: dict[str, Any], costs: dict[str, Any]
+) -> None:
     options.say("method      integrator      by  ending    violation    error   steps     time s")
     for run in runs:
         options.say(
@@ -149,6 +163,8 @@ def say(options: Options, runs: list[jb.ConstraintRun], maps: dict[str, Any]) ->
                 f"{found['row'][i]:.3g}, {found['columns']} = {found['column'][j]:.3g}; "
                 f"{int(np.sum(found['failed']))} of {error.size} failed"
             )
+    for line in cost_lines(costs):
+        options.say(line)
 
 
 def draw_trade(options: Options, runs: list[jb.ConstraintRun]) -> str:

@@ -7,19 +7,24 @@ from typing import Any
 
 import numpy as np
 from _held import (
-    COLOURS,
     FLOOR,
     PROJECTING,
-    STYLES,
     Curve,
-    batch_seconds,
+    cost_lines,
     curve_of,
+    relative_costs,
     truth_of,
+)
+from _held_pictures import (
+    draw_all,
+    draw_costs,
+    draw_each,
+    draw_integrators,
+    draw_times,
 )
 from _options import Options, parse
 
 import jaxbiped as jb
-from jaxbiped.plot._style import dress, new_figure
 
 ODE = jb.Integrator("dopri5", rtol=1e-3)
 """What the paper's "ode" is taken for: Dormand and Prince's pair at MATLAB's usual tolerance."""
@@ -46,7 +51,7 @@ def main() -> None:
         for name, how in tried.items()
     }
     long = {} if quick else hundred_footsteps(scene)
-    costs = costs_of(scene, by_method, long, euler, quick)
+    costs = costs_of(scene, methods, euler, quick)
     verdicts = judged(by_method, by_integrator, long)
     say(options, by_method, by_integrator, costs, long, verdicts)
     pictures = [
@@ -91,27 +96,13 @@ def hundred_footsteps(scene: jb.Scene) -> dict[str, Curve]:
 
 
 def costs_of(
-    scene: jb.Scene,
-    by_method: dict[str, Curve],
-    long: dict[str, Curve],
-    euler: jb.Integrator,
-    quick: bool,
+    scene: jb.Scene, methods: tuple[str, ...], euler: jb.Integrator, quick: bool
 ) -> dict[str, dict[str, float]]:
-    """Times relative to the standard method: one walk, and in a batch, by Euler and by rodas4."""
-    count, short = (64, 1e-3) if quick else (1024, 2e-3)
-    costs: dict[str, dict[str, float]] = {}
-    for name, curve in by_method.items():
-        found = {"euler_single": curve.seconds}
-        found["euler_batch"] = batch_seconds(scene, name, euler, short, count)
-        if not quick:
-            found["rodas4_single"] = long[name].seconds
-            found["rodas4_batch"] = batch_seconds(scene, name, STIFF, FOOTSTEP, count)
-        costs[name] = found
-    usual = costs["standard"]
-    return {
-        name: {key: value / usual[key] for key, value in found.items()}
-        for name, found in costs.items()
-    }
+    """Times beside the standard method's by Euler steps, of one walk and in a batch."""
+    count, single, batch = (64, 0.02, 1e-3) if quick else (1024, 0.05, 2e-3)
+    return relative_costs(
+        scene, methods, euler, single=single, batch=batch, count=count, turns=3 if quick else 7
+    )
 
 
 def numbers(curve: Curve) -> dict[str, Any]:
@@ -222,105 +213,11 @@ def say(
                 f"{curve.largest(0.5, 1.0):.1e} m  {curve.at_steps:.1e} m  "
                 f"{curve.error:.1e}  {curve.seconds:.3f} s"
             )
-    options.say("time relative to the standard method: " + ", ".join(next(iter(costs.values()))))
-    for name, row in costs.items():
-        options.say(f"  {name:<12}" + "".join(f"{value:>8.2f}" for value in row.values()))
+    for line in cost_lines(costs):
+        options.say(line)
     for each in verdicts:
         word = "confirmed" if each["confirmed"] else "CONTRADICTED"
         options.say(f'figure {each["figure"]}, {word}: "{each["sentence"]}" ({each["numbers"]})')
-
-
-def draw_each(options: Options, curves: dict[str, Curve]) -> str:
-    columns = 3 if len(curves) < 7 else 4
-    rows = -(-len(curves) // columns)
-    figure = new_figure(3.0 * columns, 2.4 * rows)
-    axes = np.ravel(figure.subplots(rows, columns, squeeze=False))
-    for k, (name, curve) in enumerate(curves.items()):
-        axes[k].plot(curve.t, curve.position, color=COLOURS[k], linewidth=1.0)
-        dress(axes[k], name, "time (s)", "violation (m)")
-        axes[k].ticklabel_format(axis="y", style="sci", scilimits=(0, 0), useMathText=True)
-        axes[k].set_title(name, loc="right", fontsize="medium")
-        axes[k].set_title("", loc="left")
-    for ax in axes[len(curves) :]:
-        ax.set_visible(False)
-    return saved(options, figure, "fig11_violation.png")
-
-
-def draw_all(options: Options, name: str, curves: dict[str, Curve], title: str) -> str:
-    figure = new_figure(9.0, 3.8)
-    linear, logarithmic = figure.subplots(1, 2)
-    names = list(jb.CONSTRAINT_METHODS)
-    for method, curve in curves.items():
-        k = names.index(method)
-        style = dict(color=COLOURS[k], linestyle=STYLES[k], linewidth=1.1)
-        linear.plot(curve.t, curve.position, label=method, **style)
-        logarithmic.plot(curve.t, np.maximum(curve.position, FLOOR), **style)
-    logarithmic.set_yscale("log")
-    dress(linear, title, "time (s)", "violation (m)")
-    linear.ticklabel_format(axis="y", style="sci", scilimits=(0, 0), useMathText=True)
-    linear.set_title("", loc="left")
-    dress(logarithmic, "logarithmic", "time (s)", "violation (m)")
-    figure.suptitle(title, fontsize=10)
-    handles, labels = linear.get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside lower center", ncols=min(len(labels), 4), frameon=False
-    )
-    return saved(options, figure, name)
-
-
-def draw_costs(options: Options, costs: dict[str, dict[str, float]]) -> str:
-    figure = new_figure(7.0, 3.6)
-    ax = figure.subplots()
-    keys = list(next(iter(costs.values())))
-    width = 0.8 / len(keys)
-    for j, key in enumerate(keys):
-        places = np.arange(len(costs)) + (j - 0.5 * (len(keys) - 1)) * width
-        ax.bar(places, [row[key] for row in costs.values()], width, color=COLOURS[j + 1], label=key)
-    ax.set_xticks(np.arange(len(costs)), list(costs))
-    ax.axhline(1.0, color="#595959", linewidth=0.8)
-    dress(ax, "", "method", "time, standard = 1")
-    labels = [key.replace("_", ", ") for key in keys]
-    figure.legend(ax.get_legend_handles_labels()[0], labels, loc="outside upper center", ncols=4)
-    return saved(options, figure, "fig14_time_ratio.png")
-
-
-def draw_integrators(
-    options: Options, name: str, method: str, curves: dict[tuple[str, str], Curve]
-) -> str:
-    figure = new_figure(6.4, 3.8)
-    ax = figure.subplots()
-    mine = {i: c for (m, i), c in curves.items() if m == method}
-    for k, (integrator, curve) in enumerate(mine.items()):
-        values = np.maximum(curve.position, FLOOR)
-        ax.plot(curve.t, values, color=COLOURS[k], linestyle=STYLES[k], label=integrator)
-    ax.set_yscale("log")
-    dress(ax, f"Integrators, {method} method", "time (s)", "violation (m)")
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    return saved(options, figure, name)
-
-
-def draw_times(options: Options, curves: dict[tuple[str, str], Curve]) -> str:
-    figure = new_figure(6.4, 3.6)
-    ax = figure.subplots()
-    names = list(dict.fromkeys(name for _, name in curves))
-    for k, method in enumerate(("augmented", "standard")):
-        seconds = [curves[method, name].seconds for name in names]
-        places = np.arange(len(names)) + 0.4 * (k - 0.5)
-        ax.bar(places, seconds, 0.38, color=COLOURS[k + 2], label=method)
-        for place, value in zip(places, seconds, strict=True):
-            ax.annotate(f"{value:.2g}", (place, value), ha="center", va="bottom", fontsize=8)
-    ax.set_xticks(np.arange(len(names)), names)
-    ax.set_yscale("log")
-    ax.margins(y=0.15)
-    dress(ax, "Time of the integrators", "integrator", "time of a run (s)")
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside upper right", ncols=2)
-    return saved(options, figure, "fig17_times.png")
-
-
-def saved(options: Options, figure: Any, name: str) -> str:
-    path = options.path(name)
-    figure.savefig(path, dpi=150)
-    return str(path)
 
 
 if __name__ == "__main__":

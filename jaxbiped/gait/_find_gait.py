@@ -65,7 +65,9 @@ def find_gait(
     Args:
         scene: the walker, compliant or rigid. In redundant coordinates every passage starts on the
             constraints, and returns, multipliers and sensitivities are told in minimal ones: the
-            constraint directions are left out. Second derivatives take the minimal equations.
+            constraint directions are left out. Second derivatives (the spectral radius's) take the
+            minimal equations along the redundant motion: on the constraints these are the method's
+            own, but for what a penalty leaves (a share of 1/(A s), see `Penalty`).
         guess: a start near the gait, on the section or not; unless given, the seed's start, its
             stance foot set down as deep for the scene's own legs and rolling as fast.
         period: footsteps in a cycle.

@@ -19,14 +19,15 @@ from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gradient import AbstractGradient, Implicit
 from jaxbiped.gait._return_map import Return, return_map
 from jaxbiped.scene._parameters import chosen_parameters
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._elimination import solution
 
 
 def gait_measures(
-    scene: Scene | RigidScene,
-    guess: State | RigidState | None = None,
+    scene: Scene | RigidScene | RedundantScene,
+    guess: Any = None,
     *,
     gradient: AbstractGradient | None = None,
     period: int = 1,
@@ -40,7 +41,8 @@ def gait_measures(
     - `Forward()`, `Reverse()`: the gait is searched without derivatives, and one differentiable
       Newton correction of it carries them; no peak force and no spectral radius (None).
 
-    NaN where no gait is found.
+    NaN where no gait is found. How a redundant scene's hip is held makes no difference to its gait:
+    by `Implicit()` the derivatives by a method's constants are zero.
 
     Args:
         scene, guess, period, section, accuracy, engine: as for `find_gait`.
@@ -85,9 +87,10 @@ def gait_measures(
     return _by_correction(gait, turn)
 
 
-def _by_theorem(scene: Scene | RigidScene, gait: Gait) -> Measures:
-    _, active = chosen_parameters(scene, gait.parameters)
-    leaves = jtu.tree_leaves(scene)
+def _by_theorem(scene: Scene | RigidScene | RedundantScene, gait: Gait) -> Measures:
+    modelled = scene.scene if isinstance(scene, RedundantScene) else scene
+    _, active = chosen_parameters(modelled, gait.parameters)
+    leaves = jtu.tree_leaves(modelled)
     parameters = jnp.stack([leaves[i] for i in active])
     return _where_found(gait, _attached(gait.measures, gait.sensitivities, parameters))
 

@@ -111,9 +111,8 @@ def _dense(tangents: PyTree, like: PyTree) -> list[Scalar]:
 
 
 def full_tangents(tangents: PyTree, like: PyTree) -> PyTree:
-    return jtu.tree_map(
-        lambda leaf, dot: jnp.zeros_like(leaf) if dot is None else dot,
-        like,
-        tangents,
-        is_leaf=lambda leaf: leaf is None,
-    )
+    def full(leaf: Any, dot: Any) -> Any:
+        # A part that there is not, as bristles may be, has no tangent either.
+        return jnp.zeros_like(leaf) if dot is None and leaf is not None else dot
+
+    return jtu.tree_map(full, like, tangents, is_leaf=lambda leaf: leaf is None)

@@ -4,15 +4,9 @@ from typing import ClassVar
 
 import equinox as eqx
 
-from jaxbiped._checks import check_at_least
 from jaxbiped._types import Parameter, Scalar, as_float
-from jaxbiped.scene._constraint_method import (
-    AbstractConstraintMethod,
-    Constrained,
-    gram,
-    inverse_masses,
-)
-from jaxbiped.scene._penalised import check_penalty, penalty_system, repeated
+from jaxbiped.scene._constraint_method import AbstractConstraintMethod, Constrained
+from jaxbiped.scene._penalised import augmented_multipliers, check_augmented
 
 
 class Augmented(AbstractConstraintMethod):
@@ -41,10 +35,7 @@ class Augmented(AbstractConstraintMethod):
     needs_independent: ClassVar[bool] = False
 
     def __check_init__(self) -> None:
-        check_penalty(self.A, self.omega, self.zeta)
-        check_at_least("iterations", self.iterations, "1", 1)
+        check_augmented(self.A, self.omega, self.zeta, self.iterations)
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
-        factors, right = penalty_system(system, self.A, self.omega, self.zeta)
-        matrix = gram(system.rows, inverse_masses(system.masses))
-        return repeated(factors, matrix, right, self.iterations)
+        return augmented_multipliers(system, self.A, self.omega, self.zeta, self.iterations)

@@ -103,8 +103,9 @@ def inverse_masses(masses: list[Scalar]) -> list[Scalar]:
     return [1.0 / mass for mass in masses]
 
 
-def exact_multipliers(system: Constrained, right: list[Scalar]) -> list[Scalar]:
-    """λ with (J M⁻¹ Jᵀ) λ = right."""
+def exact_multipliers(system: Constrained, right: list[Scalar] | None = None) -> list[Scalar]:
+    """λ with (J M⁻¹ Jᵀ) λ = right, the free residual unless given."""
+    right = free_residual(system) if right is None else right
     return solved(factorised(gram(system.rows, inverse_masses(system.masses))), right)
 
 
@@ -116,3 +117,8 @@ def moved_by(rows: list[Row], weights: list[Scalar], multipliers: list[Scalar]) 
             move = -weights[c] * entry * value
             moves[c] = moves[c] + move if c in moves else move
     return moves
+
+
+def projection(rows: list[Row], weights: list[Scalar], residual: list[Scalar]) -> Row:
+    """−W Jᵀ(J W Jᵀ)⁻¹ r for a diagonal W."""
+    return moved_by(rows, weights, solved(factorised(gram(rows, weights)), residual))

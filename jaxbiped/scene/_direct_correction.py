@@ -6,16 +6,13 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxbiped._checks import check_at_least
-from jaxbiped._symmetric import factorised, solved
 from jaxbiped._types import Scalar
 from jaxbiped.scene._constraint_method import (
     AbstractProjectingMethod,
     Constrained,
     Row,
     exact_multipliers,
-    free_residual,
-    gram,
-    moved_by,
+    projection,
 )
 
 
@@ -41,8 +38,7 @@ class DirectCorrection(AbstractProjectingMethod):
         check_at_least("iterations", self.iterations, "1", 1)
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
-        return exact_multipliers(system, free_residual(system))
+        return exact_multipliers(system)
 
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
-        ones = [jnp.ones_like(mass) for mass in masses]
-        return moved_by(rows, ones, solved(factorised(gram(rows, ones)), residual))
+        return projection(rows, [jnp.ones_like(mass) for mass in masses], residual)

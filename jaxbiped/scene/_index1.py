@@ -5,17 +5,14 @@ from typing import ClassVar
 import equinox as eqx
 
 from jaxbiped._checks import check_at_least
-from jaxbiped._symmetric import factorised, solved
 from jaxbiped._types import Scalar
 from jaxbiped.scene._constraint_method import (
     AbstractProjectingMethod,
     Constrained,
     Row,
     exact_multipliers,
-    free_residual,
-    gram,
     inverse_masses,
-    moved_by,
+    projection,
 )
 
 
@@ -41,8 +38,7 @@ class Index1(AbstractProjectingMethod):
         check_at_least("iterations", self.iterations, "1", 1)
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
-        return exact_multipliers(system, free_residual(system))
+        return exact_multipliers(system)
 
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
-        weights = inverse_masses(masses)
-        return moved_by(rows, weights, solved(factorised(gram(rows, weights)), residual))
+        return projection(rows, inverse_masses(masses), residual)

@@ -4,7 +4,6 @@ from typing import ClassVar
 
 import equinox as eqx
 
-from jaxbiped._checks import check_at_least
 from jaxbiped._symmetric import factorised
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene._constraint_method import (
@@ -15,7 +14,7 @@ from jaxbiped.scene._constraint_method import (
     inverse_masses,
     moved_by,
 )
-from jaxbiped.scene._penalised import check_penalty, penalty_system, repeated
+from jaxbiped.scene._penalised import augmented_multipliers, check_augmented, repeated
 
 
 class Index1Augmented(AbstractProjectingMethod):
@@ -43,13 +42,10 @@ class Index1Augmented(AbstractProjectingMethod):
     needs_independent: ClassVar[bool] = False
 
     def __check_init__(self) -> None:
-        check_penalty(self.A, self.omega, self.zeta)
-        check_at_least("iterations", self.iterations, "1", 1)
+        check_augmented(self.A, self.omega, self.zeta, self.iterations)
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
-        factors, right = penalty_system(system, self.A, self.omega, self.zeta)
-        matrix = gram(system.rows, inverse_masses(system.masses))
-        return repeated(factors, matrix, right, self.iterations)
+        return augmented_multipliers(system, self.A, self.omega, self.zeta, self.iterations)
 
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
         weights = inverse_masses(masses)

@@ -7,7 +7,6 @@ from jaxbiped.scene._constraint_method import (
     AbstractConstraintMethod,
     Constrained,
     exact_multipliers,
-    free_residual,
 )
 
 
@@ -23,4 +22,4 @@ class Standard(AbstractConstraintMethod):
     needs_independent: ClassVar[bool] = True
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
-        return exact_multipliers(system, free_residual(system))
+        return exact_multipliers(system)

@@ -1,6 +1,6 @@
 """What the methods with a penalty have in common."""
 
-from jaxbiped._checks import check_not_negative, check_positive
+from jaxbiped._checks import check_at_least, check_not_negative, check_positive
 from jaxbiped._symmetric import Factors, factorised, solved
 from jaxbiped._types import Scalar
 from jaxbiped.scene._constraint_method import Constrained, gram, inverse_masses, stabilised
@@ -13,6 +13,12 @@ def check_penalty(A: Scalar, omega: Scalar, zeta: Scalar) -> None:
     check_not_negative("zeta", zeta)
 
 
+def check_augmented(A: Scalar, omega: Scalar, zeta: Scalar, iterations: int) -> None:
+    """`check_penalty`, and raises `ArgumentError` for fewer than one iteration."""
+    check_penalty(A, omega, zeta)
+    check_at_least("iterations", iterations, "1", 1)
+
+
 def penalty_system(
     system: Constrained, A: Scalar, omega: Scalar, zeta: Scalar
 ) -> tuple[Factors, list[Scalar]]:
@@ -23,6 +29,14 @@ def penalty_system(
     """
     right = stabilised(system, 2.0 * zeta * omega, omega * omega)
     return factorised(gram(system.rows, inverse_masses(system.masses), 1.0 / A)), right
+
+
+def augmented_multipliers(
+    system: Constrained, A: Scalar, omega: Scalar, zeta: Scalar, iterations: int
+) -> list[Scalar]:
+    """λ of the augmented Lagrangian: the penalty's, and again for what that leaves."""
+    factors, right = penalty_system(system, A, omega, zeta)
+    return repeated(factors, gram(system.rows, inverse_masses(system.masses)), right, iterations)
 
 
 def repeated(

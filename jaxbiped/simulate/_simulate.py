@@ -25,6 +25,7 @@ from jaxbiped.simulate._start import check_steps, start_for
 from jaxbiped.solve._accuracy import check_precision, tolerances
 from jaxbiped.solve._ending import WATCHES
 from jaxbiped.solve._footstep_limit import PATIENCE
+from jaxbiped.solve._projected import check_adjoint
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -67,7 +68,9 @@ def simulate(
         rtol: relative tolerance, in place of the accuracy's.
         atol: absolute tolerance (SI), in place of a hundredth of the relative one.
         dt: steps of this size [s], in place of tolerances; explicit methods fail on stiff contact
-            unless it is about 1e-6.
+            unless it is about 1e-6, and their derivatives unless it is half of that: friction's
+            rate, up to 5e6 1/s, makes a longer Euler step unstable, which the state survives
+            because friction saturates, and derivatives do not.
         save: "steps" for every step and the continuous solution, "end" for the final state, an
             array of increasing times [s], shape (n,), at which to save, or a section (by lanes
             only), at whose arrivals to save: `HeelStrike()` saves the footsteps. The legs take
@@ -78,7 +81,8 @@ def simulate(
         watch: which misfortunes end the solve: any of "fall", "stop", "stumble".
         max_solver_steps: cap on the solver's attempted steps.
         adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
-            needs `diffrax.ForwardMode()`.
+            needs `diffrax.ForwardMode()`. Where a method projects after each step, only adjoints
+            that see the steps are allowed.
         engine: "xla", "lanes" or "auto" (see `ENGINES`). The results of the two agree to within
             the tolerance, not bit by bit.
 
@@ -176,6 +180,8 @@ class Simulation(eqx.Module):
         check_precision(scene, dtype)
         method = solver_named(solver)
         check_steps(method, dt, most_steps=max_solver_steps, duration=time)
+        if isinstance(scene, RedundantScene):
+            check_adjoint(scene.method, adjoint)
 
         def cast(leaf: Any) -> Array:
             return jnp.asarray(leaf, dtype=dtype)

@@ -17,7 +17,7 @@ from jaxbiped.scene._constraint_method import AbstractProjectingMethod
 from jaxbiped.scene._linkage_scene import LinkageScene
 from jaxbiped.simulate._start import check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
-from jaxbiped.solve._projected import wrapped
+from jaxbiped.solve._projected import check_adjoint, wrapped
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._step_control import first_step, step_control
 
@@ -87,6 +87,7 @@ def swing(
     method = solver_named(solver)
     check_steps(method, dt, most_steps=max_solver_steps, duration=times[-1])
     check_independent(scene.linkage, scene.method, state.q)
+    check_adjoint(scene.method, adjoint)
     relative, absolute = tolerances(accuracy, rtol, atol)
     control = step_control(relative, absolute, rms_norm) if dt is None else None
     scene = jtu.tree_map(as_float, scene)

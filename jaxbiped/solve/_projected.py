@@ -9,9 +9,28 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._consistent import projected
-from jaxbiped.scene._constraint_method import AbstractProjectingMethod
+from jaxbiped.scene._constraint_method import AbstractConstraintMethod, AbstractProjectingMethod
 from jaxbiped.scene._redundant_scene import RedundantScene
+
+_SCAN_KINDS: dict[Any, str | None] = {
+    diffrax.RecursiveCheckpointAdjoint: None,
+    diffrax.DirectAdjoint: "bounded",
+    diffrax.ForwardMode: "lax",
+}
+"""Adjoints that go through the steps themselves, and how Runge–Kutta methods loop for them."""
+
+
+def check_adjoint(method: AbstractConstraintMethod, adjoint: Any) -> None:
+    """Raises `ArgumentError` for an adjoint that would not see a method's projections."""
+    projects = isinstance(method, AbstractProjectingMethod)
+    if projects and adjoint is not None and type(adjoint) not in _SCAN_KINDS:
+        raise ArgumentError(
+            f"adjoint = {type(adjoint).__name__} is not allowed for method = "
+            f"{type(method).__name__}, which projects after each step: choose one that sees the "
+            f"steps, {', '.join(kind.__name__ for kind in _SCAN_KINDS)}."
+        )
 
 
 class Projected(diffrax.AbstractWrappedSolver):
@@ -80,10 +99,10 @@ class Projected(diffrax.AbstractWrappedSolver):
 
 def wrapped(solver: Any, project: Callable[[PyTree, PyTree], PyTree], adjoint: Any = None) -> Any:
     """A `Projected` solver, ready for what will differentiate it."""
-    unset = getattr(solver, "scan_kind", "none") is None
-    if isinstance(adjoint, diffrax.ForwardMode) and unset:
+    kind = _SCAN_KINDS.get(type(adjoint))
+    if kind is not None and getattr(solver, "scan_kind", "none") is None:
         # diffrax would set it, but cannot through a wrapper.
-        solver = dataclasses.replace(solver, scan_kind="lax")
+        solver = dataclasses.replace(solver, scan_kind=kind)
     return Projected(solver, project)
 
 

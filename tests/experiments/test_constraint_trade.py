@@ -7,7 +7,7 @@ def test_errors_costs_and_maps(tmp_path):
     numbers = quick_numbers(
         "constraint_trade",
         tmp_path,
-        keys={"runs", "maps"},
+        keys={"runs", "maps", "costs"},
         pictures={"trade.png", "constants.png"},
     )
     runs = {(run["method"], run["rtol_or_dt"]): run for run in numbers["runs"]}
@@ -16,6 +16,12 @@ def test_errors_costs_and_maps(tmp_path):
         assert fine["state_error"] < 0.3 * coarse["state_error"]
         assert fine["steps"] == 10 * coarse["steps"]
     assert runs["index1", 1e-5]["max_violation_m"] < 1e-15
+    costs = numbers["costs"]
+    assert set(costs) == {"minimal", "standard", "index1"}
+    for key in ("single", "batch"):
+        usual = costs["standard"][f"{key}_s"]
+        for each in costs.values():
+            assert each[key] == each[f"{key}_s"] / usual > 0.0
     found = numbers["maps"]["baumgarte"]
     off = np.array(found["max_violation_m"], dtype=float)
     # Faster decay, smaller violation: along a = b, as far as Euler steps stand it.

@@ -1,19 +1,32 @@
 """The periodic gait found in redundant coordinates is the minimal one."""
 
+import json
+
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.cli import _gait as command
+from jaxbiped.cli import main
+from jaxbiped.gait import _gait_measures as measuring
+
+HOW = dict(parameters=("K", "c"), radius_sensitivities=False, accuracy="tight")
+"""All tests here ask for the same, so that one compiled search serves them."""
+
+
+def find_alike(*arguments, **options):
+    """`find_gait` with fewer sensitivities, whatever was asked for."""
+    return jb.find_gait(*arguments, **options | HOW)
 
 
 @pytest.fixture(scope="module")
 def gaits():
     """The seed's gait: by lanes in minimal coordinates, and by diffrax in redundant ones."""
     scene = jb.seed_scene()
-    how = dict(parameters=("K", "c"), radius_sensitivities=False, accuracy="tight")
-    minimal = jb.find_gait(scene, **how)
-    redundant = jb.find_gait(jb.RedundantScene(scene), minimal.measures.state, **how)
+    minimal = find_alike(scene)
+    redundant = find_alike(jb.RedundantScene(scene), minimal.measures.state)
     return minimal, redundant
 
 
@@ -42,6 +55,59 @@ def test_orbit_is_told_in_minimal_coordinates(gaits):
     assert isinstance(states, jb.State)
     alive = np.isfinite(np.asarray(times[0]))
     assert np.isfinite(np.asarray(states.hip_x[0])[alive]).all()
+
+
+def test_measures_differentiate_in_both_modes(gaits, monkeypatch):
+    """By the leaves of what is modelled; the method's own have no part in the gait."""
+    minimal, redundant = gaits
+    scene, start = jb.RedundantScene(jb.seed_scene()), redundant.measures.state
+    monkeypatch.setattr(measuring, "find_gait", find_alike)
+
+    def period(scene):
+        return jb.gait_measures(scene, start, accuracy="tight").period
+
+    value, slopes = jax.value_and_grad(period)(scene)
+    assert float(value) == pytest.approx(float(minimal.measures.period), abs=1e-9)
+    modelled = slopes.scene.normal
+    for name, slope, at in zip(
+        HOW["parameters"], minimal.sensitivities.period, (1e6, 1e7), strict=True
+    ):
+        assert float(getattr(modelled, name)) == pytest.approx(float(slope), rel=1e-5)
+        along = jax.jvp(
+            lambda x, name=name: period(jb.with_parameters(scene, {name: x})),
+            (jnp.asarray(at),),
+            (jnp.asarray(1.0),),
+        )
+        assert float(along[1]) == pytest.approx(float(getattr(modelled, name)), rel=1e-9)
+
+
+def test_the_command_finds_it_too(gaits, monkeypatch, tmp_path, capsys):
+    """From the seed's start; the same search, told and written as any gait is."""
+    minimal, _ = gaits
+    monkeypatch.setattr(command, "find_gait", find_alike)
+    flags = ("--formulation", "redundant", "--method", "index1", "--accuracy", "tight")
+    with pytest.raises(SystemExit) as stopped:
+        main(["gait", *flags, "--json", str(tmp_path / "gait.json")])
+    assert stopped.value.code == 0
+    numbers = json.loads((tmp_path / "gait.json").read_text())
+    assert numbers["ending"] == "found"
+    assert numbers["engine"] == "xla"
+    assert numbers["period_s"] == pytest.approx(float(minimal.measures.period), abs=1e-6)
+    assert set(numbers["elasticities"]) == {"K", "c"}
+    assert "0.4408" in capsys.readouterr().out
+
+
+def test_return_map_takes_tangents_in_redundant_coordinates():
+    """Traced, not run: bristles that a state lacks have no tangents, and nothing asks for any."""
+
+    def lasting(stiffness):
+        scene = jb.with_parameters(jb.RedundantScene(jb.seed_scene()), {"K": stiffness})
+        return jb.return_map(scene, jb.seed_state())
+
+    one = jnp.asarray(1.0)
+    arrived, slope = jax.eval_shape(lambda k: jax.jvp(lasting, (k,), (one,)), 1e6 * one)
+    assert isinstance(arrived.state, jb.State)
+    assert slope.time.shape == slope.state.hip_x.shape == ()
 
 
 def test_other_engines_are_refused():

@@ -1,5 +1,7 @@
 """Simulations against an independent integrator, closed forms, and each other."""
 
+import functools
+
 import diffrax
 import jax
 import jax.numpy as jnp
@@ -257,3 +259,26 @@ def test_extremes_of_the_contact_parameters():
     ):
         assert jb.Ending(int(ending)) == jb.Ending.WALKING, name
         assert int(attempts) < 40000, name
+
+
+def test_derivatives_need_shorter_euler_steps_than_states():
+    """At 1 µs friction makes the step itself unstable; its saturation saves the state alone."""
+
+    @jax.jit
+    @functools.partial(jax.vmap, in_axes=(0, None))
+    def rise(change, dt):
+        def end(change):
+            scene = jb.with_parameters(jb.seed_scene(), {"c": 1e7 * (1.0 + change)})
+            how = dict(solver="euler", dt=dt, save="end", watch=(), max_solver_steps=4096)
+            forward = diffrax.ForwardMode()
+            walk = jb.simulate(scene, jb.seed_state(), duration=8e-4, adjoint=forward, **how)
+            return walk.final.hip_vz
+
+        return jax.jvp(end, (change,), (jnp.ones_like(change),))
+
+    changes = jnp.asarray([-1e-5, 0.0, 1e-5])
+    found = {dt: rise(changes, jnp.asarray(dt)) for dt in (1e-6, 5e-7)}
+    values, slopes = found[5e-7]
+    assert float(slopes[1]) == pytest.approx(float(values[2] - values[0]) / 2e-5, rel=1e-5)
+    assert float(found[1e-6][0][1]) == pytest.approx(float(values[1]), abs=1e-5)
+    assert abs(float(found[1e-6][1][1])) > 1e3 * abs(float(slopes[1]))
