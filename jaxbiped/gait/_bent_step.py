@@ -134,7 +134,7 @@ def linear_about(
     # A step that ends on a switch belongs to the old side; a corrected point may lie beyond.
     short = jnp.where(crossing.crossed, path.after - MARGIN * ends, points[2])
     points = jnp.concatenate([points[:2], short[None]])
-    away = MARGIN * jnp.asarray(SIDES)[:, None] * ends
+    away = jnp.asarray(SIDES)[:, None] * ends
     found = jax.lax.map(
         rows.gradient, jnp.concatenate([points, path.before[None], crossing.landed + away])
     )

@@ -9,10 +9,11 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._radau import Rates, stacked, velocities, with_seeds
-from jaxbiped.solve._landing import MARGIN
 
-SIDES = (1.0, 4.0, 16.0, -1.0, -4.0, -16.0)
-"""When, in units of the margin, the two sides of a switch are looked at: first the new one."""
+SIDES = tuple(1e-10 * side for side in (1.0, 4.0, 16.0, -1.0, -4.0, -16.0))
+"""When the two sides of a switch are looked at [s]: first the new one. Nearer, penetrations are all
+rounding; a thousand times the margin away, Jacobians have changed by more than their jump's error.
+"""
 
 
 class Crossings(NamedTuple):
@@ -99,7 +100,7 @@ def crossing_of(
 def sides_of(rates: Rates, crossings: Crossings, parameters: Scalar) -> Scalar:
     """Points on the new and then the old side of each crossing, shape (steps, 6, c)."""
     speed = velocities(rates, crossings.landed, parameters)
-    away = MARGIN * jnp.array(SIDES)
+    away = jnp.array(SIDES)
     return crossings.landed[:, None] + away[:, None] * speed[:, None]
 
 
