@@ -40,6 +40,7 @@ def main() -> None:
         integrators=integrators,
         methods={name: name for name in methods},
         repeats=1,
+        progress=True,
     )
     count = 3 if quick else 9
     maps = {

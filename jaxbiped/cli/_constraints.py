@@ -60,6 +60,7 @@ class Constraints:
             duration=self.duration,
             integrators=integrators,
             methods={name: name for name in self.methods},
+            progress=True,
         )
         report = Report(self.json)
         report.say(run_table(runs))

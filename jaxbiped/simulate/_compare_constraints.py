@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_positive, check_type
 from jaxbiped.dynamics._redundant_motion import violation
@@ -95,6 +96,7 @@ def compare_constraints(
     methods: Mapping[str, Any] | None = None,
     orientation: str = "angle",
     repeats: int = 3,
+    progress: bool = False,
 ) -> list[ConstraintRun]:
     """Runs every method with every integrator from one start, compiled and timed apart.
 
@@ -108,6 +110,7 @@ def compare_constraints(
         methods: `AbstractConstraintMethod`s by the names to give them; all seven unless given.
         orientation: one of `ORIENTATIONS`.
         repeats: runs of which the fastest counts.
+        progress: whether to show a bar on stderr.
 
     Raises:
         ArgumentError: an argument that is not allowed.
@@ -120,10 +123,10 @@ def compare_constraints(
         name: RedundantScene(scene, method_named(how), orientation) for name, how in chosen.items()
     }
     truth = final_truth(scene, state, duration)
+    every = [(name, integrator) for name in scenes for integrator in integrators]
     return [
-        _run(name, redundant, state, duration, integrator, truth, int(repeats))
-        for name, redundant in scenes.items()
-        for integrator in integrators
+        _run(name, scenes[name], state, duration, integrator, truth, int(repeats))
+        for name, integrator in tqdm(every, unit="runs", disable=not progress)
     ]
 
 

@@ -19,7 +19,9 @@ def test_compares_methods_and_integrators(capsys):
     flags = ("--methods", "standard", "described", "--duration", "0.05")
     integrators = ("--integrators", "euler:dt=1e-5", "euler:dt=2e-3")
     assert _run("constraints", *flags, *integrators, "--json", "-") == 0
-    runs = json.loads(capsys.readouterr().out)["runs"]
+    shown = capsys.readouterr()
+    assert "4/4" in shown.err
+    runs = json.loads(shown.out)["runs"]
     assert [(run["method"], run["rtol_or_dt"]) for run in runs] == [
         ("standard", 1e-5),
         ("standard", 2e-3),
