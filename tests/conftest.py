@@ -1,6 +1,5 @@
 """What all tests share."""
 
-import gc
 import os
 
 import hypothesis
@@ -14,9 +13,6 @@ from tests.reference import reference_states
 hypothesis.settings.register_profile("landing", derandomize=True, print_blob=True)
 if os.environ.get("CI"):
     hypothesis.settings.load_profile("landing")
-
-# Tracing makes many objects and little garbage: looking for it as often as usual costs some 7 %.
-gc.set_threshold(100_000, 10, 10)
 
 jax.config.update("jax_numpy_dtype_promotion", "strict")
 
