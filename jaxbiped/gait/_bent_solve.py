@@ -21,13 +21,17 @@ from jaxbiped.lanes._call import call
 from jaxbiped.lanes._engine import CompiledProgram
 from jaxbiped.lanes._program import Program
 from jaxbiped.solve._columns import Seeded, active_leaves
+from jaxbiped.solve._passage import Nodes
 
 _COUNT = 2
 """Turned tangents: a multiplier's eigenvector has a real and an imaginary part."""
 
 
 class _Given(NamedTuple):
-    """Inputs: parameters, how far each moves, the start, tangents there, how many steps."""
+    """Inputs: parameters, how far each moves, the start, tangents there, how many steps.
+
+    And time and state at the `last` one's end, in place of the tape's.
+    """
 
     args: PyTree
     sizes: Any
@@ -37,6 +41,7 @@ class _Given(NamedTuple):
     family: Any
     second: Any
     steps: Any
+    last: Any
 
 
 class _Now(NamedTuple):
@@ -61,9 +66,8 @@ class _Now(NamedTuple):
 
 def along_nodes(
     flow: Flow,
-    times: Scalar,
-    states: Scalar,
-    steps: Scalar,
+    nodes: Nodes,
+    last: Scalar,
     bent: Bent,
     sizes: Scalar,
     *,
@@ -72,22 +76,22 @@ def along_nodes(
     """`along_path` and `renewed` by lanes.
 
     Of the tangents the two turned ones come first, and move no parameter; of the others each moves
-    one, by `sizes`, shape (p,). `steps` is how many there are.
+    one, by `sizes`, shape (p,). The last of the nodes is replaced by `last`, shape (1 + c,).
     """
     args = jtu.tree_structure(flow.args.args)
     compiled = _compiled(flow.system, flow.arrival, flow.args.active, args, flow.structure, final)
     given = _Given(
         args=flow.args.args,
         sizes=sizes,
-        t=times[0],
-        state=states[0],
+        t=nodes.start[0],
+        state=nodes.start[1:],
         turned=bent.first[:, :_COUNT].T,
         family=bent.first[:, _COUNT:].T,
         second=jnp.transpose(bent.second, (1, 2, 0)),
-        steps=steps,
+        steps=nodes.steps,
+        last=last,
     )
-    tape = jnp.concatenate([times[1:, None], states[1:]], axis=1)
-    return call(compiled, given, tape=tape, quick=True)[0]
+    return call(compiled, given, tape=nodes.ends, quick=True)[0]
 
 
 @functools.lru_cache(maxsize=256)
@@ -112,6 +116,7 @@ def _compiled(
         numbers(p, c),
         numbers(p, _COUNT, c),
         numbers(),
+        numbers(1 + c),
     )
     # Compiled by itself, the field is traced once, not at each of its many uses.
     field = jax.jit(system.vector_field)
@@ -148,6 +153,8 @@ class _BentSolve:
 
     def attempt(self, given: _Given, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
         flow, order, parameters = self.flow(given), self._order(given), self._parameters(given)
+        count = now.count + 1.0
+        row = jnp.where(count >= given.steps, given.last, row)
         t, node = row[0], row[1:]
 
         def field(y: Any, q: Any) -> list[Scalar]:
@@ -167,7 +174,6 @@ class _BentSolve:
         tangents = tangent_step(
             field, linear, crossing, now.fresh, given.sizes, parameters, now.tangents
         )
-        count = now.count + 1.0
         after = _Now(
             node=node,
             t=end,

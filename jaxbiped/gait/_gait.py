@@ -12,7 +12,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait._orbit import Orbit, orbit_of
 from jaxbiped.gait._search import Found, Search
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.gait._turn import Turning
+from jaxbiped.gait._turn import Turn, Turning
 from jaxbiped.solve._ending import Ending
 
 _NOTHING = 1e-9
@@ -148,8 +148,6 @@ def described(
     errors = jtu.tree_map(
         jnp.abs, _by_parameter(orbit, measures, orbit.slope_errors, orbit.radius_errors)
     )
-    times, states = last.nodes
-    valid = jnp.isfinite(times)
     return Gait(
         ending=found.ending,
         walk_ending=found.code,
@@ -172,10 +170,21 @@ def described(
         turns=found.turns,
         history=found.history,
         solver_steps=last.attempted,
-        orbit=jtu.tree_map(lambda leaf: jnp.where(valid, leaf, jnp.nan), (times, states)),
+        orbit=_path(last, start),
         parameters=names,
         engine=turning.engine,
     )
+
+
+def _path(last: Turn, like: Any) -> tuple[Scalar, Any]:
+    """Times and states of a cycle's nodes, leaves of shape (footsteps, nodes); NaN beyond them."""
+    nodes = last.nodes
+    assert nodes is not None
+    known = jnp.arange(nodes.ends.shape[-2]) < nodes.steps[..., None]
+    ends = jnp.where(known[..., None], nodes.ends, jnp.nan)
+    rows = jnp.concatenate([nodes.start[..., None, :], ends], axis=-2)
+    times, *states = jnp.moveaxis(rows, -1, 0)
+    return times, jtu.tree_unflatten(jtu.tree_structure(like), states)
 
 
 def _by_parameter(orbit: Orbit, measures: Measures, slopes: Any, radius: Scalar) -> Measures:

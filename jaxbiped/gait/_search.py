@@ -1,6 +1,7 @@
 """The search for a periodic orbit: a fixed point of the return map."""
 
 import enum
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -93,13 +94,19 @@ class _Progress(NamedTuple):
     trial: Scalar
     base: Scalar
     base_residual: Scalar
+    change: Scalar
+    slope: Scalar
     base_turn: Turn
     damping: Scalar
-    coarse: Turn
+    coarse: Turn | None
     optimiser: Any
     code: Scalar
     turns: Scalar
     history: Scalar
+
+
+Run = Callable[[Scalar, Scalar, Scalar], Turn]
+"""The turn from recurring components, as exactly as a stage wants, or none where idle."""
 
 
 def search(
@@ -112,31 +119,17 @@ def search(
 ) -> Found:
     """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely."""
     first = recurring_of(turning.system, guess)
-    seeds, _ = seeded(args, active, len(first))
-    coarse = Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
-
-    def run(trial: Scalar, stage: Scalar) -> Turn:
-        chosen = Precision(
-            *(
-                jnp.where(stage == _Stage.FINE, a, jnp.where(stage == _Stage.COARSE, b, c))
-                for a, b, c in zip(precision, coarse, _ROUGH, strict=True)
-            )
-        )
-        start = state_with(turning.system, guess, trial)
-        return turn(turning, seeds, start, chosen, idle=stage >= _Stage.FOUND)
-
-    def advance(now: _Progress) -> _Progress:
-        latest = run(now.trial, now.stage)
-        active_lane = now.stage < _Stage.FOUND
-        after = _progressed(now, latest, method)
-        return jax.tree.map(lambda a, b: jnp.where(active_lane, a, b), after, now)
-
-    def goes_on(now: _Progress) -> Scalar:
-        return (now.stage < _Stage.FOUND) & (now.turns < method.most_turns)
-
     off = jnp.abs(turning.section.value(args, guess))
-    begin = _begin(first, off, method, jax.eval_shape(run, first, jnp.asarray(0)))
-    end = jax.lax.while_loop(goes_on, advance, begin)
+    whole = _runner(turning, args, active, guess, precision, save_nodes=True)
+    if turning.engine == "lanes":
+        bare = _runner(turning, args, (), guess, precision, save_nodes=False)
+        end = _by_lanes(bare, whole, first, off, method)
+    else:
+        # One loop, all directions in it: each loop is compiled for itself.
+        nothing = _nothing(whole, first)
+        begin = _begin(first, off, method, nothing)._replace(coarse=nothing)
+        end = _advanced(whole, begin, method, _Stage.FOUND)
+    assert end.coarse is not None
     ending = jnp.where(
         end.stage == _Stage.FOUND,
         int(Search.FOUND),
@@ -154,8 +147,78 @@ def search(
     )
 
 
-def _begin(first: Scalar, off: Scalar, method: Method, shape: Any) -> _Progress:
-    nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
+def _by_lanes(bare: Run, whole: Run, first: Scalar, off: Scalar, method: Method) -> _Progress:
+    """Turns are `bare` of directions but the state's until it is near.
+
+    Most need two more, which are outside of a loop: what a loop carries it copies.
+    """
+    now = _advanced(bare, _begin(first, off, method, _nothing(bare, first)), method, _Stage.COARSE)
+    near = (now.stage == _Stage.COARSE) & (now.turns < method.most_turns)
+    # Whoever did not come so far still has the best orbit told.
+    shown = whole(jnp.where(near, now.trial, now.base), now.stage, now.stage == _Stage.NO_RETURN)
+    now = now._replace(base_turn=shown, coarse=shown)
+    now = _where(near, _progressed(now, shown, method), now)
+    now = _further(whole, now, method, _goes_on(now, method, _Stage.COARSE, _Stage.FOUND))
+    return _advanced(whole, now, method, _Stage.FOUND, since=_Stage.COARSE)
+
+
+def _runner(
+    turning: Turning,
+    args: PyTree,
+    active: tuple[int, ...],
+    guess: PyTree,
+    precision: Precision,
+    *,
+    save_nodes: bool,
+) -> Run:
+    """Turns with derivatives by the state and by the `active` parameters."""
+    seeds, _ = seeded(args, active, len(recurring_of(turning.system, guess)))
+    coarse = Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
+
+    def run(trial: Scalar, stage: Scalar, idle: Scalar) -> Turn:
+        chosen = Precision(
+            *(
+                jnp.where(stage == _Stage.FINE, a, jnp.where(stage == _Stage.COARSE, b, c))
+                for a, b, c in zip(precision, coarse, _ROUGH, strict=True)
+            )
+        )
+        start = state_with(turning.system, guess, trial)
+        return turn(turning, seeds, start, chosen, idle, save_nodes=save_nodes)
+
+    return run
+
+
+def _advanced(
+    run: Run, begin: _Progress, method: Method, until: _Stage, since: _Stage = _Stage.APPROACH
+) -> _Progress:
+    """Searches on, from stage `since` on, until a stage is reached or the turns are used up."""
+
+    def goes_on(now: _Progress) -> Scalar:
+        return _goes_on(now, method, since, until)
+
+    return jax.lax.while_loop(goes_on, lambda now: _further(run, now, method, goes_on(now)), begin)
+
+
+def _goes_on(now: _Progress, method: Method, since: _Stage, until: _Stage) -> Scalar:
+    return (now.stage >= since) & (now.stage < until) & (now.turns < method.most_turns)
+
+
+def _further(run: Run, now: _Progress, method: Method, on: Scalar) -> _Progress:
+    """One turn further, where that is wanted."""
+    return _where(on, _progressed(now, run(now.trial, now.stage, ~on), method), now)
+
+
+def _where(condition: Scalar, new: Any, old: Any) -> Any:
+    return jax.tree.map(lambda a, b: jnp.where(condition, a, b), new, old)
+
+
+def _nothing(run: Run, first: Scalar) -> Turn:
+    """A turn of zeros."""
+    shape: Turn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
+    return jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
+
+
+def _begin(first: Scalar, off: Scalar, method: Method, nothing: Turn) -> _Progress:
     on_section = off < 1e-9
     stage = jnp.where(on_section, int(_Stage.ROUGH), int(_Stage.APPROACH))
     return _Progress(
@@ -163,9 +226,11 @@ def _begin(first: Scalar, off: Scalar, method: Method, shape: Any) -> _Progress:
         trial=first,
         base=first,
         base_residual=jnp.asarray(jnp.inf),
+        change=jnp.zeros_like(first),
+        slope=jnp.zeros((len(first), len(first))),
         base_turn=nothing,
         damping=jnp.asarray(0.0),
-        coarse=nothing,
+        coarse=None,
         optimiser=None if method.optimiser is None else method.optimiser.init(first),
         code=jnp.asarray(0),
         turns=jnp.asarray(0),
@@ -184,12 +249,14 @@ def _progressed(now: _Progress, latest: Turn, method: Method) -> _Progress:
         returned & ~approaching & ((residual < now.base_residual) | (method.optimiser is not None))
     )
 
-    def chosen(new: Any, old: Any) -> Any:
-        return jax.tree.map(lambda a, b: jnp.where(better, a, b), new, old)
-
-    base = jnp.where(approaching & returned, latest.recurring, chosen(now.trial, now.base))
-    base_residual = chosen(residual, now.base_residual)
-    base_turn = chosen(latest, now.base_turn)
+    base = jnp.where(better, now.trial, now.base)
+    base = jnp.where(approaching & returned, latest.recurring, base)
+    m = len(base)
+    base_residual, moved, slope, base_turn = _where(
+        better,
+        (residual, change, latest.jacobian[:, :m] - jnp.eye(m), latest),
+        (now.base_residual, now.change, now.slope, now.base_turn),
+    )
     damping = jnp.where(
         better,
         jnp.where(now.damping <= _FIRST_DAMPING, 0.0, 0.1 * now.damping),
@@ -207,7 +274,7 @@ def _progressed(now: _Progress, latest: Turn, method: Method) -> _Progress:
     stage = jnp.where(nowhere, int(_Stage.NO_RETURN), stage)
     stage = jnp.where(damping > _LARGEST_DAMPING, int(_Stage.STUCK), stage)
     damping = jnp.where(approaching | refined, 0.0, damping)
-    step, optimiser = _step(base, base_turn, damping, now, method, better)
+    step, optimiser = _step(base, moved, slope, damping, now, method, better)
     trial = jnp.where(approaching, base, base + step)
     return _Progress(
         stage=stage,
@@ -215,9 +282,11 @@ def _progressed(now: _Progress, latest: Turn, method: Method) -> _Progress:
         base=base,
         # The finer solves begin afresh: their residuals are not the looser ones'.
         base_residual=jnp.where(refined, jnp.inf, base_residual),
+        change=moved,
+        slope=slope,
         base_turn=base_turn,
         damping=damping,
-        coarse=jax.tree.map(lambda a, b: jnp.where(coarse_done, a, b), base_turn, now.coarse),
+        coarse=None if now.coarse is None else _where(coarse_done, base_turn, now.coarse),
         optimiser=optimiser,
         code=jnp.where(returned, now.code, latest.code),
         turns=now.turns + 1,
@@ -226,18 +295,22 @@ def _progressed(now: _Progress, latest: Turn, method: Method) -> _Progress:
 
 
 def _step(
-    base: Scalar, base_turn: Turn, damping: Scalar, now: _Progress, method: Method, better: Scalar
+    base: Scalar,
+    change: Scalar,
+    slope: Scalar,
+    damping: Scalar,
+    now: _Progress,
+    method: Method,
+    better: Scalar,
 ) -> tuple[Scalar, Any]:
-    m = base.shape[0]
-    change = base_turn.recurring - base
-    slope = base_turn.jacobian[:, :m] - jnp.eye(m)
+    """From `base`, whose turn comes `change` away from it; `slope` is that of the change."""
     if method.optimiser is not None:
         gradient = slope.T @ change
         step, optimiser = method.optimiser.update(gradient, now.optimiser, base)
         assert isinstance(step, jax.Array)
         # A trial that did not return: go half way back.
         return jnp.where(better, step, 0.5 * (now.trial - base)), optimiser
-    normal = slope.T @ slope + damping * jnp.eye(m)
+    normal = slope.T @ slope + damping * jnp.eye(len(base))
     damped = -solved(normal, slope.T @ change)
     newton = -solved(slope, change)
     return jnp.where(damping > 0.0, damped, newton), now.optimiser

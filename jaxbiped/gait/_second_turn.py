@@ -1,5 +1,6 @@
 """Second derivatives of the return map at a periodic orbit."""
 
+import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
@@ -9,11 +10,11 @@ from jaxbiped.gait._bent import Bent, renewed
 from jaxbiped.gait._bent_solve import along_nodes
 from jaxbiped.gait._curvature import along_path
 from jaxbiped.gait._flow import Flow
-from jaxbiped.gait._radau import velocities
+from jaxbiped.gait._radau import stacked
 from jaxbiped.gait._turn import Turn, Turning, recurring_places
 from jaxbiped.solve._columns import Seeded, active_leaves
 from jaxbiped.solve._landing import MARGIN
-from jaxbiped.solve._passage import arrival_at
+from jaxbiped.solve._passage import Nodes, arrival_at
 
 
 def second_turn(
@@ -51,37 +52,34 @@ def second_turn(
     flow = Flow(turning.system, watch.section, turning.system.vector_field, args, structure)
     first = jnp.zeros((c, seeds.shape[1])).at[places].set(jnp.concatenate([turned, tangents], 1))
     bent = Bent(first, jnp.zeros((c, tangents.shape[1], count)))
-    times, states = last.nodes
+    assert last.nodes is not None
     for k in range(turning.steps):
-        nodes = jnp.stack([leaf[k] for leaf in jtu.tree_leaves(states)], axis=-1)
-        end = jnp.sum(jnp.isfinite(times[k])) - 1
+        nodes = jax.tree.map(lambda leaf, k=k: leaf[k], last.nodes)
+        end = jnp.where(nodes.steps > 0, nodes.ends[nodes.steps - 1], nodes.start)
         # The last step ends on the section, not just past it.
-        arrived, past = arrival_at(
-            watch, jtu.tree_unflatten(structure, list(nodes[end])), args.args
-        )
-        clock = times[k].at[end].add(-past)
-        nodes = nodes.at[end].set(jnp.stack(jtu.tree_leaves(arrived)))
+        state = jtu.tree_unflatten(structure, list(end[1:]))
+        arrived, past = arrival_at(watch, state, args.args)
+        end = jnp.stack([end[0] - past, *jtu.tree_leaves(arrived)])
         # A section may be a switch, as touchdown is: the motion begins and ends before it.
-        clock, nodes = _earlier(flow, clock, nodes, jnp.stack([0, end]), parameters)
+        start, end = (_earlier(flow, row, parameters) for row in (nodes.start, end))
         final = k + 1 == turning.steps
         if turning.engine == "lanes":
-            bent, period = along_nodes(flow, clock, nodes, end, bent, sizes, final=final)
+            bent, period = along_nodes(
+                flow, Nodes(start, nodes.ends, nodes.steps), end, bent, sizes, final=final
+            )
             continue
-        bent = along_path(flow, clock, nodes, parameters, bent, seeds, count)
-        z = jnp.concatenate([nodes[end], parameters])
+        ends = nodes.ends.at[nodes.steps - 1].set(end)
+        rows = jnp.concatenate([start[None], ends])
+        times = jnp.where(jnp.arange(len(rows)) <= nodes.steps, rows[:, 0], jnp.inf)
+        bent = along_path(flow, times, rows[:, 1:], parameters, bent, seeds, count)
+        z = jnp.concatenate([end[1:], parameters])
         bent, period = renewed(flow, z, bent, seeds, count, final=final)
     second = bent.second
     parted = [second[places], period[None], second[drifting]]
     return jnp.concatenate(parted)
 
 
-def _earlier(
-    flow: Flow,
-    clock: Scalar,
-    nodes: Scalar,
-    places: Scalar,
-    parameters: Scalar,
-) -> tuple[Scalar, Scalar]:
-    """Times and states, some of them as little earlier as tells a switch's sides apart."""
-    back = -MARGIN * velocities(flow, nodes[places], parameters)
-    return clock.at[places].add(-MARGIN), nodes.at[places].add(back)
+def _earlier(flow: Flow, row: Scalar, parameters: Scalar) -> Scalar:
+    """A time and state as little earlier as tells a switch's sides apart."""
+    velocity = stacked(flow)(jnp.concatenate([row[1:], parameters]))
+    return row - MARGIN * jnp.concatenate([jnp.ones(1), velocity])

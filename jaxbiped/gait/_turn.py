@@ -15,7 +15,7 @@ from jaxbiped.gait._system import AbstractSystem
 from jaxbiped.lanes._passage import passage_by_lanes
 from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns
 from jaxbiped.solve._landing import Watch
-from jaxbiped.solve._passage import Passage, Precision, passage
+from jaxbiped.solve._passage import Nodes, Passage, Precision, passage
 
 STATE_FLOOR = 0.1
 """Size below which errors of derivatives by the state are absolute."""
@@ -90,7 +90,7 @@ class Turn(NamedTuple):
         code: 0 or that of an `Ending`.
         attempted: solver steps attempted.
         jumps: crossings where the vector field itself jumped; `missed` of them had no correction.
-        nodes: times and states at the ends of the steps of each passage, leaves (steps, …).
+        nodes: the ends of the steps of each passage, leaves (steps, …), where saved.
     """
 
     recurring: Scalar
@@ -106,7 +106,7 @@ class Turn(NamedTuple):
     attempted: Scalar
     jumps: Scalar
     missed: Scalar
-    nodes: Any
+    nodes: Nodes | None
 
 
 def recurring_places(system: AbstractSystem, y: PyTree) -> list[int]:
@@ -144,7 +144,15 @@ def seeded(args: PyTree, active: tuple[int, ...], m: int) -> tuple[Seeded, Scala
 
 
 @eqx.filter_jit  # for its trace cache
-def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: Any) -> Turn:
+def turn(
+    turning: Turning,
+    args: Seeded,
+    y: PyTree,
+    precision: Precision,
+    idle: Any,
+    *,
+    save_nodes: bool = True,
+) -> Turn:
     """Follows the orbit from `y` for one turn, with derivatives; nothing where `idle`."""
     places = recurring_places(turning.system, y)
     count, n = len(jtu.tree_leaves(y)), args.seeds.shape[1]
@@ -157,7 +165,8 @@ def turn(turning: Turning, args: Seeded, y: PyTree, precision: Precision, idle: 
     ) -> tuple[tuple[Tangents, Scalar], tuple[Passage, Scalar]]:
         y0, failed = before
         y0 = _entered(turning, y0, args)
-        found = _passed(turning, watch, y0, args, precision, jnp.where(failed != 0, 0.0, limit))
+        within = jnp.where(failed != 0, 0.0, limit)
+        found = _passed(turning, watch, y0, args, precision, within, save_nodes)
         found = _left(turning, found, args)
         state, moved = along_columns(lambda s, a: turning.system.renew(a, s), found.y, args)
         on_section = as_columns(moved)
@@ -199,13 +208,27 @@ def _left(turning: Turning, found: Passage, args: Seeded) -> Passage:
     if turning.within is None:
         return found
     state, columns = along_columns(lambda s, a: minimal_state(a, s), found.y, args)
-    times, states = found.nodes
-    nodes = (times, minimal_state(args.args, states))
+    nodes = found.nodes
+    if nodes is not None:
+        structure = jtu.tree_structure(found.y.state)
+
+        def left(rows: Scalar) -> Scalar:
+            inside = jtu.tree_unflatten(structure, list(jnp.moveaxis(rows[..., 1:], -1, 0)))
+            outside = jtu.tree_leaves(minimal_state(args.args, inside))
+            return jnp.stack([rows[..., 0], *outside], axis=-1)
+
+        nodes = Nodes(left(nodes.start), left(nodes.ends), nodes.steps)
     return found._replace(y=Tangents(state, as_columns(columns)), nodes=nodes)
 
 
 def _passed(
-    turning: Turning, watch: Watch, y0: Tangents, args: Seeded, precision: Precision, limit: Scalar
+    turning: Turning,
+    watch: Watch,
+    y0: Tangents,
+    args: Seeded,
+    precision: Precision,
+    limit: Scalar,
+    save_nodes: bool,
 ) -> Passage:
     """The next passage, by the engine that is asked for."""
     most = turning.max_solver_steps
@@ -218,7 +241,7 @@ def _passed(
             precision=precision,
             time_limit=limit,
             max_solver_steps=most,
-            save_nodes=True,
+            save_nodes=save_nodes,
         )
     sizes = jnp.diagonal(args.seeds[:, args.seeds.shape[1] - len(args.active) :])
     return passage_by_lanes(
@@ -230,6 +253,7 @@ def _passed(
         precision=precision,
         time_limit=limit,
         max_solver_steps=most,
+        save_nodes=save_nodes,
     )
 
 

@@ -4,12 +4,14 @@ from typing import Any
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
+from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.lanes._crossing import cross
+from jaxbiped.lanes._engine import Recorded
 from jaxbiped.solve._columns import Seeded, Tangents
 from jaxbiped.solve._landing import Watch
-from jaxbiped.solve._passage import Passage, Precision
+from jaxbiped.solve._passage import Nodes, Passage, Precision
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 
 
@@ -23,8 +25,9 @@ def passage_by_lanes(
     precision: Precision,
     time_limit: Any,
     max_solver_steps: int,
+    save_nodes: bool,
 ) -> Passage:
-    """`passage` with the nodes saved, for columns as `cross` takes them."""
+    """`passage` for columns as `cross` takes them."""
     found, recorded = cross(
         watch,
         solver,
@@ -34,9 +37,8 @@ def passage_by_lanes(
         precision=precision,
         time_limit=time_limit,
         max_solver_steps=max_solver_steps,
-        save_nodes=True,
+        save_nodes=save_nodes,
     )
-    assert recorded is not None
     return Passage(
         y=Tangents(found.state, found.columns.T),
         time=found.t,
@@ -47,16 +49,10 @@ def passage_by_lanes(
         jumps=found.jumps,
         missed=found.missed,
         attempted=found.attempted,
-        nodes=_nodes(y0.state, recorded),
+        nodes=None if recorded is None else _nodes(y0.state, recorded),
     )
 
 
-def _nodes(start: Any, recorded: Any) -> tuple[Any, Any]:
-    """Times and states at the ends of the steps, the start first; infinite beyond the last."""
-    rows, structure = jtu.tree_flatten(start)
-    first = jnp.stack([jnp.zeros(()), *rows])
-    reached = jnp.arange(recorded.values.shape[0]) < recorded.counts
-    values = jnp.where(reached[:, None], recorded.values, jnp.inf)
-    every = jnp.concatenate([first[None], values])
-    states = [every[:, 1 + i] for i in range(len(rows))]
-    return every[:, 0], jtu.tree_unflatten(structure, states)
+def _nodes(start: PyTree, recorded: Recorded) -> Nodes:
+    first = jnp.stack([jnp.zeros(()), *jtu.tree_leaves(start)])
+    return Nodes(first, jnp.asarray(recorded.values), jnp.asarray(recorded.counts))

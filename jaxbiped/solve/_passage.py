@@ -38,6 +38,20 @@ class Precision(NamedTuple):
     tangent_rtol: Any
 
 
+class Nodes(NamedTuple):
+    """The ends of a solve's accepted steps; rows are times and states, one number after the other.
+
+    Attributes:
+        start: where the first step begins, shape (1 + c,).
+        ends: shape (room, 1 + c); no numbers beyond the last.
+        steps: how many there are.
+    """
+
+    start: Scalar
+    ends: Scalar
+    steps: Scalar
+
+
 class Passage(NamedTuple):
     """An arrival at a section, or what came instead.
 
@@ -52,7 +66,7 @@ class Passage(NamedTuple):
         jumps: steps that ended past a switch where the vector field itself jumps.
         missed: whether the last of them was the last step at all: columns did not leap there.
         attempted: number of steps attempted.
-        nodes: times and states at the ends of the accepted steps, where saved.
+        nodes: the ends of the accepted steps, where saved.
     """
 
     y: Any
@@ -64,7 +78,7 @@ class Passage(NamedTuple):
     jumps: Scalar
     missed: Scalar
     attempted: Scalar
-    nodes: Any
+    nodes: Nodes | None
 
 
 def passage(
@@ -129,8 +143,14 @@ def passage(
         jumps=landed.jumps,
         missed=landed.leapt,
         attempted=solution.stats["num_steps"],
-        nodes=(times[1], states[1]) if save_nodes else None,
+        nodes=_nodes(times[1], states[1]) if save_nodes else None,
     )
+
+
+def _nodes(times: Scalar, states: PyTree) -> Nodes:
+    """From times and states of which the first are those of the start; infinite beyond the last."""
+    rows = jnp.stack([times, *jtu.tree_leaves(states)], axis=-1)
+    return Nodes(rows[0], rows[1:], jnp.sum(jnp.isfinite(times)) - 1)
 
 
 def _plain_node(t: Any, y: Any, args: Any) -> PyTree:
