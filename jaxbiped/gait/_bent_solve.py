@@ -13,7 +13,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait._bent import Bent, renewed
 from jaxbiped.gait._bent_step import Order, Tangents, linear_about, order_of, tangent_step
 from jaxbiped.gait._crossings import crossing_of
-from jaxbiped.gait._curvature import LONG_AGO
+from jaxbiped.gait._curvature import LONG_AGO, SETTLED
 from jaxbiped.gait._flow import Arrival, Flow
 from jaxbiped.gait._radau import Path
 from jaxbiped.gait._system import AbstractSystem
@@ -174,6 +174,7 @@ class _BentSolve:
         tangents = tangent_step(
             field, linear, crossing, now.fresh, given.sizes, parameters, now.tangents
         )
+        over = count >= given.steps
         after = _Now(
             node=node,
             t=end,
@@ -183,7 +184,9 @@ class _BentSolve:
             tangents=tangents,
             count=count,
         )
-        return after, count >= given.steps
+        early = (end - now.switched < SETTLED) & ~crossing.crossed & ~over
+        waiting = now._replace(node=node, count=count)
+        return jax.tree.map(lambda a, b: jnp.where(early, a, b), waiting, after), over
 
     def finish(self, given: _Given, now: _Now) -> tuple[Bent, Scalar]:
         """Tangents after the arrival, and the time's second ones."""

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.gait._crossings import SIDES, Crossings, jump_of
 from jaxbiped.gait._radau import RADAU, Path
+from jaxbiped.lanes._accumulation import jacobian
 from jaxbiped.solve._elimination import inverse, solution
 from jaxbiped.solve._landing import MARGIN
 from jaxbiped.solve._linearisation import linearise
@@ -111,7 +112,7 @@ class Linear(NamedTuple):
         by_parameter: derivatives of the kept rates there, (3, k, p).
         at_start: of the kept rates by all where the step starts, (k, n).
         velocity: rates there, (c,).
-        jump: of the derivatives of the kept rates where the step ends, (k, n).
+        jump: of the derivatives of the kept rates by the components where the step ends, (k, c).
     """
 
     stages: Stages
@@ -134,13 +135,15 @@ def linear_about(
     # A step that ends on a switch belongs to the old side; a corrected point may lie beyond.
     short = jnp.where(crossing.crossed, path.after - MARGIN * ends, points[2])
     points = jnp.concatenate([points[:2], short[None]])
-    away = jnp.asarray(SIDES)[:, None] * ends
-    found = jax.lax.map(
-        rows.gradient, jnp.concatenate([points, path.before[None], crossing.landed + away])
-    )
+    found = jax.lax.map(rows.gradient, jnp.concatenate([points, path.before[None]]))
     stages = Stages.of(order, share, found[:3, :, :c])
-    jump = jump_of(found[None, 4:])[0]
-    return Linear(stages, points, found[:3, :, c:], found[3], order.sorted(begins), jump)
+
+    def jump() -> Any:
+        sides = crossing.landed + jnp.asarray(SIDES)[:, None] * ends
+        return jump_of(jax.lax.map(rows.by_state, sides)[None])[0]
+
+    jumps = jax.lax.cond(crossing.crossed, jump, lambda: jnp.zeros_like(found[3, :, :c]))
+    return Linear(stages, points, found[:3, :, c:], found[3], order.sorted(begins), jumps)
 
 
 def _collocated(
@@ -152,13 +155,9 @@ def _collocated(
     second, third = 3.0 * change - 2.0 * start - end, start + end - 2.0 * change
     s = part[:, None]
     points = path.before + s * (start + s * (second + s * third))
-    velocities, found = jax.lax.map(
-        lambda y: (rows.velocity(y), rows.gradient(y)),
-        # Two more, for a loop of the generated code.
-        jnp.concatenate([points, points[:2]]),
-    )
-    stages = Stages.of(order, share, found[:3, :, : len(order.every)])
-    residual = order.sorted(points - path.before - (RADAU * share) @ velocities[:3])
+    velocities, found = jax.lax.map(lambda y: (rows.velocity(y), rows.by_state(y)), points)
+    stages = Stages.of(order, share, found)
+    residual = order.sorted(points - path.before - (RADAU * share) @ velocities)
     unforced = jnp.zeros((3, len(order.kept)))
     off = stages.solve(residual, unforced, lambda right: solution(stages.matrix, right))
     return points - order.restored(off)
@@ -173,9 +172,13 @@ class _Rows:
     def velocity(self, y: Any) -> Any:
         return jnp.stack(self.field(list(y), self.parameters))
 
+    def by_state(self, y: Any) -> Any:
+        """Derivatives of the kept rates by the components, (k, c)."""
+        return self.order.sorted(jacobian(lambda z: self._kept(z, self.parameters), list(y)))
+
     def gradient(self, y: Any) -> Any:
         """Derivatives of the kept rates, (k, n)."""
-        return self._rows(self._kept, list(y))
+        return self._by_all(self._kept, list(y))
 
     def bend(self, y: Any, along: Any) -> Any:
         """Derivatives of the kept rates' derivative along a tangent of the state, (k, n)."""
@@ -184,21 +187,16 @@ class _Rows:
         def turned(y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
             return jax.jvp(lambda y: self._kept(y, q), (y,), (tangent,))[1]
 
-        return self._rows(turned, list(y))
+        return self._by_all(turned, list(y))
 
     def _kept(self, y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
         every = self.field(y, q)
         return [every[i] for i in self.order.kept]
 
-    def _rows(self, function: Callable[..., list[Scalar]], y: list[Scalar]) -> Any:
-        """By reverse mode: the kept rates are few."""
-        _, pull = jax.vjp(function, y, self.parameters)
-        size = len(self.order.kept)
-        found = []
-        for i in range(size):
-            state, parameter = pull([jnp.asarray(1.0 if i == j else 0.0) for j in range(size)])
-            found.append(jnp.stack([*(state[j] for j in self.order.every), *parameter]))
-        return jnp.stack(found)
+    def _by_all(self, function: Callable[..., list[Scalar]], y: list[Scalar]) -> Any:
+        c = len(y)
+        found = jacobian(lambda z: function(z[:c], z[c:]), [*y, *self.parameters])
+        return jnp.concatenate([self.order.sorted(found[:, :c]), found[:, c:]], axis=1)
 
 
 class Tangents(NamedTuple):
@@ -250,12 +248,13 @@ def tangent_step(
     unforced = jnp.zeros_like(linear.by_parameter[..., 0])
     at_stages = [carried(before.turned[v] - shifts[v] * velocity, unforced) for v in range(count)]
     turned = jnp.stack([each[2] for each in at_stages])
-    tangents = order.restored(jnp.concatenate(at_stages))
-    points = jnp.concatenate([linear.points] * count)
-    bends = jax.lax.map(lambda each: rows.bend(*each), (points, tangents))
-    bends = bends.reshape(count, 3, *bends.shape[1:])
+    # Of one point all at once: much does not depend on the tangent.
+    bends = jax.lax.map(
+        lambda each: jnp.stack([rows.bend(each[0], tangent) for tangent in each[1]]),
+        (linear.points, order.restored(jnp.stack(at_stages, axis=1))),
+    )
     flow = change_of(velocity, none)
-    jumped = turned @ linear.jump[:, :c].T
+    jumped = turned @ linear.jump.T
     early = order.sorted(crossing.early[:c])
 
     def one(each: Any) -> Any:
@@ -267,13 +266,13 @@ def tangent_step(
         ends = []
         for v in range(count):
             shifted = shifts[v] * shift * flow - shifts[v] * rate - shift * rates[v]
-            bent = (bends[v, ..., :c] @ begun[..., None])[..., 0] + bend_force[v] * size
+            bent = (bends[:, v, :, :c] @ begun[..., None])[..., 0] + bend_force[v] * size
             end = carried(second[v] + shifted, bent)[2]
             ends.append(jnp.concatenate([end[:d], end[d:] + jumped[v] * soon]))
         return begun[2], jnp.stack(ends)
 
     by_parameter = jnp.moveaxis(linear.by_parameter, -1, 0)
-    own = jnp.moveaxis(bends[..., c:], -1, 0)
+    own = jnp.moveaxis(bends[..., c:], (3, 1), (0, 1))
     items = (before.family, before.second, sizes, linear.at_start[:, c:].T, by_parameter, own)
     family, second = jax.lax.map(one, (*items, crossing.early[c:]))
     return Tangents(turned, family, second)

@@ -70,9 +70,6 @@ def crossing_of(
     def rate(z: Scalar) -> Scalar:
         return jnp.concatenate([stacked(rates)(z), idle])
 
-    def back(past: Scalar) -> Scalar:
-        return new - past * rate(new - 0.5 * past * velocity)
-
     velocity = rate(new)
     beyond, slopes = jax.jvp(values, (new,), (velocity,))
     changed = [(a > 0.0) != (b > 0.0) for a, b in zip(values(old), beyond, strict=True)]
@@ -86,14 +83,23 @@ def crossing_of(
             value = jnp.where(here, candidate, value)
         return value
 
-    slope = picked(slopes, 1.0)
-    first = picked(beyond, 0.0) / slope
-    # The switch's rate changes fast: once more from there.
-    past = first + picked(values(back(first)), 0.0) / slope
-    z = back(past)
-    rows = jax.jacrev(lambda z: jnp.stack([jnp.zeros(()), *values(z)]))(z)
-    gradient = picked(list(rows[1:]), jnp.zeros_like(z))
-    early = jnp.where(found, gradient / jnp.where(found, gradient @ rate(z), 1.0), 0.0)
+    def back(past: Scalar) -> Scalar:
+        return new - past * rate(new - 0.5 * past * velocity)
+
+    def crossed() -> tuple[Scalar, Scalar, Scalar]:
+        slope = picked(slopes, 1.0)
+        first = picked(beyond, 0.0) / slope
+        # The switch's rate changes fast: once more from there.
+        past = first + picked(values(back(first)), 0.0) / slope
+        z = back(past)
+        rows = jax.jacrev(lambda z: jnp.stack([jnp.zeros(()), *values(z)]))(z)
+        gradient = picked(list(rows[1:]), jnp.zeros_like(z))
+        return past, z, gradient / jnp.where(found, gradient @ rate(z), 1.0)
+
+    def not_crossed() -> tuple[Scalar, Scalar, Scalar]:
+        return jnp.zeros(()), new, jnp.zeros_like(new)
+
+    past, z, early = jax.lax.cond(found, crossed, not_crossed)
     return Crossings(found, past, z[: after.shape[0]], early)
 
 

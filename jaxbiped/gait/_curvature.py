@@ -43,6 +43,9 @@ from jaxbiped.solve._landing import MARGIN
 
 LONG_AGO = 1.0
 """Time [s] since the last switch, where none is known."""
+SETTLED = 1e-9
+"""How long after a switch the first step ends at the earliest [s], however short the solve's own
+are: penetrations that are mostly rounding make the singular f'' there, and all after it, noise."""
 CHUNK = 64
 """Steps that are solved at once."""
 
@@ -83,7 +86,7 @@ def along_path(
         t = jax.lax.dynamic_slice_in_dim(times, start, CHUNK + 1)
         y = jax.lax.dynamic_slice_in_dim(states, start, CHUNK + 1)
         found = crossings_of(flow, flow.surfaces, y[:-1], y[1:], parameters)
-        path, reached = _path(reached, t[1:] - found.past, found)
+        path, reached = _path(reached, t[1:] - found.past, found, last_time)
         after = _chunk(flow, path, found, parameters, now, seeds, count)
         return start + CHUNK, reached, after
 
@@ -102,8 +105,14 @@ class _Reached(NamedTuple):
     switched: Scalar
 
 
-def _path(reached: _Reached, times: Scalar, crossings: Crossings) -> tuple[Path, _Reached]:
-    """The steps of a chunk; those that ended past a switch end on it."""
+def _path(
+    reached: _Reached, times: Scalar, crossings: Crossings, last: Scalar
+) -> tuple[Path, _Reached]:
+    """The steps of a chunk; those that ended past a switch end on it.
+
+    Those that end too soon behind one have no span, and the next one begins where they did. The
+    motion's `last` is none of them.
+    """
 
     def begun(first: Scalar, rest: Scalar) -> Scalar:
         return jnp.concatenate([first[None], rest])
@@ -112,9 +121,14 @@ def _path(reached: _Reached, times: Scalar, crossings: Crossings) -> tuple[Path,
     fresh = begun(reached.on_switch, crossings.crossed)
     latest = jnp.where(crossings.crossed, times, -jnp.inf)
     latest = jax.lax.cummax(begun(reached.switched, latest))
-    span = jnp.maximum(jnp.diff(clock), 0.0)
-    path = Path(states[:-1], states[1:], clock[:-1], span, latest[:-1], fresh[:-1])
-    return path, _Reached(clock[-1], states[-1], fresh[-1], latest[-1])
+    soon = (clock[1:] - latest[:-1] < SETTLED) & ~crossings.crossed & (times < last)
+    places = jnp.arange(len(clock))
+    source = jax.lax.cummax(jnp.where(begun(jnp.asarray(False), soon), 0, places))
+    start, before, ready = clock[source], states[source], fresh[source]
+    span = jnp.where(soon, 0.0, jnp.maximum(clock[1:] - start[:-1], 0.0))
+    after = jnp.where(soon[:, None], before[:-1], states[1:])
+    path = Path(before[:-1], after, start[:-1], span, latest[:-1], ready[:-1])
+    return path, _Reached(start[-1], before[-1], ready[-1], latest[-1])
 
 
 class _Linear(NamedTuple):

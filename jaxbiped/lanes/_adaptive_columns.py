@@ -134,7 +134,7 @@ class AdaptiveColumns:
     def attempt(self, given: Crossing, now: _Now) -> tuple[_Now, Scalar]:
         now = self._leapt(given, now)
         step = differentiated_step(
-            self.solver.tableau, self.watch.field, now.t, now.next_t, now.state, given.args
+            self.solver.tableau, self.watch.field, now.t, now.next_t, now.state, self._seeded(given)
         )
         moved, worst = self._columns(given, now, step)
         error = jtu.tree_map(lambda e: jnp.where(jnp.isnan(e), jnp.inf, e), step.error)
@@ -248,7 +248,7 @@ class AdaptiveColumns:
         else:
             found.append(by_state)
         if by_parameter.shape[0]:
-            rows = jnp.stack([step.by_parameter[..., i] for i in self.active])
+            rows = jnp.moveaxis(step.by_parameter, -1, 0)
             columns, squares = jax.lax.map(
                 lambda each: moved(each[0], each[1], each[2] * each[3]),
                 (by_parameter, given.parameter_floors, rows, given.sizes),

@@ -5,10 +5,11 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
+from jaxbiped.lanes._accumulation import jacobian
+from jaxbiped.solve._columns import Seeded, active_leaves, with_active
 from jaxbiped.solve._fence import fences_down
 from jaxbiped.solve._linearisation import Components, split
 from jaxbiped.solve._rosenbrock import (
@@ -32,7 +33,7 @@ class Differentiated(NamedTuple):
         order: the components' order.
         by_state: derivatives A_i of the kept rates at the stages, shape (stages, kept, c).
         by_curvature: derivatives B_i, likewise.
-        by_parameter: A_i + B_i for the parameters, shape (stages, kept, p).
+        by_parameter: A_i + B_i for the active parameters, shape (stages, kept, p).
     """
 
     tableau: RosenbrockTableau
@@ -51,14 +52,17 @@ def differentiated_step(
     t0: Any,
     t1: Any,
     y0: PyTree,
-    args: PyTree,
+    args: Seeded,
 ) -> Differentiated:
-    """A step of an autonomous system of scalars, with all that its derivatives share."""
+    """A step of an autonomous system of scalars, with all that its derivatives share.
+
+    Of the arguments the active leaves are differentiated by, p of them.
+    """
     start, join = split(y0)
-    parameters, structure = jtu.tree_flatten(args)
+    parameters = active_leaves(args)
 
     def rates(t: Scalar, y: Components, q: Sequence[Scalar]) -> Components:
-        return split(field(t, join(y), jtu.tree_unflatten(structure, q)))[0]
+        return split(field(t, join(y), with_active(args, list(q))))[0]
 
     span = jnp.asarray(t1 - t0)
     with fences_down():
@@ -95,35 +99,25 @@ def _derivatives(
     kept_rates: Callable[[Components, Sequence[Scalar]], Components],
     parameters: Sequence[Scalar],
 ) -> tuple[Any, Any]:
-    """A_i and B_i of all stages by components and parameters, (stages, kept, c + p).
-
-    By reverse mode: the kept rates are few.
-    """
+    """A_i and B_i of all stages by components and parameters, (stages, kept, c + p)."""
     start, size = stages.start, len(tableau.alpha)
     points = [start] + [
         [y + u for y, u in zip(start, stages.weighted(row), strict=True)] for row in tableau.a
     ]
     unit = [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)]
     directions = [stages.weighted(row) for row in unit]
-    kept = len(stages.kept)
+    count = len(start)
 
-    def rows(pull: Callable[..., Any]) -> Any:
-        found = []
-        for i in range(kept):
-            one = [jnp.asarray(1.0 if i == j else 0.0) for j in range(kept)]
-            state, parameter = pull(one)
-            found.append(jnp.stack([*state, *parameter]))
-        return jnp.stack(found)
+    def rates(z: Components) -> Components:
+        return kept_rates(z[:count], z[count:])
 
     def at_stage(both: tuple[Any, Any]) -> tuple[Any, Any]:
         point, along = (list(each) for each in both)
 
-        def turned(y: Components, q: Sequence[Scalar]) -> Components:
-            return jax.jvp(lambda y: kept_rates(y, q), (y,), (along,))[1]
+        def turned(z: Components) -> Components:
+            return jax.jvp(lambda y: kept_rates(y, z[count:]), (z[:count],), (along,))[1]
 
-        at_point = jax.vjp(kept_rates, point, list(parameters))[1]
-        at_start = jax.vjp(turned, list(start), list(parameters))[1]
-        return rows(at_point), rows(at_start)
+        return jacobian(rates, [*point, *parameters]), jacobian(turned, [*start, *parameters])
 
     stacked = [jnp.stack([jnp.stack(each) for each in array]) for array in (points, directions)]
     return jax.lax.map(at_stage, tuple(stacked))

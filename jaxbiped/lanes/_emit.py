@@ -28,8 +28,8 @@ _INLINED = {
     "custom_vjp_call": "call_jaxpr",
     "custom_vjp_call_jaxpr": "fun_jaxpr",
 }
-_LONGEST_UNROLLED = 4
-"""Loops over arrays of up to this length are written out."""
+_LONGEST_UNROLLED, _LARGEST_UNROLLED = 4, 2000
+"""Loops over arrays of up to this length are written out, and up to so many equations in all."""
 
 
 class UnknownPrimitiveError(NotImplementedError):
@@ -178,9 +178,10 @@ def _scan(block: Block, params: Any, inputs: list[Array]) -> list[Array]:
     items = inputs[constants + carried :]
     body = jaxpr.jaxpr
     outputs = len(body.outvars) - carried
-    if not carried and length > _LONGEST_UNROLLED:
+    long = length > _LONGEST_UNROLLED or length * _size(body) > _LARGEST_UNROLLED
+    if not carried and long:
         return _map(block, jaxpr, fixed, items, length)
-    if not items and not outputs and length > _LONGEST_UNROLLED:
+    if not items and not outputs and long:
         return _repeat(block, jaxpr, fixed, carry, length)
     collected: list[list[Array]] = [[] for _ in range(outputs)]
     for step in range(length):
@@ -198,10 +199,20 @@ def _scan(block: Block, params: Any, inputs: list[Array]) -> list[Array]:
     return [*carry, *(np.stack(column) for column in collected)]
 
 
+def _size(jaxpr: Any) -> int:
+    """How many equations a jaxpr has, with those inside of calls."""
+    count = 0
+    for equation in jaxpr.eqns:
+        inner = _INLINED.get(equation.primitive.name)
+        called = None if inner is None else equation.params[inner]
+        count += 1 if called is None else _size(getattr(called, "jaxpr", called))
+    return count
+
+
 def _repeat(
     block: Block, jaxpr: Any, fixed: list[Array], carry: list[Array], length: int
 ) -> list[Array]:
-    inside = Block(block)
+    inside = Block(block, loop=True)
     starts = [v for array in carry for v in array.ravel()]
     held = inside.region("held", (), [v.kind for v in starts])
     found = emit(inside, jaxpr.jaxpr, jaxpr.consts, [*fixed, *_shaped(held, carry)])
@@ -217,7 +228,7 @@ def _map(
     block: Block, jaxpr: Any, fixed: list[Array], items: list[Array], length: int
 ) -> list[Array]:
     """One run of the body for each entry along the leading axes, kept apart in memory."""
-    inside = Block(block)
+    inside = Block(block, loop=True)
     rows = [np.moveaxis(item, 0, -1).reshape(-1, length) for item in items]
     flat = [tuple(row) for array in rows for row in array]
     taken = inside.region("taken", (tuple(flat),), [row[0].kind for row in flat])

@@ -61,10 +61,13 @@ class Block:
         values: what it computes, in order.
         invariant: whether what it computes depends on a simulation's inputs alone; then what
             blocks inside compute of such values alone is moved here.
+        loop: whether it is run several times; what does not depend on the run is moved out.
     """
 
-    def __init__(self, parent: "Block | None" = None, *, invariant: bool = False) -> None:
-        self.parent, self.invariant = parent, invariant
+    def __init__(
+        self, parent: "Block | None" = None, *, invariant: bool = False, loop: bool = False
+    ) -> None:
+        self.parent, self.invariant, self.loop = parent, invariant, loop
         self.values: list[Value] = []
         self._known: dict[tuple[Any, ...], Value] = {}
 
@@ -107,6 +110,8 @@ class Block:
         values = [a for a in args if isinstance(a, Value)]
         if values and all(v.block.invariant or v.op == "const" for v in values):
             return next((block for block in self.lineage() if block.invariant), self)
+        if self.loop and self.parent is not None and all(v.block is not self for v in values):
+            return self.parent.home(args)
         return self
 
     def shared(self, name: str, args: Sequence[Value], make: "Callable[[Block], Value]") -> Value:
