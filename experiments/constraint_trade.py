@@ -43,11 +43,9 @@ def main() -> None:
         progress=True,
     )
     count = 3 if quick else 9
-    maps = {
-        "baumgarte": baumgarte_map(scene, duration, count, quick),
-        "penalty": penalty_map(scene, duration, count, quick),
-    }
+    maps = {"baumgarte": baumgarte_map(scene, duration, count, quick)}
     if not quick:
+        maps["penalty"] = penalty_map(scene, duration, count, quick)
         maps["damping"] = damping_map(scene, duration, count, quick)
     costs = costs_of(scene, methods, quick)
     say(options, runs, maps, costs)

@@ -51,7 +51,9 @@ def main() -> None:
         for name, how in tried.items()
     }
     long = {} if quick else hundred_footsteps(scene)
-    costs = costs_of(scene, methods, euler, quick)
+    # Two programs for each method: one that projects and one that does not will do.
+    costed = ("standard", "described") if quick else methods
+    costs = costs_of(scene, costed, euler, quick)
     verdicts = judged(by_method, by_integrator, long)
     say(options, by_method, by_integrator, costs, long, verdicts)
     pictures = [

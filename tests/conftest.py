@@ -1,6 +1,8 @@
 """What all tests share."""
 
+import gc
 import os
+from pathlib import Path
 
 import hypothesis
 import jax
@@ -14,7 +16,26 @@ hypothesis.settings.register_profile("landing", derandomize=True, print_blob=Tru
 if os.environ.get("CI"):
     hypothesis.settings.load_profile("landing")
 
+# Tracing makes many objects and little garbage: looking for it as often as usual costs some 8 %.
+gc.set_threshold(100_000, 10, 5)
+
 jax.config.update("jax_numpy_dtype_promotion", "strict")
+
+MANY_MAPPINGS = 12_000
+"""Mappings of memory that programs may hold; Linux allows 65530 and XLA dies where it gets none."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_programs_are_kept():
+    """A worker lives through many files: programs of those behind it are dropped when they pile up.
+
+    Not after every file, for what files share would be compiled again.
+    """
+    yield
+    mappings = Path("/proc/self/maps")
+    if mappings.exists() and mappings.read_bytes().count(b"\n") > MANY_MAPPINGS:
+        jax.clear_caches()
+        gc.collect()
 
 
 @pytest.fixture(scope="session")

@@ -49,9 +49,8 @@ def test_vmap_over_scenes_changes_nothing(found):
         return jb.find_gait(scene, parameters=("K",), radius_sensitivities=False)
 
     both = jax.jit(jax.vmap(one))(stiffness)
-    alone = one(stiffness[0])
     assert np.all(np.asarray(both.ending) == 0)
-    assert float(both.measures.period[0]) == pytest.approx(float(alone.measures.period), abs=1e-8)
+    assert float(both.measures.period[0]) == pytest.approx(float(found.measures.period), abs=1e-8)
     k = found.parameters.index("K")
     assert float(both.elasticities.period[0, 0]) == pytest.approx(
         float(found.elasticities.period[k]), rel=5e-4

@@ -18,7 +18,9 @@ def measured(log_changes, gradient):
 
 @jax.jit
 def implicitly(point):
-    return measured(point, jb.Implicit()), jax.jacrev(lambda p: measured(p, jb.Implicit()))(point)
+    # Value and derivative of one solve, which compiles sooner than one for each.
+    jacobian, value = jax.jacrev(lambda p: (measured(p, jb.Implicit()),) * 2, has_aux=True)(point)
+    return value, jacobian
 
 
 @jax.jit

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.solve._accuracy import ACCURACIES
 
 
 def _error(trajectory, state):
@@ -117,6 +118,10 @@ def _block(friction, slope):
     return jb.Scene(walker, jb.Ground(slope=slope), normal, friction, jb.AlwaysTouching())
 
 
+BLOCK = dict(accuracy="tight", watch=(), save="end")
+"""By lanes, which compile sooner; test_engines.py has them agree with XLA."""
+
+
 def _settled(scene, speed):
     depth = float((9.8 * jnp.cos(scene.ground.slope) / 1e6) ** (2 / 3))
     return _upright(speed_x=speed, height=-depth)
@@ -124,7 +129,7 @@ def _settled(scene, speed):
 
 def test_a_block_without_friction_slides_down_freely():
     scene = _block(jb.Frictionless(), 0.1)
-    end = jb.simulate(scene, _settled(scene, 0.2), duration=0.5, accuracy="tight", watch=()).final
+    end = jb.simulate(scene, _settled(scene, 0.2), duration=0.5, **BLOCK).final
     assert float(end.hip_vx) == pytest.approx(0.2 + 9.8 * np.sin(0.1) * 0.5, rel=1e-8)
 
 
@@ -132,7 +137,7 @@ def test_a_block_on_regularised_coulomb_friction():
     """v' = −μ g tanh(v/v_d) on the level: sinh(v/v_d) decays exponentially."""
     v_d, mu, t = 0.05, 0.4, 0.06
     scene = _block(jb.RegularisedCoulomb(mu=mu, v_d=v_d), 0.0)
-    end = jb.simulate(scene, _settled(scene, 0.3), duration=t, accuracy="tight", watch=()).final
+    end = jb.simulate(scene, _settled(scene, 0.3), duration=t, **BLOCK).final
     expected = v_d * np.arcsinh(np.sinh(0.3 / v_d) * np.exp(-mu * 9.8 * t / v_d))
     assert float(end.hip_vx) == pytest.approx(expected, rel=1e-6)
 
@@ -142,10 +147,10 @@ def test_a_block_on_bengisu_akay_friction(law):
     """Fast: the kinetic coefficient brakes it. On a slope: it creeps where F = m g sin α."""
     friction = law(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
     flat = _block(friction, 0.0)
-    end = jb.simulate(flat, _settled(flat, 0.5), duration=0.1, accuracy="tight", watch=()).final
+    end = jb.simulate(flat, _settled(flat, 0.5), duration=0.1, **BLOCK).final
     assert float(end.hip_vx) == pytest.approx(0.5 - 0.4 * 9.8 * 0.1, rel=1e-6)
     tilted = _block(friction, 0.1)
-    end = jb.simulate(tilted, _settled(tilted, 0.0), duration=0.1, accuracy="tight", watch=()).final
+    end = jb.simulate(tilted, _settled(tilted, 0.0), duration=0.1, **BLOCK).final
     if law is jb.BengisuAkay:
         creep = 1e-4 * (1 - np.sqrt(1 - np.tan(0.1) / 0.5))
         assert float(end.hip_vx) == pytest.approx(creep, rel=1e-4)
@@ -166,19 +171,29 @@ def test_saving_only_the_end_or_given_times_changes_nothing(seed_walk):
         end.at(0.1)
 
 
+@jax.jit
+@functools.partial(jax.vmap, in_axes=(0, 0, None, None))
+def _batch(angle, contact, duration, rtol):
+    """Walks of eight lanes that differ in the first leg's angle and in K, c, v0 and ξ.
+
+    Compiling it takes most of the time of the tests that run it: so it is one program for them.
+    """
+    scene = jb.seed_scene(**dict(zip(("K", "c", "v0", "xi"), contact, strict=True)))
+    start = jb.seed_state()._replace(theta_1=angle)
+    return jb.simulate(scene, start, duration=duration, rtol=rtol, save="end")
+
+
 def test_a_bad_lane_ends_alone():
     """One lane that is no number and one that falls leave the others as they were."""
     good = [-0.2479, -0.2489, -0.2469]
     bad = [float("nan"), 0.9]
+    contact = jnp.tile(jnp.array([1e6, 1e7, 1e-4, 1e3]), (8, 1))
 
-    @jax.jit
-    @jax.vmap
-    def run(angle):
-        start = jb.seed_state()._replace(theta_1=angle)
-        return jb.simulate(jb.seed_scene(), start, duration=0.5, accuracy="fast", save="end")
+    def run(angles):
+        more = [good[0]] * (8 - len(angles))
+        return _batch(jnp.array(angles + more), contact, 0.5, ACCURACIES["fast"])
 
-    # As many lanes in both, so that one program is compiled.
-    alone, mixed = run(jnp.array(good + good[:2])), run(jnp.array(good + bad))
+    alone, mixed = run(good), run(good + bad)
     kept = np.array(alone.final)[:, :3]
     np.testing.assert_allclose(kept, np.array(mixed.final)[:, :3], atol=1e-9)
     assert [jb.Ending(int(e)) for e in mixed.ending[:3]] == [jb.Ending.WALKING] * 3
@@ -247,13 +262,8 @@ def test_extremes_of_the_contact_parameters():
         "no Stribeck decay": (1e6, 1e7, 1e-4, 0.0),
     }
 
-    @jax.jit
-    @jax.vmap
-    def run(K, c, v0, xi):
-        scene = jb.seed_scene(K=K, c=c, v0=v0, xi=xi)
-        return jb.simulate(scene, jb.seed_state(), duration=2.0, save="end")
-
-    ends = run(*map(jnp.asarray, zip(*cases.values(), strict=True)))
+    angles = jnp.full(len(cases), jb.seed_state().theta_1)
+    ends = _batch(angles, jnp.array([*cases.values()]), 2.0, ACCURACIES["balanced"])
     for name, ending, attempts in zip(
         cases, ends.ending, ends.accepted + ends.rejected, strict=True
     ):
