@@ -137,7 +137,7 @@ def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple
     inverse, entries = _inverse(stages)
     increments: list[Any] = []
     for i in range(len(tableau.alpha)):
-        argument = start + _weighted(tableau.a[i - 1] if i else (), increments, nothing)
+        argument = _weighted(tableau.a[i - 1] if i else (), increments, start)
         coefficients = [tableau.gamma * c for c in tableau.c[i - 1]] if i else ()
         memory = _weighted(coefficients, increments, nothing)
         right = step.by_curvature[i] @ start + step.by_state[i] @ argument
@@ -148,7 +148,7 @@ def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple
         followers = through + g * solved[:led]
         increments.append(jnp.concatenate([followers, solved]))
     back = [order.index(i) for i in range(len(column))]
-    end = start + _weighted(end_weights(tableau), increments, nothing)
+    end = _weighted(end_weights(tableau), increments, start)
     error = _weighted(error_weights(tableau), increments, nothing)
     return jnp.stack([end[i] for i in back]), jnp.stack([error[i] for i in back])
 
@@ -171,7 +171,9 @@ def _inverse(stages: Stages) -> tuple[Any, Any]:
     return inverse, jnp.stack([jnp.stack(row) for row in entries])
 
 
-def _weighted(weights: Sequence[float], increments: Sequence[Any], nothing: Any) -> Any:
-    """Σ weights_j increments_j."""
-    terms = [w * u for w, u in zip(weights, increments, strict=False) if w != 0.0]
-    return sum(terms[1:], terms[0]) if terms else nothing
+def _weighted(weights: Sequence[float], increments: Sequence[Any], start: Any) -> Any:
+    """start + Σ weights_j increments_j, one behind the other: sums that begin alike are shared."""
+    for weight, increment in zip(weights, increments, strict=False):
+        if weight != 0.0:
+            start = start + weight * increment
+    return start

@@ -160,5 +160,7 @@ def test_the_section_does_not_matter(found):
     assert np.abs(other.multipliers)[:3] == pytest.approx(np.abs(found.multipliers)[:3], rel=1e-4)
     for measure in MEASURES:
         mine, theirs = (getattr(each.elasticities, measure) for each in (found, other))
-        # ξ hardly matters at all.
-        assert np.asarray(theirs) == pytest.approx(np.asarray(mine), rel=1e-3, abs=1e-7)
+        # ξ hardly matters at all; and g's effect on the radius is what is left of terms thirty times
+        # as large, each as exact as the columns.
+        least = 1e-4 * np.max(np.abs(mine)) if measure == "spectral_radius" else 1e-7
+        assert np.asarray(theirs) == pytest.approx(np.asarray(mine), rel=1e-3, abs=least)
