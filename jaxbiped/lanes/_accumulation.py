@@ -82,7 +82,7 @@ class _Graph:
 
     def output(self, end: Any) -> int:
         """A vertex that is kept."""
-        found = self._new([] if end is _ZERO else [(end, 1.0)])
+        found = self._new([(end, 1.0)] if isinstance(end, int) else [])
         self.outputs.add(found)
         return found
 

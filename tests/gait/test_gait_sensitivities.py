@@ -154,13 +154,24 @@ def test_elasticities_obey_the_scaling_of_units(accuracy, tolerance, unit, reque
         assert abs(sum(terms) - expected) <= allowed + floor
 
 
+def test_rounding_does_not_reach_the_derivatives_of_the_radius():
+    """Behind touchdown f'' is singular: there a last digit of a state had been felt 1e10 times."""
+    found = []
+    for k in range(4):
+        scene = jb.seed_scene(K=1e6 * (1.0 + 1e-9 * k))
+        gait = jb.find_gait(scene, accuracy="tight", parameters=("slope", "n"))
+        radius = float(gait.measures.spectral_radius)
+        found.append(radius * np.asarray(gait.elasticities.spectral_radius))
+    assert np.max(np.ptp(found, axis=0)) < 5e-7
+
+
 def test_the_section_does_not_matter(found):
     """Multipliers and their derivatives belong to the orbit, though heel strike is a switch."""
     other = jb.find_gait(jb.seed_scene(), section=jb.HeelStrike())
     assert np.abs(other.multipliers)[:3] == pytest.approx(np.abs(found.multipliers)[:3], rel=1e-4)
     for measure in MEASURES:
         mine, theirs = (getattr(each.elasticities, measure) for each in (found, other))
-        # ξ hardly matters at all; and g's effect on the radius is what is left of terms thirty times
-        # as large, each as exact as the columns.
+        # ξ hardly matters at all; and g's effect on the radius is what is left of terms thirty
+        # times as large, each as exact as the columns.
         least = 1e-4 * np.max(np.abs(mine)) if measure == "spectral_radius" else 1e-7
         assert np.asarray(theirs) == pytest.approx(np.asarray(mine), rel=1e-3, abs=least)

@@ -8,7 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jaxbiped.lanes._emit import UnknownPrimitiveError
+from jaxbiped.lanes._engine import CompiledProgram
 from jaxbiped.lanes._host import host
+from jaxbiped.lanes._program import Program
 from tests.lanes.one_shot import compiled, evaluate
 
 POINTS = np.concatenate([np.linspace(-3.0, 3.0, 21), [0.0, np.inf, -np.inf, np.nan]])
@@ -42,6 +44,23 @@ def _mapped(x):
     columns = jnp.stack([x * k for k in range(11)])
     found = jax.lax.map(lambda c: (jnp.sin(c) + x, c * c), columns)
     return jnp.max(found[0]) + jnp.sum(found[1])
+
+
+def _partly_the_same(x):
+    """Half of what each run of the loop computes is no matter of the run."""
+    columns = jnp.stack([x * k for k in range(9)])
+    return jnp.sum(jax.lax.map(lambda c: jnp.sin(x) * c + jnp.exp(-x * x), columns))
+
+
+def _long_body(x):
+    """Few runs of a loop that is too long to be written out."""
+
+    def body(c):
+        for k in range(800):
+            c = c * 0.999 + (k + 1) * x
+        return c
+
+    return jnp.sum(jax.lax.map(body, jnp.stack([x, 2.0 * x, x * x])))
 
 
 def _arrays(x):
@@ -80,6 +99,8 @@ CASES = {
     "branches": _branches,
     "nested": _nested,
     "mapped": _mapped,
+    "partly the same": _partly_the_same,
+    "long body": _long_body,
     "arrays": _arrays,
     "padded": _padded,
     "whole numbers": _whole,
@@ -103,6 +124,28 @@ def test_the_same_bits_at_every_width(name):
     program = compiled(CASES[name], ())
     ways = (dict(width=1, threads=1), dict(width=host().width, threads=2))
     np.testing.assert_array_equal(*(program.run([POINTS], **way).outputs for way in ways))
+
+
+def test_a_loop_computes_once_what_is_the_same_in_each_run():
+    shape = jax.ShapeDtypeStruct((), jnp.float64)
+    program = Program(
+        start=lambda x: x,
+        attempt=lambda x, carried: (_partly_the_same(carried), jnp.asarray(True)),
+        finish=lambda x, carried: carried,
+    )
+    block = CompiledProgram(program, shape).graph.body
+    (loop,) = (value for value in block.values if value.op == "map")
+    inside = {value.op for value in loop.args[1].values}
+    assert inside <= {"taken", "part", "fmul", "fadd"}
+    assert "rint" in {value.op for value in block.values}  # of the exponential
+
+
+def test_short_loops_of_long_bodies_stay_loops():
+    loops = [
+        sum(value.op == "map" for value in compiled(function, ()).graph.end.values)
+        for function in (_long_body, _unrolled)
+    ]
+    assert loops == [1, 0]
 
 
 @given(st.lists(st.floats(width=64), min_size=1, max_size=17))
