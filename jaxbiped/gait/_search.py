@@ -148,18 +148,27 @@ def search(
 
 
 def _by_lanes(bare: Run, whole: Run, first: Scalar, off: Scalar, method: Method) -> _Progress:
-    """Turns are `bare` of directions but the state's until it is near.
-
-    Most need two more, which are outside of a loop: what a loop carries it copies.
-    """
+    """Turns are `bare` of directions but the state's until it is near."""
     now = _advanced(bare, _begin(first, off, method, _nothing(bare, first)), method, _Stage.COARSE)
-    near = (now.stage == _Stage.COARSE) & (now.turns < method.most_turns)
-    # Whoever did not come so far still has the best orbit told.
-    shown = whole(jnp.where(near, now.trial, now.base), now.stage, now.stage == _Stage.NO_RETURN)
-    now = now._replace(base_turn=shown, coarse=shown)
-    now = _where(near, _progressed(now, shown, method), now)
-    now = _further(whole, now, method, _goes_on(now, method, _Stage.COARSE, _Stage.FOUND))
-    return _advanced(whole, now, method, _Stage.FOUND, since=_Stage.COARSE)
+    nothing = _nothing(whole, first)
+    now = now._replace(base_turn=nothing, coarse=nothing)
+
+    def near(now: _Progress) -> Scalar:
+        return _goes_on(now, method, _Stage.COARSE, _Stage.FOUND)
+
+    def goes_on(both: tuple[_Progress, Scalar]) -> Scalar:
+        return near(both[0]) | both[1]
+
+    def advance(both: tuple[_Progress, Scalar]) -> tuple[_Progress, Scalar]:
+        now, untold = both
+        on = near(now)
+        latest = whole(jnp.where(on, now.trial, now.base), now.stage, ~(on | untold))
+        told = now._replace(base_turn=_where(untold, latest, now.base_turn))
+        return _where(on, _progressed(now, latest, method), told), jnp.asarray(False)
+
+    # Whoever did not come near still has the best orbit told.
+    untold = ~near(now) & (now.stage != _Stage.NO_RETURN)
+    return jax.lax.while_loop(goes_on, advance, (now, untold))[0]
 
 
 def _runner(
@@ -188,24 +197,21 @@ def _runner(
     return run
 
 
-def _advanced(
-    run: Run, begin: _Progress, method: Method, until: _Stage, since: _Stage = _Stage.APPROACH
-) -> _Progress:
-    """Searches on, from stage `since` on, until a stage is reached or the turns are used up."""
+def _advanced(run: Run, begin: _Progress, method: Method, until: _Stage) -> _Progress:
+    """Searches on until a stage is reached or the turns are used up."""
 
     def goes_on(now: _Progress) -> Scalar:
-        return _goes_on(now, method, since, until)
+        return _goes_on(now, method, _Stage.APPROACH, until)
 
-    return jax.lax.while_loop(goes_on, lambda now: _further(run, now, method, goes_on(now)), begin)
+    def advance(now: _Progress) -> _Progress:
+        on = goes_on(now)
+        return _where(on, _progressed(now, run(now.trial, now.stage, ~on), method), now)
+
+    return jax.lax.while_loop(goes_on, advance, begin)
 
 
 def _goes_on(now: _Progress, method: Method, since: _Stage, until: _Stage) -> Scalar:
     return (now.stage >= since) & (now.stage < until) & (now.turns < method.most_turns)
-
-
-def _further(run: Run, now: _Progress, method: Method, on: Scalar) -> _Progress:
-    """One turn further, where that is wanted."""
-    return _where(on, _progressed(now, run(now.trial, now.stage, ~on), method), now)
 
 
 def _where(condition: Scalar, new: Any, old: Any) -> Any:
