@@ -22,8 +22,9 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import checked_state
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gait import Gait, described
+from jaxbiped.gait._newton import Method
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
-from jaxbiped.gait._search import Found, Method, search
+from jaxbiped.gait._search import Found, search
 from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._system import RedundantWalking, checked_section, system_of

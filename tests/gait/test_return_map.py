@@ -12,9 +12,10 @@ from scipy.optimize import brentq
 
 import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
+from jaxbiped.gait._newton import Method
 from jaxbiped.gait._orbit import orbit_of
 from jaxbiped.gait._precision import precision_of
-from jaxbiped.gait._search import Method, search
+from jaxbiped.gait._search import search
 from jaxbiped.gait._turn import Turning
 
 
