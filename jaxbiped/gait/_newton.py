@@ -173,4 +173,5 @@ def _step(
 
 
 def chosen(condition: Scalar, new: Any, old: Any) -> Any:
+    """One of two trees of the same structure."""
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b), new, old)
