@@ -15,10 +15,10 @@ import jax.numpy as jnp
 from jax.extend.core import Literal
 
 from jaxbiped._types import Scalar
+from jaxbiped.lanes._emit import called
 
 Weight = Any
 """Of an edge: a traced scalar, or a plain number."""
-_INLINED = {"jit": "jaxpr", "pjit": "jaxpr", "closed_call": "call_jaxpr", "core_call": "call_jaxpr"}
 _PASSED_ON = ("copy", "copy_p", "convert_element_type", "optimization_barrier", "neg")
 
 
@@ -142,8 +142,7 @@ class _Graph:
 def _linear(graph: _Graph, jaxpr: Any, consts: Sequence[Any], args: Sequence[Any]) -> list[Any]:
     """Adds a linear program's vertices; what its results are."""
     known: dict[Any, Any] = {
-        variable: const if isinstance(const, _Known | _Zero | int) else _Known(const)
-        for variable, const in zip(jaxpr.constvars, consts, strict=True)
+        variable: _Known(const) for variable, const in zip(jaxpr.constvars, consts, strict=True)
     }
     known.update(zip(jaxpr.invars, args, strict=True))
 
@@ -152,18 +151,15 @@ def _linear(graph: _Graph, jaxpr: Any, consts: Sequence[Any], args: Sequence[Any
 
     for equation in jaxpr.eqns:
         given = [read(atom) for atom in equation.invars]
-        name, params = equation.primitive.name, equation.params
+        inner = called(equation)
         if all(isinstance(g, _Known) for g in given):
-            found = equation.primitive.bind(*[g.value for g in given], **params)
+            found = equation.primitive.bind(*[g.value for g in given], **equation.params)
             found = found if equation.primitive.multiple_results else [found]
             results = [_Known(each) for each in found]
-        elif name in _INLINED:
-            inner = params[_INLINED[name]]
-            closed = hasattr(inner, "jaxpr")
-            inside, held = (inner.jaxpr, inner.consts) if closed else (inner, [])
-            results = _linear(graph, inside, held, given)
+        elif inner is not None:
+            results = _linear(graph, *inner, given)
         else:
-            results = [_vertex(graph, name, given)]
+            results = [_vertex(graph, equation.primitive.name, given)]
         known.update(zip(equation.outvars, results, strict=True))
     return [read(atom) for atom in jaxpr.outvars]
 

@@ -86,13 +86,20 @@ def _constant(block: Block, value: Any) -> Array:
     return array_of([block.const(x, kind) for x in numbers.ravel()], numbers.shape)
 
 
+def called(equation: Any) -> tuple[Any, Sequence[Any]] | None:
+    """The jaxpr and the constants of what an equation only calls; None for any other."""
+    name = _INLINED.get(equation.primitive.name)
+    if name is None:
+        return None
+    inner = equation.params[name]
+    return (inner.jaxpr, inner.consts) if hasattr(inner, "jaxpr") else (inner, [])
+
+
 def _apply(block: Block, equation: Any, inputs: list[Array]) -> list[Array]:
     name, params = equation.primitive.name, equation.params
-    if name in _INLINED:
-        inner = params[_INLINED[name]]
-        closed = hasattr(inner, "jaxpr")
-        jaxpr, consts = (inner.jaxpr, inner.consts) if closed else (inner, [])
-        return emit(block, jaxpr, consts, inputs)
+    inner = called(equation)
+    if inner is not None:
+        return emit(block, *inner, inputs)
     if name in ELEMENTWISE:
         rule = ELEMENTWISE[name]
         if name == "select_n" and inputs[0].ndim == 0 and inputs[1].ndim > 0:
@@ -201,12 +208,8 @@ def _scan(block: Block, params: Any, inputs: list[Array]) -> list[Array]:
 
 def _size(jaxpr: Any) -> int:
     """How many equations a jaxpr has, with those inside of calls."""
-    count = 0
-    for equation in jaxpr.eqns:
-        inner = _INLINED.get(equation.primitive.name)
-        called = None if inner is None else equation.params[inner]
-        count += 1 if called is None else _size(getattr(called, "jaxpr", called))
-    return count
+    inner = [called(equation) for equation in jaxpr.eqns]
+    return sum(1 if each is None else _size(each[0]) for each in inner)
 
 
 def _repeat(
