@@ -67,7 +67,6 @@ class _Now(NamedTuple):
 def along_nodes(
     flow: Flow,
     nodes: Nodes,
-    last: Scalar,
     bent: Bent,
     sizes: Scalar,
     *,
@@ -76,7 +75,7 @@ def along_nodes(
     """`along_path` and `renewed` by lanes.
 
     Of the tangents the two turned ones come first, and move no parameter; of the others each moves
-    one, by `sizes`, shape (p,). The last of the nodes is replaced by `last`, shape (1 + c,).
+    one, by `sizes`, shape (p,). The motion ends at the arrival, not at the last node.
     """
     args = jtu.tree_structure(flow.args.args)
     compiled = _compiled(flow.system, flow.arrival, flow.args.active, args, flow.structure, final)
@@ -89,7 +88,7 @@ def along_nodes(
         family=bent.first[:, _COUNT:].T,
         second=jnp.transpose(bent.second, (1, 2, 0)),
         steps=nodes.steps,
-        last=last,
+        last=nodes.arrival,
     )
     return call(compiled, given, tape=nodes.ends, quick=True)[0]
 

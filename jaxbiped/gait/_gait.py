@@ -13,6 +13,7 @@ from jaxbiped.gait._orbit import Orbit, orbit_of
 from jaxbiped.gait._search import Found, Search
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.gait._turn import Turn, Turning
+from jaxbiped.lanes._call import Recording
 from jaxbiped.solve._ending import Ending
 
 _NOTHING = 1e-9
@@ -180,10 +181,13 @@ def _path(last: Turn, like: Any) -> tuple[Scalar, Any]:
     """Times and states of a cycle's nodes, leaves of shape (footsteps, nodes); NaN beyond them."""
     nodes = last.nodes
     assert nodes is not None
-    known = jnp.arange(nodes.ends.shape[-2]) < nodes.steps[..., None]
-    ends = jnp.where(known[..., None], nodes.ends, jnp.nan)
-    rows = jnp.concatenate([nodes.start[..., None, :], ends], axis=-2)
-    times, *states = jnp.moveaxis(rows, -1, 0)
+    if isinstance(nodes.ends, Recording):
+        times, *states = jax.vmap(Recording.columns)(nodes.ends, nodes.start)
+    else:
+        known = jnp.arange(nodes.ends.shape[-2]) < nodes.steps[..., None]
+        ends = jnp.where(known[..., None], nodes.ends, jnp.nan)
+        rows = jnp.concatenate([nodes.start[..., None, :], ends], axis=-2)
+        times, *states = jnp.moveaxis(rows, -1, 0)
     return times, jtu.tree_unflatten(jtu.tree_structure(like), states)
 
 

@@ -50,10 +50,11 @@ class Progress(NamedTuple):
     Attributes:
         stage: code of a `Stage`.
         trial: the m recurring components to turn from next.
-        base: the best so far; `base_residual` the largest change over its turn, `base_turn` that
-            turn, `change` its changes and `slope` their derivatives by the components (m, m).
+        base: the best so far; `base_residual` the largest change over its turn, `base_turn` what
+            tells that turn, `change` its changes and `slope` their derivatives by the components
+            (m, m).
         damping: Levenberg and Marquardt's.
-        coarse: the last looser turn, where it is kept.
+        coarse: what tells the last looser turn.
         optimiser: its state.
         code, turns, history: as in `Found`.
     """
@@ -64,17 +65,20 @@ class Progress(NamedTuple):
     base_residual: Scalar
     change: Scalar
     slope: Scalar
-    base_turn: Turn
+    base_turn: Any
     damping: Scalar
-    coarse: Turn | None
+    coarse: Any
     optimiser: Any
     code: Scalar
     turns: Scalar
     history: Scalar
 
 
-def begun(first: Scalar, off: Scalar, method: Method, nothing: Turn) -> Progress:
-    """Before the first turn, from components that are `off` the section by so much."""
+def begun(first: Scalar, off: Scalar, method: Method, nothing: Any) -> Progress:
+    """Before the first turn, from components that are `off` the section by so much.
+
+    `nothing` is in the place of what tells a turn.
+    """
     on_section = off < 1e-9
     stage = jnp.where(on_section, int(Stage.ROUGH), int(Stage.APPROACH))
     return Progress(
@@ -86,7 +90,7 @@ def begun(first: Scalar, off: Scalar, method: Method, nothing: Turn) -> Progress
         slope=jnp.zeros((len(first), len(first))),
         base_turn=nothing,
         damping=jnp.asarray(0.0),
-        coarse=None,
+        coarse=nothing,
         optimiser=None if method.optimiser is None else method.optimiser.init(first),
         code=jnp.asarray(0),
         turns=jnp.asarray(0),
@@ -94,8 +98,8 @@ def begun(first: Scalar, off: Scalar, method: Method, nothing: Turn) -> Progress
     )
 
 
-def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
-    """One turn further: judge the trial, and propose the next."""
+def progressed(now: Progress, latest: Turn, told: Any, method: Method) -> Progress:
+    """One turn further: judge the trial, and propose the next; `told` is what tells the turn."""
     returned = latest.code == 0
     change = latest.recurring - now.trial
     residual = jnp.where(returned, jnp.max(jnp.abs(change)), jnp.inf)
@@ -110,7 +114,7 @@ def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
     m = len(base)
     base_residual, moved, slope, base_turn = chosen(
         better,
-        (residual, change, latest.jacobian[:, :m] - jnp.eye(m), latest),
+        (residual, change, latest.jacobian[:, :m] - jnp.eye(m), told),
         (now.base_residual, now.change, now.slope, now.base_turn),
     )
     damping = jnp.where(
@@ -142,7 +146,7 @@ def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
         slope=slope,
         base_turn=base_turn,
         damping=damping,
-        coarse=None if now.coarse is None else chosen(coarse_done, base_turn, now.coarse),
+        coarse=chosen(coarse_done, base_turn, now.coarse),
         optimiser=optimiser,
         code=jnp.where(returned, now.code, latest.code),
         turns=now.turns + 1,

@@ -84,12 +84,11 @@ def orbit_of(
     radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
     differentiable = turning.steps == 1 or turning.system.renews_by_symmetry
     if radius and active and differentiable:
-        both = jax.tree.map(lambda a, b: jnp.stack([a, b]), last, coarse)
         # Lanes take both at once; XLA would compute in lockstep and compile for longer.
         each_of = jax.vmap if turning.engine == "lanes" else _one_by_one
         radius_slopes, looser_slopes = each_of(
             lambda each: _radius_slopes(turning, args, active, guess, each)
-        )(both)
+        )(found.both)
         radius_errors = jnp.abs(radius_slopes - looser_slopes)
     return Orbit(found, state, stability, slopes, errors, radius_slopes, radius_errors, sizes)
 

@@ -2,7 +2,7 @@
 
 import enum
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -43,8 +43,8 @@ class Found(NamedTuple):
         code: that of the `Ending` of the last turn that did not return, 0 for none.
         recurring: the m recurring components.
         residual: largest of their changes over a turn; infinite where nothing returned.
-        last: the turn from there.
-        coarse: a looser turn near there, the witness of the last one's error.
+        both: the turn from there, and a looser one near there that is the witness of its error, one
+            behind the other.
         turns: number of turns taken.
         history: residual of each turn, shape (most_turns,), NaN beyond the last.
     """
@@ -53,10 +53,26 @@ class Found(NamedTuple):
     code: Scalar
     recurring: Scalar
     residual: Scalar
-    last: Turn
-    coarse: Turn
+    both: Turn
     turns: Scalar
     history: Scalar
+
+    @property
+    def last(self) -> Turn:
+        """The turn from the fixed point."""
+        return jax.tree.map(lambda leaf: leaf[0], self.both)
+
+    @property
+    def coarse(self) -> Turn:
+        """The looser one."""
+        return jax.tree.map(lambda leaf: leaf[1], self.both)
+
+
+class Made(NamedTuple):
+    """What tells a turn by lanes: the recurring components that it began from, and its stage."""
+
+    recurring: Scalar
+    stage: Scalar
 
 
 Run = Callable[[Scalar, Scalar, Scalar], Turn]
@@ -74,16 +90,8 @@ def search(
     """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely."""
     first = recurring_of(turning.system, guess)
     off = jnp.abs(turning.section.value(args, guess))
-    whole = _runner(turning, args, active, guess, precision, save_nodes=True)
-    if turning.engine == "lanes":
-        bare = _runner(turning, args, (), guess, precision, save_nodes=False)
-        end = _by_lanes(bare, whole, first, off, method)
-    else:
-        # One loop, all directions in it: each loop is compiled for itself.
-        nothing = _nothing(whole, first)
-        begin = begun(first, off, method, nothing)._replace(coarse=nothing)
-        end = _advanced(whole, begin, method, Stage.FOUND)
-    assert end.coarse is not None
+    by = _by_lanes if turning.engine == "lanes" else _by_xla
+    end, both = by(turning, args, active, guess, precision, method, (first, off))
     ending = jnp.where(
         end.stage == Stage.FOUND,
         int(Search.FOUND),
@@ -94,35 +102,62 @@ def search(
         code=end.code,
         recurring=end.base,
         residual=end.base_residual,
-        last=end.base_turn,
-        coarse=end.coarse,
+        both=both,
         turns=end.turns,
         history=end.history,
     )
 
 
-def _by_lanes(bare: Run, whole: Run, first: Scalar, off: Scalar, method: Method) -> Progress:
-    """Turns are `bare` of directions but the state's until it is near."""
-    now = _advanced(bare, begun(first, off, method, _nothing(bare, first)), method, Stage.COARSE)
-    nothing = _nothing(whole, first)
-    now = now._replace(base_turn=nothing, coarse=nothing)
+def _by_xla(
+    turning: Turning,
+    args: PyTree,
+    active: tuple[int, ...],
+    guess: PyTree,
+    precision: Precision,
+    method: Method,
+    begin: tuple[Scalar, Scalar],
+) -> tuple[Progress, Turn]:
+    """One loop, all directions in it: each loop is compiled for itself."""
+    run = _runner(turning, args, active, guess, precision)
+    shape: Turn = jax.eval_shape(run, begin[0], jnp.asarray(0), jnp.asarray(True))
+    nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
 
-    def near(now: Progress) -> Scalar:
-        return _goes_on(now, method, Stage.COARSE, Stage.FOUND)
+    def itself(turn: Turn, _: Made) -> Turn:
+        return turn
 
-    def goes_on(both: tuple[Progress, Scalar]) -> Scalar:
-        return near(both[0]) | both[1]
+    end = _advanced(run, itself, begun(*begin, method, nothing), method, Stage.FOUND)
+    return end, jax.tree.map(lambda *pair: jnp.stack(pair), end.base_turn, end.coarse)
 
-    def advance(both: tuple[Progress, Scalar]) -> tuple[Progress, Scalar]:
-        now, untold = both
-        on = near(now)
-        latest = whole(jnp.where(on, now.trial, now.base), now.stage, ~(on | untold))
-        told = now._replace(base_turn=chosen(untold, latest, now.base_turn))
-        return chosen(on, progressed(now, latest, method), told), jnp.asarray(False)
 
-    # Whoever did not come near still has the best orbit told.
-    untold = ~near(now) & (now.stage != Stage.NO_RETURN)
-    return jax.lax.while_loop(goes_on, advance, (now, untold))[0]
+def _by_lanes(
+    turning: Turning,
+    args: PyTree,
+    active: tuple[int, ...],
+    guess: PyTree,
+    precision: Precision,
+    method: Method,
+    begin: tuple[Scalar, Scalar],
+) -> tuple[Progress, Turn]:
+    """Turns are bare of directions but the state's until it is near.
+
+    Turns do not travel through the search: at its end two of them are asked for once more, which
+    takes no solve.
+    """
+    bare = _runner(turning, args, (), guess, precision, save_nodes=False)
+    whole = _runner(turning, args, active, guess, precision)
+    known = _runner(turning, args, active, guess, precision, again=True)
+
+    def made(_: Turn, where: Made) -> Made:
+        return where
+
+    nothing = Made(begin[0], jnp.asarray(0))
+    now = _advanced(bare, made, begun(*begin, method, nothing), method, Stage.COARSE)
+    now = _advanced(whole, made, now, method, Stage.FOUND)
+    # Where no turn was judged, what it began from is still the best orbit there is.
+    untold = (now.base_turn.stage == 0) & (now.stage != Stage.NO_RETURN)
+    last = chosen(untold, Made(now.base, jnp.asarray(int(Stage.ROUGH))), now.base_turn)
+    both: Made = jax.tree.map(lambda *pair: jnp.stack(pair), last, now.coarse)
+    return now, jax.vmap(known)(both.recurring, both.stage, both.stage == 0)
 
 
 def _runner(
@@ -132,7 +167,8 @@ def _runner(
     guess: PyTree,
     precision: Precision,
     *,
-    save_nodes: bool,
+    save_nodes: bool = True,
+    again: bool = False,
 ) -> Run:
     """Turns with derivatives by the state and by the `active` parameters."""
     seeds, _ = seeded(args, active, len(recurring_of(turning.system, guess)))
@@ -146,29 +182,27 @@ def _runner(
             )
         )
         start = state_with(turning.system, guess, trial)
-        return turn(turning, seeds, start, wanted, idle, save_nodes=save_nodes)
+        return turn(turning, seeds, start, wanted, idle, save_nodes=save_nodes, again=again)
 
     return run
 
 
-def _advanced(run: Run, begin: Progress, method: Method, until: Stage) -> Progress:
+def _advanced(
+    run: Run,
+    tell: Callable[[Turn, Made], Any],
+    begin: Progress,
+    method: Method,
+    until: Stage,
+) -> Progress:
     """Searches on until a stage is reached or the turns are used up."""
 
     def goes_on(now: Progress) -> Scalar:
-        return _goes_on(now, method, Stage.APPROACH, until)
+        return (now.stage < until) & (now.turns < method.most_turns)
 
     def advance(now: Progress) -> Progress:
         on = goes_on(now)
-        return chosen(on, progressed(now, run(now.trial, now.stage, ~on), method), now)
+        latest = run(now.trial, now.stage, ~on)
+        told = tell(latest, Made(now.trial, now.stage))
+        return chosen(on, progressed(now, latest, told, method), now)
 
     return jax.lax.while_loop(goes_on, advance, begin)
-
-
-def _goes_on(now: Progress, method: Method, since: Stage, until: Stage) -> Scalar:
-    return (now.stage >= since) & (now.stage < until) & (now.turns < method.most_turns)
-
-
-def _nothing(run: Run, first: Scalar) -> Turn:
-    """A turn of zeros."""
-    shape: Turn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
-    return jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)

@@ -14,7 +14,6 @@ from jaxbiped.gait._radau import stacked
 from jaxbiped.gait._turn import Turn, Turning, recurring_places
 from jaxbiped.solve._columns import Seeded, active_leaves
 from jaxbiped.solve._landing import MARGIN
-from jaxbiped.solve._passage import Nodes, arrival_at
 
 
 def second_turn(
@@ -55,18 +54,13 @@ def second_turn(
     assert last.nodes is not None
     for k in range(turning.steps):
         nodes = jax.tree.map(lambda leaf, k=k: leaf[k], last.nodes)
-        end = jnp.where(nodes.steps > 0, nodes.ends[nodes.steps - 1], nodes.start)
-        # The last step ends on the section, not just past it.
-        state = jtu.tree_unflatten(structure, list(end[1:]))
-        arrived, past = arrival_at(watch, state, args.args)
-        end = jnp.stack([end[0] - past, *jtu.tree_leaves(arrived)])
-        # A section may be a switch, as touchdown is: the motion begins and ends before it.
-        start, end = (_earlier(flow, row, parameters) for row in (nodes.start, end))
+        # The last step ends on the section, which may be a switch, as touchdown is: the motion
+        # begins and ends before it.
+        start, end = (_earlier(flow, row, parameters) for row in (nodes.start, nodes.arrival))
         final = k + 1 == turning.steps
         if turning.engine == "lanes":
-            bent, period = along_nodes(
-                flow, Nodes(start, nodes.ends, nodes.steps), end, bent, sizes, final=final
-            )
+            nodes = nodes._replace(start=start, arrival=end)
+            bent, period = along_nodes(flow, nodes, bent, sizes, final=final)
             continue
         ends = nodes.ends.at[nodes.steps - 1].set(end)
         rows = jnp.concatenate([start[None], ends])

@@ -152,8 +152,12 @@ def turn(
     idle: Any,
     *,
     save_nodes: bool = True,
+    again: bool = False,
 ) -> Turn:
-    """Follows the orbit from `y` for one turn, with derivatives; nothing where `idle`."""
+    """Follows the orbit from `y` for one turn, with derivatives; nothing where `idle`.
+
+    Lanes need not solve the same turn `again`, where its nodes are saved.
+    """
     places = recurring_places(turning.system, y)
     count, n = len(jtu.tree_leaves(y)), args.seeds.shape[1]
     start = jnp.zeros((count, n)).at[jnp.asarray(places), jnp.arange(len(places))].set(1.0)
@@ -166,7 +170,7 @@ def turn(
         y0, failed = before
         y0 = _entered(turning, y0, args)
         within = jnp.where(failed != 0, 0.0, limit)
-        found = _passed(turning, watch, y0, args, precision, within, save_nodes)
+        found = _passed(turning, watch, y0, args, precision, within, save_nodes, again)
         found = _left(turning, found, args)
         state, moved = along_columns(lambda s, a: turning.system.renew(a, s), found.y, args)
         on_section = as_columns(moved)
@@ -217,7 +221,7 @@ def _left(turning: Turning, found: Passage, args: Seeded) -> Passage:
             outside = jtu.tree_leaves(minimal_state(args.args, inside))
             return jnp.stack([rows[..., 0], *outside], axis=-1)
 
-        nodes = Nodes(left(nodes.start), left(nodes.ends), nodes.steps)
+        nodes = Nodes(left(nodes.start), left(nodes.ends), left(nodes.arrival), nodes.steps)
     return found._replace(y=Tangents(state, as_columns(columns)), nodes=nodes)
 
 
@@ -229,6 +233,7 @@ def _passed(
     precision: Precision,
     limit: Scalar,
     save_nodes: bool,
+    again: bool,
 ) -> Passage:
     """The next passage, by the engine that is asked for."""
     most = turning.max_solver_steps
@@ -254,6 +259,7 @@ def _passed(
         time_limit=limit,
         max_solver_steps=most,
         save_nodes=save_nodes,
+        again=again,
     )
 
 

@@ -59,6 +59,7 @@ class Crossed(NamedTuple):
     Attributes:
         t, state, columns, time_columns: on the section.
         code, attempted, jumps, missed, peak, peak_columns: see there.
+        accepted: number of steps accepted.
     """
 
     t: Any
@@ -67,6 +68,7 @@ class Crossed(NamedTuple):
     time_columns: Any
     code: Any
     attempted: Any
+    accepted: Any
     jumps: Any
     missed: Any
     peak: Any
@@ -189,6 +191,7 @@ class AdaptiveColumns:
             time_columns=time_columns,
             code=jnp.where(now.landed.arrived, 0, ended),
             attempted=now.attempted,
+            accepted=now.landed.accepted,
             jumps=now.landed.jumps,
             missed=now.landed.leapt,
             peak=peak,

@@ -1,7 +1,9 @@
 """Compiled programs as operations of JAX: they run under `jit` and `vmap`."""
 
+from collections.abc import Callable
 from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -10,8 +12,11 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, PyTree
 
-from jaxbiped.lanes._engine import CompiledProgram, Recorded
+from jaxbiped.lanes._engine import CompiledProgram, Recorded, default_threads
+from jaxbiped.lanes._held_back import HeldBack, Tables
 from jaxbiped.lanes._program import leaves_of
+
+_HELD_BACK = HeldBack(most=1 << 28)
 
 
 class Schedule:
@@ -19,6 +24,28 @@ class Schedule:
 
     def __init__(self, times: np.ndarray) -> None:
         self.times = np.ascontiguousarray(times, dtype=np.float64)
+
+
+class Recording(eqx.Module):
+    """The records of one simulation, told by its inputs: arrays of them travel nowhere.
+
+    Attributes:
+        numbers: the inputs' leaves one behind the other, shape (k,).
+        compiled: the program; `room` for how many records; `quick`: see `call`.
+    """
+
+    numbers: Any
+    compiled: CompiledProgram = eqx.field(static=True)
+    room: int = eqx.field(static=True)
+    quick: bool = eqx.field(static=True)
+
+    def columns(self, first: Any) -> list[Any]:
+        """For each number in a record `first`'s and then those recorded, NaN beyond the last.
+
+        `first` has shape (numbers,), the arrays (1 + room,).
+        """
+        params = _params(self.compiled, room=self.room, quick=self.quick, wants="columns")
+        return _bound([self.numbers, first], params)
 
 
 def call(
@@ -33,27 +60,65 @@ def call(
     """Runs one simulation, or under `vmap` many at once, each in a lane.
 
     There is room for `room` records, or for one at each time of a schedule. A `tape`, shape
-    (rows, numbers), is for programs that read one.
+    (rows, numbers) or the `Recording` of another simulation, is for programs that read one.
 
     It has no derivative of its own. Outside of `jit` it runs at once and an
     interrupt ends it; inside, it is called back from the compiled program, and an interrupt waits.
     A single simulation that is `quick` is over before a user could interrupt, and needs no thread.
     """
+    recorder, rows = None, [] if tape is None else [tape]
+    if isinstance(tape, Recording):
+        recorder, rows = (tape.compiled, tape.room, tape.quick), [tape.numbers]
+    params = _params(compiled, schedule=schedule, room=room, quick=quick, recorder=recorder)
+    table, *rest = _bound([_numbers(inputs, rows), *rows], params)
+    return _outputs(compiled, table), Recorded(*rest) if rest else None
+
+
+def call_recording(
+    compiled: CompiledProgram, inputs: PyTree, *, room: int, quick: bool, again: bool
+) -> tuple[PyTree, Recording]:
+    """`call`, but the records stay on the host; the same `again` need not run."""
+    numbers = _numbers(inputs, [])
+    wants = "outputs again" if again else "outputs"
+    params = _params(compiled, room=room, quick=quick, wants=wants)
+    (table,) = _bound([numbers], params)
+    return _outputs(compiled, table), Recording(numbers, compiled, room, quick)
+
+
+def _params(
+    compiled: CompiledProgram,
+    *,
+    room: int,
+    quick: bool,
+    schedule: Schedule | None = None,
+    wants: str = "both",
+    recorder: tuple[CompiledProgram, int, bool] | None = None,
+) -> dict[str, Any]:
+    """Of the operation: what is run and how, and which part of what that gives is wanted."""
+    return dict(
+        compiled=compiled,
+        schedule=schedule,
+        room=room,
+        quick=quick,
+        wants=wants,
+        recorder=recorder,
+    )
+
+
+def _numbers(inputs: PyTree, beside: list[Any]) -> Any:
+    """The leaves one behind the other: every array that crosses costs time."""
     leaves = jtu.tree_leaves(inputs)
-    params: dict[str, Any] = dict(compiled=compiled, schedule=schedule, room=room, quick=quick)
-    # One array each way: every array that crosses costs time.
-    rows = [] if tape is None else [tape]
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in [*leaves, *rows]):
-        numbers = [jnp.ravel(jnp.asarray(leaf, dtype=jnp.float64)) for leaf in leaves]
-        given = [jnp.concatenate(numbers), *rows]
-        table, *rest = (leaf[0] for leaf in _RUN.bind(*[x[None] for x in given], **params))
-    else:
-        known = [np.ravel(np.asarray(leaf, dtype=np.float64)) for leaf in leaves]
-        given = [np.concatenate(known), *(np.asarray(x) for x in rows)]
-        table, *rest = (leaf[0] for leaf in _run(*[x[None] for x in given], **params))
-    records: Any = [jnp.asarray(leaf) for leaf in rest]
-    recorded = Recorded(*records) if rest else None
-    return _outputs(compiled, table), recorded
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in [*leaves, *beside]):
+        return jnp.concatenate([jnp.ravel(jnp.asarray(x, dtype=jnp.float64)) for x in leaves])
+    return np.concatenate([np.ravel(np.asarray(leaf, dtype=np.float64)) for leaf in leaves])
+
+
+def _bound(given: list[Any], params: dict[str, Any]) -> list[Any]:
+    """The operation's results for one simulation."""
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in given):
+        return [leaf[0] for leaf in _RUN.bind(*[x[None] for x in given], **params)]
+    found = _run(*[np.asarray(x)[None] for x in given], **params)
+    return [jnp.asarray(leaf[0]) for leaf in found]
 
 
 def _outputs(compiled: CompiledProgram, table: Any) -> PyTree:
@@ -71,28 +136,67 @@ def _run(
     schedule: Schedule | None,
     room: int,
     quick: bool,
+    wants: str,
+    recorder: tuple[CompiledProgram, int, bool] | None,
 ) -> list[np.ndarray]:
     """Of inputs (n, k) and their tapes: outputs (n, o), and what was recorded."""
+    table = np.asarray(numbers).T
     times = None if schedule is None else schedule.times
     room = room if times is None else len(times)
-    table = np.asarray(numbers).T
-    alone = quick and table.shape[1] == 1
     rows = None if tape is None else np.asarray(tape)
-    found, recorded = compiled.run_table(table, schedule=times, tape=rows, room=room, quick=alone)
-    return [found.T, *(recorded or ())]
+    if recorder is not None:
+        recording, length, short = recorder
+        found = _recording_run(recording, tape.shape[0], length, short)
+        rows = _HELD_BACK.rows(recording, np.asarray(tape).T, found)
+    if wants == "both":
+        alone = quick and table.shape[1] == 1
+        outputs, recorded = compiled.run_table(
+            table, schedule=times, tape=rows, room=room, quick=alone
+        )
+        return [outputs.T, *(recorded or ())]
+    run = _recording_run(compiled, table.shape[1], room, quick)
+    if wants == "columns":
+        assert rows is not None
+        return _HELD_BACK.columns(compiled, table, rows, room, run)
+    if wants == "outputs":
+        return [_HELD_BACK.ran(compiled, table, run)[0].T]
+    return [_HELD_BACK.outputs(compiled, table, run).T]
+
+
+def _recording_run(
+    compiled: CompiledProgram, count: int, room: int, quick: bool
+) -> Callable[[np.ndarray], Tables]:
+    """Runs those of `count` simulations that nobody ran yet."""
+    # Also where these are few: another width would have to be compiled.
+    width = compiled.width(count, default_threads())
+
+    def run(table: np.ndarray) -> Tables:
+        alone = quick and table.shape[1] == 1
+        found, recorded = compiled.run_table(table, room=room, quick=alone, width=width)
+        assert recorded is not None
+        return found, *recorded
+
+    return run
 
 
 def _shapes(
-    count: int, *, compiled: CompiledProgram, schedule: Schedule | None, room: int, quick: bool
+    count: int,
+    *,
+    compiled: CompiledProgram,
+    schedule: Schedule | None,
+    room: int,
+    wants: str,
+    **_: Any,
 ) -> list[Any]:
-    del quick
+    numbers = len(compiled.graph.recorded)
+    if wants == "columns":
+        return [jax.ShapeDtypeStruct((count, 1 + room), jnp.float64)] * numbers
     leaves = jtu.tree_leaves(compiled.graph.output_structure)
     size = sum(int(np.prod(leaf.shape)) for leaf in leaves)
     found = [jax.ShapeDtypeStruct((count, size), jnp.float64)]
-    if compiled.graph.recording is not None:
+    if compiled.graph.recording is not None and wants == "both":
         room = room if schedule is None else len(schedule.times)
-        shape = (count, room, len(compiled.graph.recorded))
-        found.append(jax.ShapeDtypeStruct(shape, jnp.float64))
+        found.append(jax.ShapeDtypeStruct((count, room, numbers), jnp.float64))
         found.append(jax.ShapeDtypeStruct((count,), jnp.int64))
     return found
 

@@ -111,16 +111,15 @@ def _derivatives(
     def rates(z: Components) -> Components:
         return kept_rates(z[:count], z[count:])
 
-    def at_stage(both: tuple[Any, Any]) -> tuple[Any, Any]:
-        point, along = (list(each) for each in both)
+    def turned(each: Any) -> Any:
+        def along(z: Components) -> Components:
+            return jax.jvp(lambda y: kept_rates(y, z[count:]), (z[:count],), (list(each),))[1]
 
-        def turned(z: Components) -> Components:
-            return jax.jvp(lambda y: kept_rates(y, z[count:]), (z[:count],), (along,))[1]
-
-        return jacobian(rates, [*point, *parameters]), jacobian(turned, [*start, *parameters])
+        return jacobian(along, [*start, *parameters])
 
     stacked = [jnp.stack([jnp.stack(each) for each in array]) for array in (points, directions)]
-    return jax.lax.map(at_stage, tuple(stacked))
+    at_points = jax.lax.map(lambda point: jacobian(rates, [*point, *parameters]), stacked[0])
+    return at_points, jax.lax.map(turned, stacked[1])
 
 
 def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple[Any, Any]:

@@ -9,9 +9,9 @@ import jax.tree_util as jtu
 
 from jaxbiped._types import Scalar
 from jaxbiped.lanes._adaptive_columns import AdaptiveColumns, Crossed, Crossing
-from jaxbiped.lanes._call import call
+from jaxbiped.lanes._call import Recording, call, call_recording
 from jaxbiped.lanes._end_of_solve import almost
-from jaxbiped.lanes._engine import CompiledProgram, Recorded
+from jaxbiped.lanes._engine import CompiledProgram
 from jaxbiped.solve._columns import Seeded, Tangents
 from jaxbiped.solve._landing import Watch
 from jaxbiped.solve._passage import Precision
@@ -32,12 +32,14 @@ def cross(
     time_limit: Any,
     max_solver_steps: int,
     save_nodes: bool = False,
-) -> tuple[Crossed, Recorded | None]:
+    again: bool = False,
+) -> tuple[Crossed, Recording | None]:
     """Solves from `y0` to the section, a misfortune or `time_limit` [s].
 
     Of the columns the last p move one parameter each, by `sizes`, shape (p,), in the order of the
     active leaves; the columns before move none. Seeds are not looked at. Records are the time and
-    the state at the ends of the accepted steps.
+    the state at the ends of the accepted steps; with them
+    the same solve `again` takes no time.
     """
     m = y0.columns.shape[1] - len(args.active)
     inputs = Crossing(
@@ -56,8 +58,11 @@ def cross(
     )
     structures = (jtu.tree_structure(args.args), jtu.tree_structure(y0.state))
     compiled = _compiled(watch, solver, args.active, m, save_nodes, *structures)
-    room = max_solver_steps if save_nodes else 0
-    return call(compiled, inputs, room=room, quick=max_solver_steps <= _QUICK)
+    quick = max_solver_steps <= _QUICK
+    if save_nodes:
+        room = max_solver_steps
+        return call_recording(compiled, inputs, room=room, quick=quick, again=again)
+    return call(compiled, inputs, quick=quick)[0], None
 
 
 @functools.lru_cache(maxsize=256)

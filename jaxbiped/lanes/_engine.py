@@ -29,7 +29,8 @@ class Recorded(NamedTuple):
     """What was recorded of n simulations.
 
     Attributes:
-        values: shape (n, room, numbers in a record); NaN where nothing was recorded.
+        values: shape (n, room, numbers in a record). Beyond the records there are NaN where a
+            schedule says when they are due, else zeros: memory that nobody ever touched.
         counts: how many records there were, shape (n,); more than `room` are lost.
     """
 
@@ -159,7 +160,9 @@ class CompiledProgram:
         rows = np.ascontiguousarray(rows, dtype=np.float64)
         assert rows.shape[1] > 0
         assert (rows.shape[0], rows.shape[2]) == (count, len(self.graph.row))
-        records = np.full((count, room, len(self.graph.recorded)), np.nan)
+        records = np.zeros((count, room, len(self.graph.recorded)))
+        if schedule is not None:
+            records[:] = np.nan
         record_counts = np.zeros(count, dtype=np.int64)
         queue, stop = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
         chosen = self.width(count, threads or default_threads()) if width is None else width

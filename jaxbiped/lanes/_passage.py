@@ -7,8 +7,9 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
+from jaxbiped.lanes._adaptive_columns import Crossed
+from jaxbiped.lanes._call import Recording
 from jaxbiped.lanes._crossing import cross
-from jaxbiped.lanes._engine import Recorded
 from jaxbiped.solve._columns import Seeded, Tangents
 from jaxbiped.solve._landing import Watch
 from jaxbiped.solve._passage import Nodes, Passage, Precision
@@ -26,9 +27,10 @@ def passage_by_lanes(
     time_limit: Any,
     max_solver_steps: int,
     save_nodes: bool,
+    again: bool,
 ) -> Passage:
-    """`passage` for columns as `cross` takes them."""
-    found, recorded = cross(
+    """`passage` for columns as `cross` takes them; nodes are told as a `Recording`."""
+    found, recording = cross(
         watch,
         solver,
         y0,
@@ -38,6 +40,7 @@ def passage_by_lanes(
         time_limit=time_limit,
         max_solver_steps=max_solver_steps,
         save_nodes=save_nodes,
+        again=again,
     )
     return Passage(
         y=Tangents(found.state, found.columns.T),
@@ -49,10 +52,11 @@ def passage_by_lanes(
         jumps=found.jumps,
         missed=found.missed,
         attempted=found.attempted,
-        nodes=None if recorded is None else _nodes(y0.state, recorded),
+        nodes=None if recording is None else _nodes(y0.state, found, recording),
     )
 
 
-def _nodes(start: PyTree, recorded: Recorded) -> Nodes:
+def _nodes(start: PyTree, found: Crossed, recording: Recording) -> Nodes:
     first = jnp.stack([jnp.zeros(()), *jtu.tree_leaves(start)])
-    return Nodes(first, jnp.asarray(recorded.values), jnp.asarray(recorded.counts))
+    last = jnp.stack([found.t, *jtu.tree_leaves(found.state)])
+    return Nodes(first, recording, last, found.accepted)

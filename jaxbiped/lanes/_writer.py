@@ -1,6 +1,6 @@
 """Graphs written as LLVM's text, each value one vector over the lanes."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from jaxbiped.lanes._graph import Block, Kind, Value
@@ -62,8 +62,13 @@ class Writer:
             ("splat", text, width), lambda: self.text.splat(text, value.kind, width)
         )
 
-    def write(self, block: Block, width: int | None = None) -> None:
-        """Writes all of a block that is needed."""
+    def write(
+        self,
+        block: Block,
+        width: int | None = None,
+        known: Callable[[Value], None] = lambda value: None,
+    ) -> None:
+        """Writes all of a block that is needed; `known` is told what has been computed."""
         width = self.width if width is None else width
         for value in block.values:
             if value not in self.needed or id(value) in self.needed.absorbed:
@@ -78,6 +83,7 @@ class Writer:
                 self._write_map(value)
             elif value.op not in ("held", "taken"):
                 self.name(value, self._operation(value, width), width)
+                known(value)
 
     def _operation(self, value: Value, width: int) -> str:
         place = self.needed.fused.get(id(value))
@@ -181,11 +187,21 @@ class Writer:
                 kind = taken[i].kind
                 text = self.text.load(self.text.address(sources[i], kind, offset), kind, lanes)
                 self.name(taken[i], text, lanes)
-            self.write(inside, lanes)
-            for k, target in targets.items():
-                kind = values[k].kind
-                text = self.use(values[k], lanes)
-                self.text.store(text, self.text.address(target, kind, offset), kind, lanes)
+            late = dict(targets)
+
+            def store(k: int) -> None:
+                kind, text = values[k].kind, self.use(values[k], lanes)
+                at = self.text.address(late.pop(k), kind, offset)
+                self.text.store(text, at, kind, lanes)
+
+            def known(value: Value) -> None:
+                for k in [k for k in late if values[k] is value]:
+                    store(k)
+
+            # What is known is stored at once, so that it takes no register until the end.
+            self.write(inside, lanes, known)
+            for k in list(late):
+                store(k)
         self.text.lines.insert(
             at, f"  {counter} = phi i64 [ 0, %{start} ], [ {following}, %{self.text.label} ]"
         )

@@ -13,7 +13,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns
 from jaxbiped.solve._ending import Ending
-from jaxbiped.solve._landing import Landed, Landing, Watch
+from jaxbiped.solve._landing import Landed, Landing, Watch, plain_state
 from jaxbiped.solve._step_control import first_step, step_control
 from jaxbiped.solve._tangents import (
     TangentControl,
@@ -43,12 +43,15 @@ class Nodes(NamedTuple):
 
     Attributes:
         start: where the first step begins, shape (1 + c,).
-        ends: shape (room, 1 + c); no numbers beyond the last.
+        ends: shape (room, 1 + c), by lanes a `Recording` of them. The last one lies just past the
+            section; no numbers are beyond it.
+        arrival: on the section, shape (1 + c,).
         steps: how many there are.
     """
 
     start: Scalar
-    ends: Scalar
+    ends: Any
+    arrival: Scalar
     steps: Scalar
 
 
@@ -143,14 +146,15 @@ def passage(
         jumps=landed.jumps,
         missed=landed.leapt,
         attempted=solution.stats["num_steps"],
-        nodes=_nodes(times[1], states[1]) if save_nodes else None,
+        nodes=_nodes(times[1], states[1], time, y) if save_nodes else None,
     )
 
 
-def _nodes(times: Scalar, states: PyTree) -> Nodes:
+def _nodes(times: Scalar, states: PyTree, time: Scalar, y: Any) -> Nodes:
     """From times and states of which the first are those of the start; infinite beyond the last."""
     rows = jnp.stack([times, *jtu.tree_leaves(states)], axis=-1)
-    return Nodes(rows[0], rows[1:], jnp.sum(jnp.isfinite(times)) - 1)
+    arrival = jnp.stack([time, *jtu.tree_leaves(plain_state(y))])
+    return Nodes(rows[0], rows[1:], arrival, jnp.sum(jnp.isfinite(times)) - 1)
 
 
 def _plain_node(t: Any, y: Any, args: Any) -> PyTree:
