@@ -77,8 +77,6 @@ def along_nodes(
     Of the tangents the two turned ones come first, and move no parameter; of the others each moves
     one, by `sizes`, shape (p,). The motion ends at the arrival, not at the last node.
     """
-    args = jtu.tree_structure(flow.args.args)
-    compiled = _compiled(flow.system, flow.arrival, flow.args.active, args, flow.structure, final)
     given = _Given(
         args=flow.args.args,
         sizes=sizes,
@@ -90,7 +88,17 @@ def along_nodes(
         steps=nodes.steps,
         last=nodes.arrival,
     )
-    return call(compiled, given, tape=nodes.ends, quick=True)[0]
+    return call(_compiled_for(flow, final), given, tape=nodes.ends, quick=True)[0]
+
+
+def make_ready(flow: Flow, *, final: bool) -> None:
+    """Begins to compile, in the background, what `along_nodes` needs for one motion."""
+    _compiled_for(flow, final).make_ready(1)
+
+
+def _compiled_for(flow: Flow, final: bool) -> CompiledProgram:
+    args = jtu.tree_structure(flow.args.args)
+    return _compiled(flow.system, flow.arrival, flow.args.active, args, flow.structure, final)
 
 
 @functools.lru_cache(maxsize=256)

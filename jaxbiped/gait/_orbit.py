@@ -9,6 +9,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._search import Found
+from jaxbiped.gait._second_turn import make_ready as second_turn_ready
 from jaxbiped.gait._second_turn import second_turn
 from jaxbiped.gait._small_matrices import eigen, inverted, solved
 from jaxbiped.gait._stability import Stability, stability_of
@@ -82,8 +83,7 @@ def orbit_of(
     errors = jax.tree.map(lambda a, b: jnp.abs(a - b), slopes, looser)
     _, sizes = seeded(args, active, m)
     radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
-    differentiable = turning.steps == 1 or turning.system.renews_by_symmetry
-    if radius and active and differentiable:
+    if _bends(turning, active, radius):
         # Lanes take both at once; XLA would compute in lockstep and compile for longer.
         each_of = jax.vmap if turning.engine == "lanes" else _one_by_one
         radius_slopes, looser_slopes = each_of(
@@ -91,6 +91,21 @@ def orbit_of(
         )(found.both)
         radius_errors = jnp.abs(radius_slopes - looser_slopes)
     return Orbit(found, state, stability, slopes, errors, radius_slopes, radius_errors, sizes)
+
+
+def make_ready(
+    turning: Turning, args: PyTree, active: tuple[int, ...], like: PyTree, *, radius: bool
+) -> None:
+    """Begins to compile what takes longest in `orbit_of`, before there is an orbit."""
+    if _bends(turning, active, radius):
+        seeds, _ = seeded(args, active, len(recurring_of(turning.system, like)))
+        second_turn_ready(turning, seeds, like)
+
+
+def _bends(turning: Turning, active: tuple[int, ...], radius: bool) -> bool:
+    """Whether second derivatives are wanted and can be had."""
+    differentiable = turning.steps == 1 or turning.system.renews_by_symmetry
+    return radius and bool(active) and differentiable
 
 
 def slopes_of(last: Turn) -> Slopes:

@@ -8,6 +8,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.gait._bent import Bent, renewed
 from jaxbiped.gait._bent_solve import along_nodes
+from jaxbiped.gait._bent_solve import make_ready as along_nodes_ready
 from jaxbiped.gait._curvature import along_path
 from jaxbiped.gait._flow import Flow
 from jaxbiped.gait._radau import stacked
@@ -40,15 +41,12 @@ def second_turn(
         Shape (m + 1 + d, p, v): of the recurring components on the section, the period, and the
         advances.
     """
-    leaves, structure = jtu.tree_flatten(like)
-    c, count = len(leaves), turned.shape[1]
+    c, count = len(jtu.tree_leaves(like)), turned.shape[1]
     places = jnp.asarray(recurring_places(turning.system, like))
     drifting = jnp.asarray(turning.system.drifting, dtype=int)
     seeds = jnp.concatenate([jnp.zeros((len(sizes), count)), jnp.diag(sizes)], axis=1)
     parameters = jnp.stack([jnp.asarray(leaf) for leaf in active_leaves(args)])
-    watch = turning.watch(args.args, like)
-    assert watch.section is not None
-    flow = Flow(turning.system, watch.section, turning.system.vector_field, args, structure)
+    flow = _flow(turning, args, like)
     first = jnp.zeros((c, seeds.shape[1])).at[places].set(jnp.concatenate([turned, tangents], 1))
     bent = Bent(first, jnp.zeros((c, tangents.shape[1], count)))
     assert last.nodes is not None
@@ -71,6 +69,20 @@ def second_turn(
     second = bent.second
     parted = [second[places], period[None], second[drifting]]
     return jnp.concatenate(parted)
+
+
+def make_ready(turning: Turning, args: Seeded, like: PyTree) -> None:
+    """Begins to compile what `second_turn` needs, before there is a turn."""
+    if turning.engine == "lanes":
+        for final in {turning.steps == 1, True}:
+            along_nodes_ready(_flow(turning, args, like), final=final)
+
+
+def _flow(turning: Turning, args: Seeded, like: PyTree) -> Flow:
+    watch = turning.watch(args.args, like)
+    assert watch.section is not None
+    field = turning.system.vector_field
+    return Flow(turning.system, watch.section, field, args, jtu.tree_structure(like))
 
 
 def _earlier(flow: Flow, row: Scalar, parameters: Scalar) -> Scalar:

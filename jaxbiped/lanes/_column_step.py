@@ -73,8 +73,7 @@ def differentiated_step(
             every = rates(t0, y, q)
             return [every[i] for i in kept_in_order(stages)]
 
-        at_point, at_start = _derivatives(tableau, stages, kept_rates, parameters)
-    count = len(start)
+        by_state, by_curvature, by_parameter = _derivatives(tableau, stages, kept_rates, parameters)
     return Differentiated(
         tableau=tableau,
         stages=stages,
@@ -83,9 +82,9 @@ def differentiated_step(
         ),
         error=join(stages.weighted(error_weights(tableau))),
         order=order,
-        by_state=_picked(at_point, order),
-        by_curvature=_picked(at_start, order),
-        by_parameter=at_point[..., count:] + at_start[..., count:],
+        by_state=_picked(by_state, order),
+        by_curvature=_picked(by_curvature, order),
+        by_parameter=by_parameter,
     )
 
 
@@ -98,8 +97,8 @@ def _derivatives(
     stages: Stages,
     kept_rates: Callable[[Components, Sequence[Scalar]], Components],
     parameters: Sequence[Scalar],
-) -> tuple[Any, Any]:
-    """A_i and B_i of all stages by components and parameters, (stages, kept, c + p)."""
+) -> tuple[Any, Any, Any]:
+    """Of all stages A_i and B_i by components (stages, kept, c), A_i + B_i by parameters."""
     start, size = stages.start, len(tableau.alpha)
     points = [start] + [
         [y + u for y, u in zip(start, stages.weighted(row), strict=True)] for row in tableau.a
@@ -111,15 +110,23 @@ def _derivatives(
     def rates(z: Components) -> Components:
         return kept_rates(z[:count], z[count:])
 
-    def turned(each: Any) -> Any:
-        def along(z: Components) -> Components:
-            return jax.jvp(lambda y: kept_rates(y, z[count:]), (z[:count],), (list(each),))[1]
+    def at_point(point: Any) -> Any:
+        return jacobian(rates, [*point, *parameters])
 
-        return jacobian(along, [*start, *parameters])
+    def at_start(both: tuple[Any, Any]) -> tuple[Any, Any]:
+        along, by_parameter = list(both[0]), both[1]
 
+        def turned(z: Components) -> Components:
+            return jax.jvp(lambda y: kept_rates(y, z[count:]), (z[:count],), (along,))[1]
+
+        found = jacobian(turned, [*start, *parameters])
+        return found[:, :count], by_parameter + found[:, count:]
+
+    # Two short loops: what one keeps in registers and caches the other one need not.
     stacked = [jnp.stack([jnp.stack(each) for each in array]) for array in (points, directions)]
-    at_points = jax.lax.map(lambda point: jacobian(rates, [*point, *parameters]), stacked[0])
-    return at_points, jax.lax.map(turned, stacked[1])
+    by_point = jax.lax.map(at_point, stacked[0])
+    by_start, by_parameter = jax.lax.map(at_start, (stacked[1], by_point[..., count:]))
+    return by_point[..., :count], by_start, by_parameter
 
 
 def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple[Any, Any]:
@@ -139,7 +146,11 @@ def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple
         argument = _weighted(tableau.a[i - 1] if i else (), increments, start)
         coefficients = [tableau.gamma * c for c in tableau.c[i - 1]] if i else ()
         memory = _weighted(coefficients, increments, nothing)
-        right = step.by_curvature[i] @ start + step.by_state[i] @ argument
+        if i == 0:
+            # Its argument is the start itself: the matrices are summed once for all directions.
+            right = (step.by_curvature[i] + step.by_state[i]) @ start
+        else:
+            right = step.by_curvature[i] @ start + step.by_state[i] @ argument
         if forcing is not None:
             right = right + forcing[i]
         through = g * argument[led : 2 * led] + memory[:led]

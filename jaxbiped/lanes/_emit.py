@@ -233,16 +233,21 @@ def _map(
     """One run of the body for each entry along the leading axes, kept apart in memory."""
     inside = Block(block, loop=True)
     rows = [np.moveaxis(item, 0, -1).reshape(-1, length) for item in items]
-    flat = [tuple(row) for array in rows for row in array]
+    every = [tuple(row) for array in rows for row in array]
+    # What is the same in every entry is known before the loop.
+    same = [all(value is row[0] for value in row) for row in every]
+    flat = [row for row, alike in zip(every, same, strict=True) if not alike]
     taken = inside.region("taken", (tuple(flat),), [row[0].kind for row in flat])
+    left = iter(taken)
+    given = [row[0] if alike else next(left) for row, alike in zip(every, same, strict=True)]
     shapes = [np.empty(item.shape[1:], dtype=object) for item in items]
-    found = emit(inside, jaxpr.jaxpr, jaxpr.consts, [*fixed, *_shaped(taken, shapes)])
+    found = emit(inside, jaxpr.jaxpr, jaxpr.consts, [*fixed, *_shaped(given, shapes)])
     values = tuple(v for array in found for v in array.ravel())
     args = (length, inside, tuple(taken), values)
     kinds = [v.kind for v in values for _ in range(length)]
     results = array_of(block.region("map", args, kinds), (len(values), length))
     for row, value in zip(results, values, strict=True):
-        if value.constant is not None:
+        if value.block is not inside:
             row[:] = value
     arrays, place = [], 0
     for array in found:

@@ -166,42 +166,23 @@ class Writer:
         lanes = self.inner if self.width == 1 else self.width
         step = self.inner if self.width == 1 else 1
         padded = self.padded(length)
-        parts = _parts_of(head)
-        rows = [i for i, value in enumerate(taken) if value in self.needed]
-        sources = {i: self._row(taken[i].args[0].args[0][i], padded) for i in rows}
-        wanted = [
-            k
-            for k in range(len(values))
-            if any(p in self.needed for p in parts[k * length : (k + 1) * length])
-        ]
-        targets = {k: self.room(values[k].kind, padded) for k in wanted}
-        self.padded_rooms.update(targets.values())
+        rows = [value for value in taken if value in self.needed]
+        sources = [self._row(value.args[0].args[0][value.args[1]], padded) for value in rows]
+        targets = self._targets(head, padded)
         start, again, after = self.text.label, self.text.fresh("each"), self.text.fresh("all")
         self.text.line(f"br label %{again}")
         self.text.begin(again)
         counter, following = "%" + self.text.fresh("i"), "%" + self.text.fresh("i")
         at = len(self.text.lines)
         with self.text.scope():
-            offset = self.text.assign(f"mul i64 {counter}, {self.width}")
-            for i in rows:
-                kind = taken[i].kind
-                text = self.text.load(self.text.address(sources[i], kind, offset), kind, lanes)
-                self.name(taken[i], text, lanes)
-            late = dict(targets)
-
-            def store(k: int) -> None:
-                kind, text = values[k].kind, self.use(values[k], lanes)
-                at = self.text.address(late.pop(k), kind, offset)
-                self.text.store(text, at, kind, lanes)
-
-            def known(value: Value) -> None:
-                for k in [k for k in late if values[k] is value]:
-                    store(k)
-
-            # What is known is stored at once, so that it takes no register until the end.
-            self.write(inside, lanes, known)
-            for k in list(late):
-                store(k)
+            entry = {
+                stride: self.text.assign(f"mul i64 {counter}, {stride * self.width}")
+                for stride in sorted({1, *(stride for _, stride in sources)})
+            }
+            for value, (pointer, stride) in zip(rows, sources, strict=True):
+                there = self.text.address(pointer, value.kind, entry[stride])
+                self.name(value, self.text.load(there, value.kind, lanes), lanes)
+            self._write_entry(inside, [(values[k], at) for k, at in targets.items()], entry[1])
         self.text.lines.insert(
             at, f"  {counter} = phi i64 [ 0, %{start} ], [ {following}, %{self.text.label} ]"
         )
@@ -209,25 +190,68 @@ class Writer:
         more = self.text.assign(f"icmp slt i64 {following}, {length}")
         self.text.line(f"br i1 {more}, label %{again}, label %{after}")
         self.text.begin(after)
+        parts = _parts_of(head)
         for k, target in targets.items():
             for j, part in enumerate(parts[k * length : (k + 1) * length]):
-                self.homes[id(part)] = Place(target, j)
+                self.homes[id(part)] = target._replace(offset=target.offset + j)
 
-    def _row(self, row: Sequence[Value], padded: int) -> str:
-        """Address of values that lie one behind the other, copied there where they do not yet."""
+    def _targets(self, head: Value, padded: int) -> dict[int, Place]:
+        """Where the needed values go: one memory for each kind, in which they lie regularly."""
+        length, _, _, values = head.args
+        parts = _parts_of(head)
+        needed: dict[Kind, list[int]] = {}
+        for k, value in enumerate(values):
+            if any(part in self.needed for part in parts[k * length : (k + 1) * length]):
+                needed.setdefault(value.kind, []).append(k)
+        targets: dict[int, Place] = {}
+        for kind, wanted in needed.items():
+            pointer = self.room(kind, len(wanted) * padded)
+            self.padded_rooms.add(pointer)
+            targets |= {k: Place(pointer, i * padded) for i, k in enumerate(wanted)}
+        return targets
+
+    def _write_entry(
+        self, inside: Block, wanted: Sequence[tuple[Value, Place]], entry: str
+    ) -> None:
+        """One entry of a map: what is known is stored at once, and takes no register any more."""
+        lanes = self.inner if self.width == 1 else self.width
+        places: dict[int, list[Place]] = {}
+        for value, place in wanted:
+            places.setdefault(id(value), []).append(place)
+
+        def store(value: Value) -> None:
+            for place in places.pop(id(value), []):
+                row = self.text.address(place.pointer, value.kind, place.offset * self.width)
+                at = self.text.address(row, value.kind, entry)
+                self.text.store(self.use(value, lanes), at, value.kind, lanes)
+
+        self.write(inside, lanes, store)
+        for value, _ in wanted:
+            store(value)
+
+    def _row(self, row: Sequence[Value], padded: int) -> tuple[str, int]:
+        """Address of the first of some values, and how many vectors further each next one lies.
+
+        Values that lie irregularly are copied.
+        """
+        kind = row[0].kind
         places = [self.homes.get(id(value)) for value in row]
-        kind, first = row[0].kind, places[0]
-        if first is not None and self.width == 1 and first.pointer not in self.padded_rooms:
-            first = None
-        if first is not None and all(
-            place == Place(first.pointer, first.offset + i) for i, place in enumerate(places)
-        ):
-            return self.text.address(first.pointer, kind, first.offset * self.width)
+        first = places[0]
+        if first is not None and (self.width > 1 or first.pointer in self.padded_rooms):
+            second = places[1] if len(places) > 1 else None
+            stride = 1 if second is None else second.offset - first.offset
+            regular = all(
+                place == Place(first.pointer, first.offset + i * stride)
+                for i, place in enumerate(places)
+            )
+            # Many entries are one vector only where they lie side by side.
+            if regular and (stride == 1 or self.width > 1):
+                return self.text.address(first.pointer, kind, first.offset * self.width), stride
         pointer = self.room(kind, padded)
         for i, value in enumerate(row):
             at = self.text.address(pointer, kind, i * self.width)
             self.text.store(self.use(value), at, kind, self.width)
-        return pointer
+        return pointer, 1
 
 
 def _parts_of(head: Value) -> list[Value]:

@@ -1,0 +1,130 @@
+"""Records that stay on the host: asked for later, or read by another program as its tape."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxbiped.lanes._call import Recording, call, call_recording
+from jaxbiped.lanes._engine import CompiledProgram
+from jaxbiped.lanes._held_back import HeldBack
+from jaxbiped.lanes._program import Program
+
+ROOM = 8
+NUMBER = jax.ShapeDtypeStruct((), jnp.float64)
+
+
+def _powers():
+    """Records factor, factor², … up to as high a power as the inputs say; gives the last."""
+
+    def attempt(given, carried):
+        factor, steps = given
+        power, count = carried
+        return (power * factor, count + 1.0), count + 1.0 >= steps
+
+    def record(given, carried, time):
+        return carried[1] > 0.0, [carried[1], carried[0]]
+
+    start = lambda given: (jnp.ones(()), jnp.zeros(()))
+    program = Program(start, attempt, lambda _, carried: carried[0], record=record)
+    return CompiledProgram(program, (NUMBER, NUMBER))
+
+
+def _last_sum():
+    """Σ of the second numbers in as many rows as the input says."""
+
+    def attempt(steps, carried, row):
+        total, count = carried
+        return (total + row[1], count + 1.0), count + 1.0 >= steps
+
+    start = lambda steps: (jnp.zeros(()), jnp.zeros(()))
+    return CompiledProgram(Program(start, attempt, lambda _, c: c[0], tape=2), NUMBER)
+
+
+@pytest.fixture(scope="module")
+def powers():
+    return _powers()
+
+
+@pytest.fixture
+def runs(powers, monkeypatch):
+    """How many simulations each run of the program took."""
+    counts, run_table = [], powers.run_table
+
+    def counted(table, **options):
+        counts.append(table.shape[1])
+        return run_table(table, **options)
+
+    monkeypatch.setattr(powers, "run_table", counted)
+    return counts
+
+
+def _recording(powers, factor, steps, again=False):
+    given = (jnp.asarray(factor), jnp.asarray(steps))
+    return call_recording(powers, given, room=ROOM, quick=True, again=again)
+
+
+def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
+    last, recording = _recording(powers, 3.0, 4.0)
+    counts, values = recording.columns(np.array([0.0, 1.0]))
+    nothing = [np.nan] * (ROOM - 4)
+    np.testing.assert_array_equal(counts, [0, 1, 2, 3, 4, *nothing])
+    np.testing.assert_array_equal(values, [1, 3, 9, 27, 81, *nothing])
+    assert float(last) == float(_recording(powers, 3.0, 4.0, again=True)[0]) == 81.0
+    assert runs == [1]
+    _recording(powers, 3.0, 4.0)
+    assert runs == [1, 1]
+
+
+def test_what_nobody_ran_is_run(powers, runs):
+    _recording(powers, 1.5, 2.0)
+
+    def last(factor):
+        return _recording(powers, factor, 2.0, again=True)[0]
+
+    found = jax.jit(jax.vmap(last))(jnp.array([1.25, 1.5, 1.75]))
+    np.testing.assert_allclose(found, [1.25**2, 1.5**2, 1.75**2])
+    assert runs == [1, 2]
+
+
+def test_a_recording_is_another_programs_tape(powers, runs):
+    reader = _last_sum()
+
+    def both(factor, steps):
+        _, recording = _recording(powers, factor, steps)
+        total, _ = call(reader, steps, tape=recording)
+        return total, recording.columns(jnp.zeros(2))[1]
+
+    factors, steps = jnp.array([2.0, 3.0, 0.5]), jnp.array([3.0, 1.0, 5.0])
+    totals, values = jax.jit(jax.vmap(both))(factors, steps)
+    np.testing.assert_allclose(totals, [14.0, 3.0, 0.96875])
+    np.testing.assert_allclose(np.nansum(values, axis=1), totals)
+    assert runs == [3]
+    assert float(both(jnp.asarray(2.0), jnp.asarray(3.0))[0]) == 14.0
+
+
+def test_leaves_can_be_stacked(powers):
+    _, one = _recording(powers, 2.0, 3.0)
+    _, other = _recording(powers, 4.0, 2.0)
+    stacked = jax.tree.map(lambda *pair: jnp.stack(pair), one, other)
+    _, values = jax.vmap(Recording.columns)(stacked, jnp.zeros((2, 2)))
+    np.testing.assert_array_equal(values[:, 2], [4.0, 16.0])
+
+
+def test_what_came_first_goes_first():
+    ran = []
+
+    def run(table):
+        ran.extend(table[0])
+        return table.copy(), np.ones((table.shape[1], 3, 1)), np.full(table.shape[1], 2)
+
+    # An output and two records of one number each: 24 bytes a simulation.
+    held = HeldBack(most=60)
+    for number in (1.0, 2.0, 3.0):
+        held.ran("program", np.array([[number]]), run)
+    held.outputs("program", np.array([[3.0, 2.0]]), run)
+    assert ran == [1.0, 2.0, 3.0]
+    np.testing.assert_array_equal(held.outputs("program", np.array([[1.0, 3.0]]), run), [[1, 3]])
+    assert ran == [1.0, 2.0, 3.0, 1.0]
+    held.outputs("another", np.array([[3.0]]), run)
+    assert ran == [1.0, 2.0, 3.0, 1.0, 3.0]
