@@ -106,8 +106,10 @@ class AdaptiveColumns:
         save_nodes: bool,
     ) -> None:
         self.solver, self.active = solver, active
-        # Compiled by itself, the field is traced once, not at each of its many uses.
-        self.watch = dataclasses.replace(watch, field=jax.jit(watch.field))
+        # Compiled by themselves, these are traced once, not at each of their many uses.
+        whole = ((name, getattr(watch, name)) for name in ("field", "section", "ending", "peak"))
+        once = {name: jax.jit(function) for name, function in whole if function is not None}
+        self.watch = dataclasses.replace(watch, **once)
         self.save_nodes = save_nodes
         self.term: Any = diffrax.ODETerm(watch.field)
 
