@@ -91,9 +91,9 @@ def along_nodes(
     return call(_compiled_for(flow, final), given, tape=nodes.ends, quick=True)[0]
 
 
-def make_ready(flow: Flow, *, final: bool) -> None:
-    """Begins to compile, in the background, what `along_nodes` needs for one motion."""
-    _compiled_for(flow, final).make_ready(1)
+def prepare_along_nodes(flow: Flow, count: int, *, final: bool) -> None:
+    """Begins to compile, in the background, `along_nodes` of `count` motions at once."""
+    _compiled_for(flow, final).make_ready(count)
 
 
 def _compiled_for(flow: Flow, final: bool) -> CompiledProgram:

@@ -23,7 +23,7 @@ from jaxbiped.dynamics._state import checked_state
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gait import Gait, described
 from jaxbiped.gait._newton import Method
-from jaxbiped.gait._orbit import make_ready
+from jaxbiped.gait._orbit import prepare_orbit
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._search import Found, search
 from jaxbiped.gait._seed_start import seed_start
@@ -177,7 +177,7 @@ def _find(
         return describe(_searched(*searching))
     # Two programs, so that the second compiles while the first one does: run on nothing, it ends
     # at once. What takes longest to compile begins first.
-    make_ready(turning, scene, active, start, radius=radius)
+    prepare_orbit(turning, scene, active, start, radius=radius)
     with ThreadPoolExecutor(max_workers=1) as meanwhile:
         nothing = _nothing(eqx.filter_eval_shape(_searched, *searching))
         ready = meanwhile.submit(describe, nothing)

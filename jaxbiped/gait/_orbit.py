@@ -9,8 +9,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._search import Found
-from jaxbiped.gait._second_turn import make_ready as second_turn_ready
-from jaxbiped.gait._second_turn import second_turn
+from jaxbiped.gait._second_turn import prepare_second_turn, second_turn
 from jaxbiped.gait._small_matrices import eigen, inverted, solved
 from jaxbiped.gait._stability import Stability, stability_of
 from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with
@@ -93,13 +92,14 @@ def orbit_of(
     return Orbit(found, state, stability, slopes, errors, radius_slopes, radius_errors, sizes)
 
 
-def make_ready(
+def prepare_orbit(
     turning: Turning, args: PyTree, active: tuple[int, ...], like: PyTree, *, radius: bool
 ) -> None:
     """Begins to compile what takes longest in `orbit_of`, before there is an orbit."""
-    if _bends(turning, active, radius):
+    if turning.engine == "lanes" and _bends(turning, active, radius):
         seeds, _ = seeded(args, active, len(recurring_of(turning.system, like)))
-        second_turn_ready(turning, seeds, like)
+        # The turn and its witness.
+        prepare_second_turn(turning, seeds, like, 2)
 
 
 def _bends(turning: Turning, active: tuple[int, ...], radius: bool) -> bool:

@@ -1,6 +1,7 @@
 """The search for a periodic orbit: a fixed point of the return map."""
 
 import enum
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -90,8 +91,13 @@ def search(
     """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely."""
     first = recurring_of(turning.system, guess)
     off = jnp.abs(turning.section.value(args, guess))
-    by = _by_lanes if turning.engine == "lanes" else _by_xla
-    end, both = by(turning, args, active, guess, precision, method, (first, off))
+    runner = functools.partial(_runner, turning, args, guess, precision)
+    if turning.engine == "lanes":
+        # The state's directions alone; all of them; and those turns once more.
+        bare, whole = runner((), save_nodes=False), runner(active)
+        end, both = _by_lanes(bare, whole, runner(active, again=True), first, off, method)
+    else:
+        end, both = _by_xla(runner(active), first, off, method)
     ending = jnp.where(
         end.stage == Stage.FOUND,
         int(Search.FOUND),
@@ -108,51 +114,26 @@ def search(
     )
 
 
-def _by_xla(
-    turning: Turning,
-    args: PyTree,
-    active: tuple[int, ...],
-    guess: PyTree,
-    precision: Precision,
-    method: Method,
-    begin: tuple[Scalar, Scalar],
-) -> tuple[Progress, Turn]:
+def _by_xla(run: Run, first: Scalar, off: Scalar, method: Method) -> tuple[Progress, Turn]:
     """One loop, all directions in it: each loop is compiled for itself."""
-    run = _runner(turning, args, active, guess, precision)
-    shape: Turn = jax.eval_shape(run, begin[0], jnp.asarray(0), jnp.asarray(True))
+    shape: Turn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
     nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
-
-    def itself(turn: Turn, _: Made) -> Turn:
-        return turn
-
-    end = _advanced(run, itself, begun(*begin, method, nothing), method, Stage.FOUND)
+    begin = begun(first, off, method, nothing)
+    end = _advanced(run, lambda turn, made: turn, begin, method, Stage.FOUND)
     return end, jax.tree.map(lambda *pair: jnp.stack(pair), end.base_turn, end.coarse)
 
 
 def _by_lanes(
-    turning: Turning,
-    args: PyTree,
-    active: tuple[int, ...],
-    guess: PyTree,
-    precision: Precision,
-    method: Method,
-    begin: tuple[Scalar, Scalar],
+    bare: Run, whole: Run, known: Run, first: Scalar, off: Scalar, method: Method
 ) -> tuple[Progress, Turn]:
     """Turns are bare of directions but the state's until it is near.
 
     Turns do not travel through the search: at its end two of them are asked for once more, which
     takes no solve.
     """
-    bare = _runner(turning, args, (), guess, precision, save_nodes=False)
-    whole = _runner(turning, args, active, guess, precision)
-    known = _runner(turning, args, active, guess, precision, again=True)
-
-    def made(_: Turn, where: Made) -> Made:
-        return where
-
-    nothing = Made(begin[0], jnp.asarray(0))
-    now = _advanced(bare, made, begun(*begin, method, nothing), method, Stage.COARSE)
-    now = _advanced(whole, made, now, method, Stage.FOUND)
+    begin = begun(first, off, method, Made(first, jnp.asarray(0)))
+    now = _advanced(bare, lambda turn, made: made, begin, method, Stage.COARSE)
+    now = _advanced(whole, lambda turn, made: made, now, method, Stage.FOUND)
     # Where no turn was judged, what it began from is still the best orbit there is.
     untold = (now.base_turn.stage == 0) & (now.stage != Stage.NO_RETURN)
     last = chosen(untold, Made(now.base, jnp.asarray(int(Stage.ROUGH))), now.base_turn)
@@ -163,9 +144,9 @@ def _by_lanes(
 def _runner(
     turning: Turning,
     args: PyTree,
-    active: tuple[int, ...],
     guess: PyTree,
     precision: Precision,
+    active: tuple[int, ...],
     *,
     save_nodes: bool = True,
     again: bool = False,

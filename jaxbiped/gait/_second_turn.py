@@ -7,8 +7,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._bent import Bent, renewed
-from jaxbiped.gait._bent_solve import along_nodes
-from jaxbiped.gait._bent_solve import make_ready as along_nodes_ready
+from jaxbiped.gait._bent_solve import along_nodes, prepare_along_nodes
 from jaxbiped.gait._curvature import along_path
 from jaxbiped.gait._flow import Flow
 from jaxbiped.gait._radau import stacked
@@ -71,11 +70,11 @@ def second_turn(
     return jnp.concatenate(parted)
 
 
-def make_ready(turning: Turning, args: Seeded, like: PyTree) -> None:
-    """Begins to compile what `second_turn` needs, before there is a turn."""
-    if turning.engine == "lanes":
-        for final in {turning.steps == 1, True}:
-            along_nodes_ready(_flow(turning, args, like), final=final)
+def prepare_second_turn(turning: Turning, args: Seeded, like: PyTree, count: int) -> None:
+    """Begins to compile what `count` of `second_turn` at once need by lanes, before any turn."""
+    flow = _flow(turning, args, like)
+    for final in {turning.steps == 1, True}:
+        prepare_along_nodes(flow, count, final=final)
 
 
 def _flow(turning: Turning, args: Seeded, like: PyTree) -> Flow:

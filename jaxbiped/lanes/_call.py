@@ -1,5 +1,6 @@
 """Compiled programs as operations of JAX: they run under `jit` and `vmap`."""
 
+import enum
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +18,20 @@ from jaxbiped.lanes._held_back import HeldBack, Tables
 from jaxbiped.lanes._program import leaves_of
 
 _HELD_BACK = HeldBack(most=1 << 28)
+
+
+class _Wanted(enum.Enum):
+    """Which part of what simulations give is wanted, and whether they are run for it."""
+
+    ALL = "outputs and records of a run"
+    OUTPUTS = "outputs of a run whose records are held back"
+    KNOWN_OUTPUTS = "outputs of a run that may have been before"
+    KNOWN_COLUMNS = "records of a run that may have been before"
+
+    @property
+    def runs(self) -> bool:
+        """Whether the simulations are run in any case."""
+        return self in (_Wanted.ALL, _Wanted.OUTPUTS)
 
 
 class Schedule:
@@ -44,7 +59,9 @@ class Recording(eqx.Module):
 
         `first` has shape (numbers,), the arrays (1 + room,).
         """
-        params = _params(self.compiled, room=self.room, quick=self.quick, wants="columns")
+        params = _params(
+            self.compiled, room=self.room, quick=self.quick, wants=_Wanted.KNOWN_COLUMNS
+        )
         return _bound([self.numbers, first], params)
 
 
@@ -70,7 +87,7 @@ def call(
     if isinstance(tape, Recording):
         recorder, rows = (tape.compiled, tape.room, tape.quick), [tape.numbers]
     params = _params(compiled, schedule=schedule, room=room, quick=quick, recorder=recorder)
-    table, *rest = _bound([_numbers(inputs, rows), *rows], params)
+    table, *rest = _bound([_numbers(inputs), *rows], params)
     return _outputs(compiled, table), Recorded(*rest) if rest else None
 
 
@@ -78,8 +95,8 @@ def call_recording(
     compiled: CompiledProgram, inputs: PyTree, *, room: int, quick: bool, again: bool
 ) -> tuple[PyTree, Recording]:
     """`call`, but the records stay on the host; the same `again` need not run."""
-    numbers = _numbers(inputs, [])
-    wants = "outputs again" if again else "outputs"
+    numbers = _numbers(inputs)
+    wants = _Wanted.KNOWN_OUTPUTS if again else _Wanted.OUTPUTS
     params = _params(compiled, room=room, quick=quick, wants=wants)
     (table,) = _bound([numbers], params)
     return _outputs(compiled, table), Recording(numbers, compiled, room, quick)
@@ -91,7 +108,7 @@ def _params(
     room: int,
     quick: bool,
     schedule: Schedule | None = None,
-    wants: str = "both",
+    wants: _Wanted = _Wanted.ALL,
     recorder: tuple[CompiledProgram, int, bool] | None = None,
 ) -> dict[str, Any]:
     """Of the operation: what is run and how, and which part of what that gives is wanted."""
@@ -105,10 +122,10 @@ def _params(
     )
 
 
-def _numbers(inputs: PyTree, beside: list[Any]) -> Any:
+def _numbers(inputs: PyTree) -> Any:
     """The leaves one behind the other: every array that crosses costs time."""
     leaves = jtu.tree_leaves(inputs)
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in [*leaves, *beside]):
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
         return jnp.concatenate([jnp.ravel(jnp.asarray(x, dtype=jnp.float64)) for x in leaves])
     return np.concatenate([np.ravel(np.asarray(leaf, dtype=np.float64)) for leaf in leaves])
 
@@ -136,7 +153,7 @@ def _run(
     schedule: Schedule | None,
     room: int,
     quick: bool,
-    wants: str,
+    wants: _Wanted,
     recorder: tuple[CompiledProgram, int, bool] | None,
 ) -> list[np.ndarray]:
     """Of inputs (n, k) and their tapes: outputs (n, o), and what was recorded."""
@@ -148,17 +165,17 @@ def _run(
         recording, length, short = recorder
         found = _recording_run(recording, tape.shape[0], length, short)
         rows = _HELD_BACK.rows(recording, np.asarray(tape).T, found)
-    if wants == "both":
+    if wants is _Wanted.ALL:
         alone = quick and table.shape[1] == 1
         outputs, recorded = compiled.run_table(
             table, schedule=times, tape=rows, room=room, quick=alone
         )
         return [outputs.T, *(recorded or ())]
     run = _recording_run(compiled, table.shape[1], room, quick)
-    if wants == "columns":
+    if wants is _Wanted.KNOWN_COLUMNS:
         assert rows is not None
         return _HELD_BACK.columns(compiled, table, rows, room, run)
-    if wants == "outputs":
+    if wants is _Wanted.OUTPUTS:
         return [_HELD_BACK.ran(compiled, table, run)[0].T]
     return [_HELD_BACK.outputs(compiled, table, run).T]
 
@@ -185,16 +202,16 @@ def _shapes(
     compiled: CompiledProgram,
     schedule: Schedule | None,
     room: int,
-    wants: str,
+    wants: _Wanted,
     **_: Any,
 ) -> list[Any]:
     numbers = len(compiled.graph.recorded)
-    if wants == "columns":
+    if wants is _Wanted.KNOWN_COLUMNS:
         return [jax.ShapeDtypeStruct((count, 1 + room), jnp.float64)] * numbers
     leaves = jtu.tree_leaves(compiled.graph.output_structure)
     size = sum(int(np.prod(leaf.shape)) for leaf in leaves)
     found = [jax.ShapeDtypeStruct((count, size), jnp.float64)]
-    if compiled.graph.recording is not None and wants == "both":
+    if compiled.graph.recording is not None and wants is _Wanted.ALL:
         room = room if schedule is None else len(schedule.times)
         found.append(jax.ShapeDtypeStruct((count, room, numbers), jnp.float64))
         found.append(jax.ShapeDtypeStruct((count,), jnp.int64))
@@ -220,8 +237,9 @@ def _lowered(context: Any, *operands: Any, **params: Any) -> Any:
     def run(*given: np.ndarray) -> tuple[np.ndarray, ...]:
         return tuple(_run(*given, **params))
 
-    # While XLA compiles the rest, this compiles as well.
-    params["compiled"].make_ready(context.avals_in[0].shape[0])
+    if params["wants"].runs:
+        # While XLA compiles the rest, this compiles as well.
+        params["compiled"].make_ready(context.avals_in[0].shape[0])
     results, _, _ = mlir.emit_python_callback(
         context,
         run,

@@ -71,8 +71,10 @@ class HeldBack:
         room: int,
         run: Callable[[np.ndarray], Tables],
     ) -> list[np.ndarray]:
-        """For each number in a record an array (n, 1 + room): `first` (n, numbers), then those
-        recorded, NaN beyond them."""
+        """Each number in a record as an array (n, 1 + room), NaN beyond the last record.
+
+        Before those recorded comes that of `first`, shape (n, numbers).
+        """
         known = self._known(program, inputs, run)
         found = [np.empty((len(known), 1 + room)) for _ in first.T]
         for i, entry in enumerate(known):

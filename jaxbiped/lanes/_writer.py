@@ -168,7 +168,8 @@ class Writer:
         padded = self.padded(length)
         rows = [value for value in taken if value in self.needed]
         sources = [self._row(value.args[0].args[0][value.args[1]], padded) for value in rows]
-        targets = self._targets(head, padded)
+        parts = _parts_of(head)
+        targets = self._targets(head, parts, padded)
         start, again, after = self.text.label, self.text.fresh("each"), self.text.fresh("all")
         self.text.line(f"br label %{again}")
         self.text.begin(again)
@@ -182,7 +183,8 @@ class Writer:
             for value, (pointer, stride) in zip(rows, sources, strict=True):
                 there = self.text.address(pointer, value.kind, entry[stride])
                 self.name(value, self.text.load(there, value.kind, lanes), lanes)
-            self._write_entry(inside, [(values[k], at) for k, at in targets.items()], entry[1])
+            wanted = [(values[k], target) for k, target in targets.items()]
+            self._write_entry(inside, wanted, entry[1], lanes)
         self.text.lines.insert(
             at, f"  {counter} = phi i64 [ 0, %{start} ], [ {following}, %{self.text.label} ]"
         )
@@ -190,15 +192,13 @@ class Writer:
         more = self.text.assign(f"icmp slt i64 {following}, {length}")
         self.text.line(f"br i1 {more}, label %{again}, label %{after}")
         self.text.begin(after)
-        parts = _parts_of(head)
         for k, target in targets.items():
             for j, part in enumerate(parts[k * length : (k + 1) * length]):
                 self.homes[id(part)] = target._replace(offset=target.offset + j)
 
-    def _targets(self, head: Value, padded: int) -> dict[int, Place]:
+    def _targets(self, head: Value, parts: list[Value], padded: int) -> dict[int, Place]:
         """Where the needed values go: one memory for each kind, in which they lie regularly."""
         length, _, _, values = head.args
-        parts = _parts_of(head)
         needed: dict[Kind, list[int]] = {}
         for k, value in enumerate(values):
             if any(part in self.needed for part in parts[k * length : (k + 1) * length]):
@@ -211,10 +211,9 @@ class Writer:
         return targets
 
     def _write_entry(
-        self, inside: Block, wanted: Sequence[tuple[Value, Place]], entry: str
+        self, inside: Block, wanted: Sequence[tuple[Value, Place]], entry: str, lanes: int
     ) -> None:
         """One entry of a map: what is known is stored at once, and takes no register any more."""
-        lanes = self.inner if self.width == 1 else self.width
         places: dict[int, list[Place]] = {}
         for value, place in wanted:
             places.setdefault(id(value), []).append(place)

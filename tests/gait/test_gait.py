@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.lanes._engine import CompiledProgram
 
 
 @pytest.fixture(scope="module")
@@ -22,6 +23,22 @@ def test_seed_gait(found):
     assert float(found.residual) < 1e-7
     assert float(found.unit_multiplier_error) < 1e-4
     assert found.multipliers.shape == (6,)
+
+
+def test_no_turn_is_solved_twice(found, monkeypatch):
+    """The end of a search asks for two turns once more: their records wait on the host."""
+    most, run_table = [], CompiledProgram.run_table
+
+    def counted(self, *args, **options):
+        most.append(options.get("room", 0))
+        return run_table(self, *args, **options)
+
+    monkeypatch.setattr(CompiledProgram, "run_table", counted)
+    again = jb.find_gait(jb.seed_scene())
+    # A run for each turn, and one for the second derivatives; two of the turns record.
+    assert len(most) == int(again.turns) + 1
+    assert sum(room > 0 for room in most) == 2
+    np.testing.assert_array_equal(again.orbit[0], found.orbit[0])
 
 
 def test_a_start_that_falls_gives_no_gait():
