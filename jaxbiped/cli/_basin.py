@@ -6,10 +6,9 @@ import math
 import time
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import xarray as xr
 from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
@@ -31,6 +30,9 @@ from jaxbiped.sweep._prepare import labelling
 from jaxbiped.sweep._starts import AbstractStarts
 from jaxbiped.sweep._store import check_store
 from jaxbiped.sweep._sweep import CHUNK, sweep
+
+if TYPE_CHECKING:
+    import xarray
 
 _MOST_ROWS = 64
 
@@ -130,7 +132,7 @@ class Basin:
         return 0
 
 
-def basin_numbers(found: xr.Dataset, seconds: float) -> dict[str, Any]:
+def basin_numbers(found: "xarray.Dataset", seconds: float) -> dict[str, Any]:
     """What is known of a basin in SI units, ready for JSON."""
     fractions = basin_fractions(_names(found))
     fresh = int(found.attrs["labelled_in_this_run"])
@@ -151,7 +153,7 @@ def basin_numbers(found: xr.Dataset, seconds: float) -> dict[str, Any]:
     }
 
 
-def _names(found: xr.Dataset) -> np.ndarray:
+def _names(found: "xarray.Dataset") -> np.ndarray:
     return label_names(found.label.values, found.period.values)
 
 
@@ -188,7 +190,9 @@ def _at(parameters: dict[str, float]) -> str:
     return "".join(f", {name} {value:.4g}" for name, value in parameters.items())
 
 
-def _written(found: xr.Dataset, known: Labelling, starts: AbstractStarts, out: Path) -> list[Path]:
+def _written(
+    found: "xarray.Dataset", known: Labelling, starts: AbstractStarts, out: Path
+) -> list[Path]:
     """Writes the results, and the picture where there are two axes; returns the paths."""
     paths = [out / "basin.nc"]
     found.to_netcdf(paths[0])

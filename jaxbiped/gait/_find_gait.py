@@ -9,6 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 import optax
 from jaxtyping import PyTree
 
@@ -214,6 +215,7 @@ def _searched(*searching: Any) -> Found:
 def _nothing(shape: PyTree) -> PyTree:
     """Arrays of these shapes that hold nothing."""
     return jtu.tree_map(
-        lambda leaf: jnp.full(leaf.shape, jnp.nan if leaf.dtype.kind == "f" else 0, leaf.dtype),
+        # Made by NumPy: JAX would compile a program for every shape.
+        lambda leaf: np.full(leaf.shape, np.nan if leaf.dtype.kind == "f" else 0, leaf.dtype),
         shape,
     )

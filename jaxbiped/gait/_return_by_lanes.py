@@ -13,7 +13,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.gait._return_by_xla import NO_REVERSE, full_tangents, renewed
 from jaxbiped.gait._turn import PARAMETER_FLOOR, STATE_FLOOR, Turning
-from jaxbiped.lanes._adaptive_columns import Crossed
+from jaxbiped.lanes._crossed import Crossed
 from jaxbiped.lanes._crossing import cross
 from jaxbiped.solve._columns import Seeded, Tangents
 from jaxbiped.solve._passage import Precision

@@ -91,13 +91,11 @@ def search(
     """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely."""
     first = recurring_of(turning.system, guess)
     off = jnp.abs(turning.section.value(args, guess))
-    runner = functools.partial(_runner, turning, args, guess, precision)
+    runner = functools.partial(_runner, turning, args, active, guess, precision)
     if turning.engine == "lanes":
-        # The state's directions alone; all of them; and those turns once more.
-        bare, whole = runner((), save_nodes=False), runner(active)
-        end, both = _by_lanes(bare, whole, runner(active, again=True), first, off, method)
+        end, both = _by_lanes(runner(), runner(again=True), first, off, method)
     else:
-        end, both = _by_xla(runner(active), first, off, method)
+        end, both = _by_xla(runner(), first, off, method)
     ending = jnp.where(
         end.stage == Stage.FOUND,
         int(Search.FOUND),
@@ -115,25 +113,22 @@ def search(
 
 
 def _by_xla(run: Run, first: Scalar, off: Scalar, method: Method) -> tuple[Progress, Turn]:
-    """One loop, all directions in it: each loop is compiled for itself."""
     shape: Turn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
     nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
     begin = begun(first, off, method, nothing)
-    end = _advanced(run, lambda turn, made: turn, begin, method, Stage.FOUND)
+    end = _advanced(run, lambda turn, made: turn, begin, method)
     return end, jax.tree.map(lambda *pair: jnp.stack(pair), end.base_turn, end.coarse)
 
 
 def _by_lanes(
-    bare: Run, whole: Run, known: Run, first: Scalar, off: Scalar, method: Method
+    run: Run, known: Run, first: Scalar, off: Scalar, method: Method
 ) -> tuple[Progress, Turn]:
-    """Turns are bare of directions but the state's until it is near.
+    """Turns do not travel through the search.
 
-    Turns do not travel through the search: at its end two of them are asked for once more, which
-    takes no solve.
+    At its end two of them are asked for once more, which takes no solve.
     """
     begin = begun(first, off, method, Made(first, jnp.asarray(0)))
-    now = _advanced(bare, lambda turn, made: made, begin, method, Stage.COARSE)
-    now = _advanced(whole, lambda turn, made: made, now, method, Stage.FOUND)
+    now = _advanced(run, lambda turn, made: made, begin, method)
     # Where no turn was judged, what it began from is still the best orbit there is.
     untold = (now.base_turn.stage == 0) & (now.stage != Stage.NO_RETURN)
     last = chosen(untold, Made(now.base, jnp.asarray(int(Stage.ROUGH))), now.base_turn)
@@ -144,14 +139,13 @@ def _by_lanes(
 def _runner(
     turning: Turning,
     args: PyTree,
+    active: tuple[int, ...],
     guess: PyTree,
     precision: Precision,
-    active: tuple[int, ...],
     *,
-    save_nodes: bool = True,
     again: bool = False,
 ) -> Run:
-    """Turns with derivatives by the state and by the `active` parameters."""
+    """Turns with derivatives by the state, and once it is near by the `active` parameters."""
     seeds, _ = seeded(args, active, len(recurring_of(turning.system, guess)))
     coarse = Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
 
@@ -163,7 +157,8 @@ def _runner(
             )
         )
         start = state_with(turning.system, guess, trial)
-        return turn(turning, seeds, start, wanted, idle, save_nodes=save_nodes, again=again)
+        steered = again | (stage >= Stage.COARSE)
+        return turn(turning, seeds, start, wanted, idle, steered=steered, again=again)
 
     return run
 
@@ -173,12 +168,11 @@ def _advanced(
     tell: Callable[[Turn, Made], Any],
     begin: Progress,
     method: Method,
-    until: Stage,
 ) -> Progress:
-    """Searches on until a stage is reached or the turns are used up."""
+    """Searches on until it has ended or the turns are used up."""
 
     def goes_on(now: Progress) -> Scalar:
-        return (now.stage < until) & (now.turns < method.most_turns)
+        return (now.stage < Stage.FOUND) & (now.turns < method.most_turns)
 
     def advance(now: Progress) -> Progress:
         on = goes_on(now)

@@ -151,12 +151,13 @@ def turn(
     precision: Precision,
     idle: Any,
     *,
-    save_nodes: bool = True,
+    steered: Any = True,
     again: bool = False,
 ) -> Turn:
     """Follows the orbit from `y` for one turn, with derivatives; nothing where `idle`.
 
-    Lanes need not solve the same turn `again`, where its nodes are saved.
+    Where not `steered`, derivatives by parameters choose no steps, and lanes do without them. Lanes
+    need not solve the same turn `again`.
     """
     places = recurring_places(turning.system, y)
     count, n = len(jtu.tree_leaves(y)), args.seeds.shape[1]
@@ -170,7 +171,7 @@ def turn(
         y0, failed = before
         y0 = _entered(turning, y0, args)
         within = jnp.where(failed != 0, 0.0, limit)
-        found = _passed(turning, watch, y0, args, precision, within, save_nodes, again)
+        found = _passed(turning, watch, y0, args, precision, within, steered, again)
         found = _left(turning, found, args)
         state, moved = along_columns(lambda s, a: turning.system.renew(a, s), found.y, args)
         on_section = as_columns(moved)
@@ -232,12 +233,16 @@ def _passed(
     args: Seeded,
     precision: Precision,
     limit: Scalar,
-    save_nodes: bool,
+    steered: Any,
     again: bool,
 ) -> Passage:
     """The next passage, by the engine that is asked for."""
     most = turning.max_solver_steps
+    m = args.seeds.shape[1] - len(args.active)
     if turning.engine == "xla":
+        deaf = (jnp.arange(len(args.floors)) >= m) & ~jnp.asarray(steered)
+        floors = jnp.where(deaf, jnp.inf, args.floors)
+        args = Seeded(args.args, args.seeds, floors, args.active)
         return passage(
             watch,
             turning.solver,
@@ -246,9 +251,9 @@ def _passed(
             precision=precision,
             time_limit=limit,
             max_solver_steps=most,
-            save_nodes=save_nodes,
+            save_nodes=True,
         )
-    sizes = jnp.diagonal(args.seeds[:, args.seeds.shape[1] - len(args.active) :])
+    sizes = jnp.diagonal(args.seeds[:, m:])
     return passage_by_lanes(
         watch,
         turning.solver,
@@ -258,7 +263,7 @@ def _passed(
         precision=precision,
         time_limit=limit,
         max_solver_steps=most,
-        save_nodes=save_nodes,
+        steered=steered,
         again=again,
     )
 

@@ -12,6 +12,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.lanes._column_step import Differentiated, column_step, differentiated_step
+from jaxbiped.lanes._crossed import Crossed, Crossing
 from jaxbiped.lanes._end_of_solve import clipped
 from jaxbiped.lanes._program import Program
 from jaxbiped.solve._accuracy import rms_norm
@@ -23,56 +24,6 @@ from jaxbiped.solve._passage import onto_section, peak_of
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.solve._step_control import first_step, step_control
 from jaxbiped.solve._tangents import SHARE
-
-
-class Crossing(NamedTuple):
-    """One solve's inputs. Of n directions, m are of the state and p of parameters.
-
-    Attributes:
-        args, state: parameters and start, pytrees of scalars.
-        by_state: columns of the first m directions, shape (m, c).
-        by_parameter: of the others, shape (p, c).
-        sizes: by how much these move their parameter, shape (p,).
-        state_floors, parameter_floors: below which errors of columns are absolute, (m,) and (p,).
-        rtol, tangent_rtol: tolerances of state and columns.
-        time_limit: longest time to the section [s]; from `almost` on, a step there ends there.
-        most_attempts: cap on attempted steps.
-    """
-
-    args: PyTree
-    state: PyTree
-    by_state: Any
-    by_parameter: Any
-    sizes: Any
-    state_floors: Any
-    parameter_floors: Any
-    rtol: Any
-    tangent_rtol: Any
-    time_limit: Any
-    almost: Any
-    most_attempts: Any
-
-
-class Crossed(NamedTuple):
-    """What a solve found: as in `Passage`, all columns as rows of shape (m + p, …).
-
-    Attributes:
-        t, state, columns, time_columns: on the section.
-        code, attempted, jumps, missed, peak, peak_columns: see there.
-        accepted: number of steps accepted.
-    """
-
-    t: Any
-    state: PyTree
-    columns: Any
-    time_columns: Any
-    code: Any
-    attempted: Any
-    accepted: Any
-    jumps: Any
-    missed: Any
-    peak: Any
-    peak_columns: Any
 
 
 class _Now(NamedTuple):
@@ -254,12 +205,19 @@ class AdaptiveColumns:
             found.append(by_state)
         if by_parameter.shape[0]:
             rows = jnp.moveaxis(step.by_parameter, -1, 0)
-            columns, squares = jax.lax.map(
-                lambda each: moved(each[0], each[1], each[2] * each[3]),
-                (by_parameter, given.parameter_floors, rows, given.sizes),
+
+            def carried() -> tuple[Any, Scalar]:
+                columns, squares = jax.lax.map(
+                    lambda each: moved(each[0], each[1], each[2] * each[3]),
+                    (by_parameter, given.parameter_floors, rows, given.sizes),
+                )
+                return columns, jnp.max(squares)
+
+            columns, square = jax.lax.cond(
+                given.steered > 0.0, carried, lambda: (by_parameter, jnp.zeros(()))
             )
             found.append(columns)
-            norms.append(jnp.max(squares))
+            norms.append(square)
         else:
             found.append(by_parameter)
         worst = jnp.zeros(())

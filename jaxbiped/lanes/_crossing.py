@@ -8,8 +8,9 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._types import Scalar
-from jaxbiped.lanes._adaptive_columns import AdaptiveColumns, Crossed, Crossing
+from jaxbiped.lanes._adaptive_columns import AdaptiveColumns
 from jaxbiped.lanes._call import Recording, call, call_recording
+from jaxbiped.lanes._crossed import Crossed, Crossing
 from jaxbiped.lanes._end_of_solve import almost
 from jaxbiped.lanes._engine import CompiledProgram
 from jaxbiped.solve._columns import Seeded, Tangents
@@ -31,13 +32,15 @@ def cross(
     precision: Precision,
     time_limit: Any,
     max_solver_steps: int,
+    steered: Any = True,
     save_nodes: bool = False,
     again: bool = False,
 ) -> tuple[Crossed, Recording | None]:
     """Solves from `y0` to the section, a misfortune or `time_limit` [s].
 
     Of the columns the last p move one parameter each, by `sizes`, shape (p,), in the order of the
-    active leaves; the columns before move none. Seeds are not looked at. Records are the time and
+    active leaves; the columns before move none. Where not `steered`, the last p are not carried and
+    stay what they are. Seeds are not looked at. Records are the time and
     the state at the ends of the accepted steps; with them
     the same solve `again` takes no time.
     """
@@ -48,6 +51,7 @@ def cross(
         by_state=y0.columns[:, :m].T,
         by_parameter=y0.columns[:, m:].T,
         sizes=sizes,
+        steered=_number(steered),
         state_floors=args.floors[:m],
         parameter_floors=args.floors[m:],
         rtol=_number(precision.rtol),
@@ -87,6 +91,7 @@ def _compiled(
         numbers(directions, c),
         numbers(p, c),
         numbers(p),
+        numbers(),
         numbers(directions),
         numbers(p),
         *[numbers()] * 5,

@@ -1,8 +1,8 @@
 """How the last steps of a solve meet its end, as diffrax has it."""
 
-import equinox.internal as eqxi
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxbiped._types import Scalar
 
@@ -10,12 +10,18 @@ _CLIPPED_ULPS = 100
 """A step that would end this near the end, in units in the last place, ends there."""
 
 
-@jax.jit
 def almost(duration: Scalar) -> Scalar:
-    """The time from which on a step that would end there ends at `duration`, as diffrax has it."""
-    for _ in range(_CLIPPED_ULPS):
-        duration = eqxi.prevbefore(duration)
-    return duration
+    """The time from which on a step that would end there ends at `duration`, as diffrax has it.
+
+    Units are counted in the bits of the 64-bit number, which are in the numbers' own order: as
+    many steps to the number before would take XLA seconds to compile.
+    """
+    bits = jax.lax.bitcast_convert_type(duration, jnp.int64)
+    below = jnp.where(duration > 0.0, bits - _CLIPPED_ULPS, bits + _CLIPPED_ULPS)
+    # Numbers below the least normal one count for none.
+    nothing = -np.finfo(np.float64).tiny * (1.0 + (_CLIPPED_ULPS - 1) * np.finfo(np.float64).eps)
+    earlier = jax.lax.bitcast_convert_type(below, jnp.float64)
+    return jnp.where(duration == 0.0, nothing, earlier)
 
 
 def clipped(

@@ -7,8 +7,8 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.lanes._adaptive_columns import Crossed
 from jaxbiped.lanes._call import Recording
+from jaxbiped.lanes._crossed import Crossed
 from jaxbiped.lanes._crossing import cross
 from jaxbiped.solve._columns import Seeded, Tangents
 from jaxbiped.solve._landing import Watch
@@ -26,7 +26,7 @@ def passage_by_lanes(
     precision: Precision,
     time_limit: Any,
     max_solver_steps: int,
-    save_nodes: bool,
+    steered: Any,
     again: bool,
 ) -> Passage:
     """`passage` for columns as `cross` takes them; nodes are told as a `Recording`."""
@@ -39,7 +39,8 @@ def passage_by_lanes(
         precision=precision,
         time_limit=time_limit,
         max_solver_steps=max_solver_steps,
-        save_nodes=save_nodes,
+        steered=steered,
+        save_nodes=True,
         again=again,
     )
     return Passage(

@@ -15,8 +15,8 @@ from jaxbiped.dynamics._motion import vector_field
 from jaxbiped.dynamics._state import State
 from jaxbiped.dynamics._switches import switches
 from jaxbiped.lanes._adaptive import AdaptiveSolve, Saved, Solve, Solved, shapes_of
-from jaxbiped.lanes._adaptive_columns import Crossed
 from jaxbiped.lanes._call import Schedule, call
+from jaxbiped.lanes._crossed import Crossed
 from jaxbiped.lanes._crossing import cross
 from jaxbiped.lanes._engine import CompiledProgram, Recorded
 from jaxbiped.solve._columns import Seeded, Tangents

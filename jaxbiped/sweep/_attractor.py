@@ -6,7 +6,6 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-import scipy.linalg
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._feet import feet
@@ -61,6 +60,8 @@ def unmeasured_attractor(scene: Scene | RigidScene, gait: Gait, period: int) -> 
     Raises:
         ArgumentError: the search found none, or the gait is not stable.
     """
+    import scipy.linalg
+
     if int(gait.ending) != int(Search.FOUND) or not bool(gait.stable):
         raise ArgumentError(
             f"gait = {gait.outcome} with spectral radius {float(gait.measures.spectral_radius):g} "
@@ -88,6 +89,8 @@ def unmeasured_attractor(scene: Scene | RigidScene, gait: Gait, period: int) -> 
 
 def section_tangents(scene: Scene | RigidScene, state: Any) -> np.ndarray:
     """Orthonormal directions in which the section extends at a state, shape (m, m − 1)."""
+    import scipy.linalg
+
     section = checked_section(scene, None)
     slope = jax.grad(lambda y: section.value(scene, y))(jtu.tree_map(jnp.asarray, state))
     normal = np.array([float(leaf) for leaf in slope[1:]])

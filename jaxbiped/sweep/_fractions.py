@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtri
 
 from jaxbiped._checks import ArgumentError, check_at_least, check_not_negative
 from jaxbiped.sweep._arguments import check_confidence, check_known
@@ -42,6 +41,8 @@ def wilson_interval(
         ArgumentError: a count below 0 or above its total, shapes that do not broadcast, or a
             confidence not between 0 and 1.
     """
+    from scipy.special import ndtri
+
     check_confidence(confidence)
     check_not_negative("count", count)
     check_not_negative("total", total)

@@ -1,15 +1,17 @@
 """How the results of a sweep lie in arrays, and how these are cut into chunks."""
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from jaxbiped.sweep._coordinates import UNITS
 from jaxbiped.sweep._label import Label
 from jaxbiped.sweep._labelling import Labelled
 from jaxbiped.sweep._starts import AbstractStarts, Batch
+
+if TYPE_CHECKING:
+    import xarray
 
 FIELDS: dict[str, tuple[str, Any, str, str]] = {
     "label": ("i1", int(Label.PENDING), "", "what became of the start"),
@@ -103,8 +105,10 @@ def fields_of(starts: AbstractStarts, found: Labelled, batch: Batch) -> dict[str
     return fields | {f"start_{name}": batch.columns[name] for name in starts.own_columns}
 
 
-def empty_dataset(layout: Layout) -> xr.Dataset:
+def empty_dataset(layout: Layout) -> "xarray.Dataset":
     """The results before any is known; the arrays take no memory."""
+    import xarray
+
     starts = layout.starts
     dims = tuple(starts.axes)
     kinds = dict(FIELDS)
@@ -125,4 +129,4 @@ def empty_dataset(layout: Layout) -> xr.Dataset:
         for name, values in starts.axes.items()
         if values is not None
     }
-    return xr.Dataset(variables, coordinates)
+    return xarray.Dataset(variables, coordinates)

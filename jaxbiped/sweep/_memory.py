@@ -1,13 +1,15 @@
 """Results in memory: what a `Store` is, without a disk."""
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from jaxbiped.sweep._layout import Layout, empty_dataset
 from jaxbiped.sweep._store import SETTINGS
+
+if TYPE_CHECKING:
+    import xarray
 
 
 class Memory:
@@ -41,5 +43,5 @@ class Memory:
     def noted(self, name: str) -> Any:
         return self._dataset.attrs.get(name)
 
-    def dataset(self) -> xr.Dataset:
+    def dataset(self) -> "xarray.Dataset":
         return self._dataset

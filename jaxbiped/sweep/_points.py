@@ -5,7 +5,6 @@ import warnings
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.stats import qmc
 
 SAMPLINGS = ("uniform", "latin-hypercube", "sobol", "halton")
 """Ways to draw samples."""
@@ -29,6 +28,8 @@ def points(method: str, dimensions: int, count: int, seed: int, numbers: np.ndar
     if method == "uniform":
         parts = [_uniform(dimensions, seed, *run) for run in _runs(numbers)]
     else:
+        from scipy.stats import qmc
+
         engine = qmc.Sobol if method == "sobol" else qmc.Halton
         sequence = engine(dimensions, scramble=True, rng=seed)
         parts, reached = [], 0
@@ -62,6 +63,8 @@ def _uniform(dimensions: int, seed: int, first: int, last: int) -> np.ndarray:
 @functools.lru_cache(maxsize=1)
 def _latin_hypercube(dimensions: int, count: int, seed: int) -> np.ndarray:
     """All of them: each dimension is a permutation, which has to be drawn whole."""
+    from scipy.stats import qmc
+
     drawn = qmc.LatinHypercube(dimensions, rng=seed).random(count)
     drawn.setflags(write=False)
     return drawn

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import distance_transform_cdt
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.sweep._arguments import check_box, check_whole
@@ -83,6 +82,8 @@ class RefinedBoundary:
             raise ArgumentError(
                 f"the full grid has {self.full} points: it must have at most largest = {largest}."
             )
+        from scipy.ndimage import distance_transform_cdt
+
         counts = [n + 1 for n in self.cells_across(self.levels)]
         unknown = np.ones(counts, dtype=bool)
         grid = np.zeros(counts, dtype=int)

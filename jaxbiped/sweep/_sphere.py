@@ -1,12 +1,12 @@
 """Evenly spread points of cubes and directions, the same every time."""
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import qmc
 
 
 def spread_points(count: int, d: int) -> np.ndarray:
     """Sobol' points inside the unit cube, shape (count, d), none on a face or at the centre."""
+    from scipy.stats import qmc
+
     bits = max(int(np.ceil(np.log2(max(count, 2)))), 1)
     points = qmc.Sobol(d, scramble=False).random_base2(bits)[:count]
     return points + 0.5 ** (bits + 1)
@@ -23,6 +23,8 @@ def spread_directions(count: int, d: int) -> np.ndarray:
 
     m is `count`, at least 2 d; in one dimension there are two directions.
     """
+    from scipy.special import ndtri
+
     axes = np.concatenate([np.eye(d), -np.eye(d)])
     if d == 1 or count <= 2 * d:
         return axes

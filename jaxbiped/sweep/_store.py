@@ -6,14 +6,15 @@ import shutil
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
-import zarr
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.sweep._layout import Layout, empty_dataset
+
+if TYPE_CHECKING:
+    import xarray
 
 SETTINGS = "settings"
 """Attribute that holds, as JSON, all that the labels depend on."""
@@ -34,6 +35,8 @@ class Store:
     """
 
     def __init__(self, path: Path, layout: Layout) -> None:
+        import zarr
+
         self.path, self.layout = path, layout
         self._group: Any = zarr.open_group(str(path), mode="r+", use_consolidated=False)
         done: Any = self._group[_DONE]
@@ -130,7 +133,7 @@ class Store:
         """An attribute, None where it is not there."""
         return self._group.attrs.get(name)
 
-    def dataset(self) -> xr.Dataset:
+    def dataset(self) -> "xarray.Dataset":
         """The results, opened lazily."""
         return opened(self.path)
 
@@ -145,9 +148,11 @@ def check_store(path: Path) -> None:
         )
 
 
-def opened(path: Path) -> xr.Dataset:
+def opened(path: Path) -> "xarray.Dataset":
     """The dataset of a store, read as it is needed."""
-    return xr.open_zarr(path, chunks=None)
+    import xarray
+
+    return xarray.open_zarr(path, chunks=None)
 
 
 def unwritable(path: Path, error: OSError) -> ArgumentError:
@@ -166,6 +171,8 @@ def _create(
 
     Arrays take no room until they are written.
     """
+    import zarr
+
     half = path.with_name(f".{path.name}.unfinished")
     shutil.rmtree(half, ignore_errors=True)
     try:
@@ -207,6 +214,8 @@ def _create(
 
 def _consolidate(path: Path) -> None:
     """Lets `xarray.open_zarr` read all arrays' metadata at once, without a warning."""
+    import zarr
+
     with warnings.catch_warnings():
         # Zarr's third format has no word on it yet.
         warnings.simplefilter("ignore")
@@ -225,6 +234,8 @@ def _is_new(path: Path) -> bool:
 
 
 def _check_same(path: Path, settings: dict[str, Any], *, but: str = "") -> None:
+    import zarr
+
     try:
         group = zarr.open_group(str(path), mode="r", use_consolidated=False)
         stored = json.loads(str(group.attrs[SETTINGS]))

@@ -4,10 +4,9 @@ import json
 import time
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_type
@@ -21,6 +20,9 @@ from jaxbiped.sweep._provenance import provenance
 from jaxbiped.sweep._starts import AbstractStarts
 from jaxbiped.sweep._store import GAITS, Store, check_store
 from jaxbiped.sweep._workers import computed
+
+if TYPE_CHECKING:
+    import xarray
 
 CHUNK = 16384
 _MOST_OPEN = 4096
@@ -39,7 +41,7 @@ def sweep(
     workers: int = 1,
     look_for_gaits: bool = True,
     progress: bool = False,
-) -> xr.Dataset:
+) -> "xarray.Dataset":
     """Labels all starts.
 
     Gaits that some of the starts converge to are sought first, so that every start is compared
@@ -104,7 +106,7 @@ def sweep(
             "wall_s": time.perf_counter() - began,
         }
     )
-    dataset: xr.Dataset = sink.dataset()
+    dataset: xarray.Dataset = sink.dataset()
     return dataset
 
 

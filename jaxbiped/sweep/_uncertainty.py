@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtri
 
 from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.sweep._arguments import check_box, check_label_grid, check_vector, check_whole
@@ -101,6 +100,8 @@ def sampled_uncertainty(
         ArgumentError: an argument that is not allowed, or uncertain starts at fewer than three
             distances: take more samples, or larger distances.
     """
+    from scipy.special import ndtri
+
     low, high = check_box(lower, upper)
     check_positive("distances", distances)
     parts = np.unique(check_vector("distances", distances))
