@@ -75,7 +75,8 @@ def along_nodes(
     """`along_path` and `renewed` by lanes.
 
     Of the tangents the two turned ones come first, and move no parameter; of the others each moves
-    one, by `sizes`, shape (p,). The motion ends at the arrival, not at the last node.
+    one, by `sizes`, shape (p,). The motion ends at the arrival, not at the last node, and begins
+    and ends before its section: that may be a switch, as touchdown is.
     """
     given = _Given(
         args=flow.args.args,
@@ -88,17 +89,9 @@ def along_nodes(
         steps=nodes.steps,
         last=nodes.arrival,
     )
-    return call(_compiled_for(flow, final), given, tape=nodes.ends, quick=True)[0]
-
-
-def prepare_along_nodes(flow: Flow, count: int, *, final: bool) -> None:
-    """Begins to compile, in the background, `along_nodes` of `count` motions at once."""
-    _compiled_for(flow, final).make_ready(count)
-
-
-def _compiled_for(flow: Flow, final: bool) -> CompiledProgram:
     args = jtu.tree_structure(flow.args.args)
-    return _compiled(flow.system, flow.arrival, flow.args.active, args, flow.structure, final)
+    compiled = _compiled(flow.system, flow.arrival, flow.args.active, args, flow.structure, final)
+    return call(compiled, given, tape=nodes.ends, quick=True)[0]
 
 
 @functools.lru_cache(maxsize=256)
@@ -147,13 +140,15 @@ class _BentSolve:
 
     def start(self, given: _Given) -> _Now:
         order = self._order(given)
+        row = jnp.concatenate([given.t[None], given.state])
+        t, state = _cut(self.flow(given).earlier(row, self._parameters(given)))
         tangents = Tangents(*(order.sorted(x) for x in (given.turned, given.family, given.second)))
         return _Now(
-            node=given.state,
-            t=given.t,
-            state=given.state,
+            node=state,
+            t=t,
+            state=state,
             fresh=jnp.asarray(False),
-            switched=given.t - LONG_AGO,
+            switched=t - LONG_AGO,
             tangents=tangents,
             count=jnp.zeros(()),
         )
@@ -161,8 +156,8 @@ class _BentSolve:
     def attempt(self, given: _Given, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
         flow, order, parameters = self.flow(given), self._order(given), self._parameters(given)
         count = now.count + 1.0
-        row = jnp.where(count >= given.steps, given.last, row)
-        t, node = row[0], row[1:]
+        last = flow.earlier(given.last, parameters)
+        t, node = _cut(jnp.where(count >= given.steps, last, row))
 
         def field(y: Any, q: Any) -> list[Scalar]:
             return flow([*y, *q])
@@ -215,6 +210,11 @@ class _BentSolve:
         return order_of(
             lambda y, q: flow([*y, *q]), list(given.state), list(self._parameters(given))
         )
+
+
+def _cut(row: Scalar) -> tuple[Scalar, Scalar]:
+    """The time and the components."""
+    return row[0], row[1:]
 
 
 def _one_by_one(function: Callable[[Scalar], Scalar]) -> Callable[[Scalar], Scalar]:

@@ -24,13 +24,13 @@ from jaxbiped.dynamics._state import checked_state
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gait import Gait, described
 from jaxbiped.gait._newton import Method
-from jaxbiped.gait._orbit import prepare_orbit
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._search import Found, search
 from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._system import RedundantWalking, checked_section, system_of
 from jaxbiped.gait._turn import Turning
+from jaxbiped.lanes._call import lowered_ahead
 from jaxbiped.scene._parameters import chosen_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -167,25 +167,32 @@ def _find(
     active: tuple[int, ...],
     radius: bool,
 ) -> Gait:
-    def describe(found: Found) -> Gait:
-        return described(turning, scene, start, found, names, active, radius)
-
     searching = (turning, scene, active, start, precision, method)
-    if _is_traced(searching):
-        return describe(_searched(*searching))
-    kind = _kind_of((searching, names, radius))
-    if kind in _COMPILED:
-        return describe(_searched(*searching))
-    # Two programs, so that the second compiles while the first one does: run on nothing, it ends
-    # at once. What takes longest to compile begins first.
-    prepare_orbit(turning, scene, active, start, radius=radius)
-    with ThreadPoolExecutor(max_workers=1) as meanwhile:
-        nothing = _nothing(eqx.filter_eval_shape(_searched, *searching))
-        ready = meanwhile.submit(describe, nothing)
-        found = _searched(*searching)
-        ready.result()
-    _COMPILED.add(kind)
-    return describe(found)
+    describing = (names, active, radius)
+    kind = None if _is_traced(searching) else _kind_of((searching, names, radius))
+    if kind is not None and kind not in _COMPILED:
+        _compile(searching, describing)
+        _COMPILED.add(kind)
+    found = _searched(*searching)
+    return described(turning, scene, start, found, *describing)
+
+
+def _compile(searching: tuple, describing: tuple) -> None:
+    """Compiles both programs, and what lanes run for them, at the same time."""
+    turning, scene, _, start, *_ = searching
+    nothing = _nothing(eqx.filter_eval_shape(_searched, *searching))
+    first: Any = _searched
+    second: Any = described
+    with ThreadPoolExecutor() as meanwhile:
+        with lowered_ahead() as programs:
+            # What takes lanes longest begins first.
+            lowered = second.lower(turning, scene, start, nothing, *describing)
+            ready = [meanwhile.submit(lowered.compile)]
+            ready.append(meanwhile.submit(first.lower(*searching).compile))
+        for program in programs:
+            program.check()
+        for each in ready:
+            each.result()
 
 
 _COMPILED: set[Any] = set()

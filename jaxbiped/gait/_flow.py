@@ -12,6 +12,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._system import AbstractSystem
 from jaxbiped.solve._columns import Seeded, with_active
+from jaxbiped.solve._landing import MARGIN
 
 Arrival = Callable[[PyTree, PyTree], tuple[Scalar, Scalar]]
 """Of (args, state): a section's value, and whether a crossing counts."""
@@ -55,6 +56,11 @@ class Flow(eqx.Module):
         """The section's value."""
         state, scene = self._parts(z)
         return self.arrival(scene, state)[0]
+
+    def earlier(self, row: Scalar, parameters: Scalar) -> Scalar:
+        """Time and components, (1 + c,), as little earlier as tells a switch's sides apart."""
+        rates = jnp.stack(self([*row[1:], *parameters]))
+        return row - MARGIN * jnp.concatenate([jnp.ones(1), rates])
 
     def _parts(self, z: Sequence[Scalar] | Scalar) -> tuple[PyTree, PyTree]:
         c = self.structure.num_leaves

@@ -50,11 +50,10 @@ class Progress(NamedTuple):
     Attributes:
         stage: code of a `Stage`.
         trial: the m recurring components to turn from next.
-        base: the best so far; `base_residual` the largest change over its turn, `base_turn` what
-            tells that turn, `change` its changes and `slope` their derivatives by the components
-            (m, m).
+        base: the best so far; `base_residual` the largest change over its turn `base_turn`,
+            `change` its changes and `slope` their derivatives by the components (m, m).
         damping: Levenberg and Marquardt's.
-        coarse: what tells the last looser turn.
+        coarse: the last looser turn.
         optimiser: its state.
         code, turns, history: as in `Found`.
     """
@@ -65,19 +64,19 @@ class Progress(NamedTuple):
     base_residual: Scalar
     change: Scalar
     slope: Scalar
-    base_turn: Any
+    base_turn: Turn
     damping: Scalar
-    coarse: Any
+    coarse: Turn
     optimiser: Any
     code: Scalar
     turns: Scalar
     history: Scalar
 
 
-def begun(first: Scalar, off: Scalar, method: Method, nothing: Any) -> Progress:
+def begun(first: Scalar, off: Scalar, method: Method, nothing: Turn) -> Progress:
     """Before the first turn, from components that are `off` the section by so much.
 
-    `nothing` is in the place of what tells a turn.
+    `nothing` is in the place of a turn.
     """
     on_section = off < 1e-9
     stage = jnp.where(on_section, int(Stage.ROUGH), int(Stage.APPROACH))
@@ -98,8 +97,8 @@ def begun(first: Scalar, off: Scalar, method: Method, nothing: Any) -> Progress:
     )
 
 
-def progressed(now: Progress, latest: Turn, told: Any, method: Method) -> Progress:
-    """One turn further: judge the trial, and propose the next; `told` is what tells the turn."""
+def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
+    """One turn further: judge the trial, and propose the next."""
     returned = latest.code == 0
     change = latest.recurring - now.trial
     residual = jnp.where(returned, jnp.max(jnp.abs(change)), jnp.inf)
@@ -114,7 +113,7 @@ def progressed(now: Progress, latest: Turn, told: Any, method: Method) -> Progre
     m = len(base)
     base_residual, moved, slope, base_turn = chosen(
         better,
-        (residual, change, latest.jacobian[:, :m] - jnp.eye(m), told),
+        (residual, change, latest.jacobian[:, :m] - jnp.eye(m), latest),
         (now.base_residual, now.change, now.slope, now.base_turn),
     )
     damping = jnp.where(

@@ -9,10 +9,10 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._search import Found
-from jaxbiped.gait._second_turn import prepare_second_turn, second_turn
+from jaxbiped.gait._second_turn import second_turn
 from jaxbiped.gait._small_matrices import eigen, inverted, solved
 from jaxbiped.gait._stability import Stability, stability_of
-from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with
+from jaxbiped.gait._turn import Turn, Turning, seeded, state_with
 
 CLOSENESS = 1e-3
 """Distance of a multiplier from the unit circle that is flagged as a bifurcation."""
@@ -72,10 +72,9 @@ def orbit_of(
     """
     state = state_with(turning.system, guess, found.recurring)
     m = found.recurring.shape[0]
-    rates = turning.system.vector_field(jnp.zeros(()), state, args)
-    velocity = recurring_of(turning.system, rates)
     last, coarse = found.last, found.coarse
-    stability = stability_of(last.monodromy[:, :m], coarse.monodromy[:, :m], velocity, CLOSENESS)
+    monodromy, witness = last.monodromy[:, :m], coarse.monodromy[:, :m]
+    stability = stability_of(monodromy, witness, last.velocity, CLOSENESS)
     slopes, looser = (slopes_of(each) for each in (last, coarse))
     # Where the force itself jumped on the section, columns lack the jump's own correction.
     slopes = jax.tree.map(lambda leaf: jnp.where(last.missed > 0, jnp.nan, leaf), slopes)
@@ -90,16 +89,6 @@ def orbit_of(
         )(found.both)
         radius_errors = jnp.abs(radius_slopes - looser_slopes)
     return Orbit(found, state, stability, slopes, errors, radius_slopes, radius_errors, sizes)
-
-
-def prepare_orbit(
-    turning: Turning, args: PyTree, active: tuple[int, ...], like: PyTree, *, radius: bool
-) -> None:
-    """Begins to compile what takes longest in `orbit_of`, before there is an orbit."""
-    if turning.engine == "lanes" and _bends(turning, active, radius):
-        seeds, _ = seeded(args, active, len(recurring_of(turning.system, like)))
-        # The turn and its witness.
-        prepare_second_turn(turning, seeds, like, 2)
 
 
 def _bends(turning: Turning, active: tuple[int, ...], radius: bool) -> bool:

@@ -1,9 +1,8 @@
 """The search for a periodic orbit: a fixed point of the return map."""
 
 import enum
-import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -69,13 +68,6 @@ class Found(NamedTuple):
         return jax.tree.map(lambda leaf: leaf[1], self.both)
 
 
-class Made(NamedTuple):
-    """What tells a turn by lanes: the recurring components that it began from, and its stage."""
-
-    recurring: Scalar
-    stage: Scalar
-
-
 Run = Callable[[Scalar, Scalar, Scalar], Turn]
 """The turn from recurring components, as exactly as a stage wants, or none where idle."""
 
@@ -91,11 +83,10 @@ def search(
     """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely."""
     first = recurring_of(turning.system, guess)
     off = jnp.abs(turning.section.value(args, guess))
-    runner = functools.partial(_runner, turning, args, active, guess, precision)
-    if turning.engine == "lanes":
-        end, both = _by_lanes(runner(), runner(again=True), first, off, method)
-    else:
-        end, both = _by_xla(runner(), first, off, method)
+    run = _runner(turning, args, active, guess, precision)
+    shape: Turn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
+    nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
+    end = _advanced(run, begun(first, off, method, nothing), method)
     ending = jnp.where(
         end.stage == Stage.FOUND,
         int(Search.FOUND),
@@ -106,34 +97,10 @@ def search(
         code=end.code,
         recurring=end.base,
         residual=end.base_residual,
-        both=both,
+        both=jax.tree.map(lambda *pair: jnp.stack(pair), end.base_turn, end.coarse),
         turns=end.turns,
         history=end.history,
     )
-
-
-def _by_xla(run: Run, first: Scalar, off: Scalar, method: Method) -> tuple[Progress, Turn]:
-    shape: Turn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
-    nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
-    begin = begun(first, off, method, nothing)
-    end = _advanced(run, lambda turn, made: turn, begin, method)
-    return end, jax.tree.map(lambda *pair: jnp.stack(pair), end.base_turn, end.coarse)
-
-
-def _by_lanes(
-    run: Run, known: Run, first: Scalar, off: Scalar, method: Method
-) -> tuple[Progress, Turn]:
-    """Turns do not travel through the search.
-
-    At its end two of them are asked for once more, which takes no solve.
-    """
-    begin = begun(first, off, method, Made(first, jnp.asarray(0)))
-    now = _advanced(run, lambda turn, made: made, begin, method)
-    # Where no turn was judged, what it began from is still the best orbit there is.
-    untold = (now.base_turn.stage == 0) & (now.stage != Stage.NO_RETURN)
-    last = chosen(untold, Made(now.base, jnp.asarray(int(Stage.ROUGH))), now.base_turn)
-    both: Made = jax.tree.map(lambda *pair: jnp.stack(pair), last, now.coarse)
-    return now, jax.vmap(known)(both.recurring, both.stage, both.stage == 0)
 
 
 def _runner(
@@ -142,8 +109,6 @@ def _runner(
     active: tuple[int, ...],
     guess: PyTree,
     precision: Precision,
-    *,
-    again: bool = False,
 ) -> Run:
     """Turns with derivatives by the state, and once it is near by the `active` parameters."""
     seeds, _ = seeded(args, active, len(recurring_of(turning.system, guess)))
@@ -157,18 +122,12 @@ def _runner(
             )
         )
         start = state_with(turning.system, guess, trial)
-        steered = again | (stage >= Stage.COARSE)
-        return turn(turning, seeds, start, wanted, idle, steered=steered, again=again)
+        return turn(turning, seeds, start, wanted, idle, steered=stage >= Stage.COARSE)
 
     return run
 
 
-def _advanced(
-    run: Run,
-    tell: Callable[[Turn, Made], Any],
-    begin: Progress,
-    method: Method,
-) -> Progress:
+def _advanced(run: Run, begin: Progress, method: Method) -> Progress:
     """Searches on until it has ended or the turns are used up."""
 
     def goes_on(now: Progress) -> Scalar:
@@ -177,7 +136,6 @@ def _advanced(
     def advance(now: Progress) -> Progress:
         on = goes_on(now)
         latest = run(now.trial, now.stage, ~on)
-        told = tell(latest, Made(now.trial, now.stage))
-        return chosen(on, progressed(now, latest, told, method), now)
+        return chosen(on, progressed(now, latest, method), now)
 
     return jax.lax.while_loop(goes_on, advance, begin)

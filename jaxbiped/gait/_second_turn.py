@@ -7,13 +7,11 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._bent import Bent, renewed
-from jaxbiped.gait._bent_solve import along_nodes, prepare_along_nodes
+from jaxbiped.gait._bent_solve import along_nodes
 from jaxbiped.gait._curvature import along_path
 from jaxbiped.gait._flow import Flow
-from jaxbiped.gait._radau import stacked
 from jaxbiped.gait._turn import Turn, Turning, recurring_places
 from jaxbiped.solve._columns import Seeded, active_leaves
-from jaxbiped.solve._landing import MARGIN
 
 
 def second_turn(
@@ -51,14 +49,12 @@ def second_turn(
     assert last.nodes is not None
     for k in range(turning.steps):
         nodes = jax.tree.map(lambda leaf, k=k: leaf[k], last.nodes)
-        # The last step ends on the section, which may be a switch, as touchdown is: the motion
-        # begins and ends before it.
-        start, end = (_earlier(flow, row, parameters) for row in (nodes.start, nodes.arrival))
         final = k + 1 == turning.steps
         if turning.engine == "lanes":
-            nodes = nodes._replace(start=start, arrival=end)
             bent, period = along_nodes(flow, nodes, bent, sizes, final=final)
             continue
+        # The motion begins and ends before its section: that may be a switch, as touchdown is.
+        start, end = (flow.earlier(row, parameters) for row in (nodes.start, nodes.arrival))
         ends = nodes.ends.at[nodes.steps - 1].set(end)
         rows = jnp.concatenate([start[None], ends])
         times = jnp.where(jnp.arange(len(rows)) <= nodes.steps, rows[:, 0], jnp.inf)
@@ -70,21 +66,8 @@ def second_turn(
     return jnp.concatenate(parted)
 
 
-def prepare_second_turn(turning: Turning, args: Seeded, like: PyTree, count: int) -> None:
-    """Begins to compile what `count` of `second_turn` at once need by lanes, before any turn."""
-    flow = _flow(turning, args, like)
-    for final in {turning.steps == 1, True}:
-        prepare_along_nodes(flow, count, final=final)
-
-
 def _flow(turning: Turning, args: Seeded, like: PyTree) -> Flow:
     watch = turning.watch(args.args, like)
     assert watch.section is not None
     field = turning.system.vector_field
     return Flow(turning.system, watch.section, field, args, jtu.tree_structure(like))
-
-
-def _earlier(flow: Flow, row: Scalar, parameters: Scalar) -> Scalar:
-    """A time and state as little earlier as tells a switch's sides apart."""
-    velocity = stacked(flow)(jnp.concatenate([row[1:], parameters]))
-    return row - MARGIN * jnp.concatenate([jnp.ones(1), velocity])

@@ -84,6 +84,7 @@ class Turn(NamedTuple):
         recurring: the m components that must return.
         jacobian: their derivatives on the section, shape (m, n).
         monodromy: their derivatives at a fixed time, shape (m, n).
+        velocity: their rates where the turn ends, shape (m,).
         period: duration [s]; `period_row` its derivatives, shape (n,).
         advance: what the drifting components gained, shape (d,); `advance_rows` (d, n).
         peak: largest load; `peak_row` (n,). Zeros where the system has none.
@@ -96,6 +97,7 @@ class Turn(NamedTuple):
     recurring: Scalar
     jacobian: Scalar
     monodromy: Scalar
+    velocity: Scalar
     period: Scalar
     period_row: Scalar
     advance: Scalar
@@ -152,12 +154,10 @@ def turn(
     idle: Any,
     *,
     steered: Any = True,
-    again: bool = False,
 ) -> Turn:
     """Follows the orbit from `y` for one turn, with derivatives; nothing where `idle`.
 
-    Where not `steered`, derivatives by parameters choose no steps, and lanes do without them. Lanes
-    need not solve the same turn `again`.
+    Where not `steered`, derivatives by parameters choose no steps, and lanes do without them.
     """
     places = recurring_places(turning.system, y)
     count, n = len(jtu.tree_leaves(y)), args.seeds.shape[1]
@@ -167,11 +167,11 @@ def turn(
 
     def one(
         before: tuple[Tangents, Scalar], _: None
-    ) -> tuple[tuple[Tangents, Scalar], tuple[Passage, Scalar]]:
+    ) -> tuple[tuple[Tangents, Scalar], tuple[Passage, Scalar, Scalar]]:
         y0, failed = before
         y0 = _entered(turning, y0, args)
         within = jnp.where(failed != 0, 0.0, limit)
-        found = _passed(turning, watch, y0, args, precision, within, steered, again)
+        found = _passed(turning, watch, y0, args, precision, within, steered)
         found = _left(turning, found, args)
         state, moved = along_columns(lambda s, a: turning.system.renew(a, s), found.y, args)
         on_section = as_columns(moved)
@@ -180,7 +180,7 @@ def turn(
         velocity = jnp.stack(jtu.tree_leaves(rates))
         columns = on_section - velocity[:, None] * found.time_columns
         code = jnp.where(failed != 0, failed, found.code)
-        return (Tangents(state, columns), code), (found, on_section)
+        return (Tangents(state, columns), code), (found, on_section, velocity)
 
     begin = (Tangents(y, start), jnp.asarray(0))
     if turning.steps == 1:
@@ -188,8 +188,8 @@ def turn(
         every = jax.tree.map(lambda leaf: leaf[None], last)
     else:
         (end, code), every = jax.lax.scan(one, begin, length=turning.steps)
-    passages, on_section = every
-    return _turn(turning, y, end, code, passages, on_section[-1])
+    passages, on_section, velocity = every
+    return _turn(turning, y, end, code, passages, on_section[-1], velocity[-1])
 
 
 def _watched(turning: Turning, args: PyTree, y: PyTree) -> Watch:
@@ -234,7 +234,6 @@ def _passed(
     precision: Precision,
     limit: Scalar,
     steered: Any,
-    again: bool,
 ) -> Passage:
     """The next passage, by the engine that is asked for."""
     most = turning.max_solver_steps
@@ -264,7 +263,6 @@ def _passed(
         time_limit=limit,
         max_solver_steps=most,
         steered=steered,
-        again=again,
     )
 
 
@@ -275,6 +273,7 @@ def _turn(
     code: Scalar,
     passages: Passage,
     on_section: Scalar,
+    velocity: Scalar,
 ) -> Turn:
     places = jnp.asarray(recurring_places(turning.system, y))
     drifting = jnp.asarray(turning.system.drifting, dtype=int)
@@ -284,6 +283,7 @@ def _turn(
         recurring=after[places],
         jacobian=on_section[places],
         monodromy=end.columns[places],
+        velocity=velocity[places],
         period=jnp.sum(passages.time),
         period_row=passages.time_columns[-1],
         advance=(after - before)[drifting],

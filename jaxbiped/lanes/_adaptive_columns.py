@@ -127,7 +127,9 @@ class AdaptiveColumns:
     def finish(self, given: Crossing, now: _Now) -> Crossed:
         ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), int(Ending.OUT_OF_STEPS))
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
-        seeded, columns = self._seeded(given), jnp.concatenate(now.columns).T
+        by_state, by_parameter = now.columns
+        by_parameter = jnp.where(given.steered > 0.0, by_parameter, jnp.nan)
+        seeded, columns = self._seeded(given), jnp.concatenate([by_state, by_parameter]).T
         y, t = Tangents(now.state, columns), now.t
         time_columns, peak = jnp.zeros(columns.shape[1]), jnp.zeros(())
         peak_columns = time_columns

@@ -1,7 +1,9 @@
 """Compiled programs as operations of JAX: they run under `jit` and `vmap`."""
 
+import contextlib
+import contextvars
 import enum
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import equinox as eqx
@@ -18,20 +20,31 @@ from jaxbiped.lanes._held_back import HeldBack, Tables
 from jaxbiped.lanes._program import leaves_of
 
 _HELD_BACK = HeldBack(most=1 << 28)
+_UNTRACED: contextvars.ContextVar[list[CompiledProgram] | None] = contextvars.ContextVar(
+    "programs that may not be expressible", default=None
+)
 
 
 class _Wanted(enum.Enum):
-    """Which part of what simulations give is wanted, and whether they are run for it."""
+    """Which part of what simulations give is wanted."""
 
-    ALL = "outputs and records of a run"
-    OUTPUTS = "outputs of a run whose records are held back"
-    KNOWN_OUTPUTS = "outputs of a run that may have been before"
-    KNOWN_COLUMNS = "records of a run that may have been before"
+    ALL = "outputs and records"
+    OUTPUTS = "outputs, while records are held back"
+    COLUMNS = "records that were held back"
 
-    @property
-    def runs(self) -> bool:
-        """Whether the simulations are run in any case."""
-        return self in (_Wanted.ALL, _Wanted.OUTPUTS)
+
+@contextlib.contextmanager
+def lowered_ahead() -> Iterator[list[CompiledProgram]]:
+    """Within, nothing that is lowered waits until its programs are traced.
+
+    They are listed: whoever goes on to run them first has to `check` each.
+    """
+    programs: list[CompiledProgram] = []
+    token = _UNTRACED.set(programs)
+    try:
+        yield programs
+    finally:
+        _UNTRACED.reset(token)
 
 
 class Schedule:
@@ -59,9 +72,7 @@ class Recording(eqx.Module):
 
         `first` has shape (numbers,), the arrays (1 + room,).
         """
-        params = _params(
-            self.compiled, room=self.room, quick=self.quick, wants=_Wanted.KNOWN_COLUMNS
-        )
+        params = _params(self.compiled, room=self.room, quick=self.quick, wants=_Wanted.COLUMNS)
         return _bound([self.numbers, first], params)
 
 
@@ -92,12 +103,11 @@ def call(
 
 
 def call_recording(
-    compiled: CompiledProgram, inputs: PyTree, *, room: int, quick: bool, again: bool
+    compiled: CompiledProgram, inputs: PyTree, *, room: int, quick: bool
 ) -> tuple[PyTree, Recording]:
-    """`call`, but the records stay on the host; the same `again` need not run."""
+    """`call`, but the records stay on the host."""
     numbers = _numbers(inputs)
-    wants = _Wanted.KNOWN_OUTPUTS if again else _Wanted.OUTPUTS
-    params = _params(compiled, room=room, quick=quick, wants=wants)
+    params = _params(compiled, room=room, quick=quick, wants=_Wanted.OUTPUTS)
     (table,) = _bound([numbers], params)
     return _outputs(compiled, table), Recording(numbers, compiled, room, quick)
 
@@ -139,8 +149,8 @@ def _bound(given: list[Any], params: dict[str, Any]) -> list[Any]:
 
 
 def _outputs(compiled: CompiledProgram, table: Any) -> PyTree:
-    shapes, structure = jtu.tree_flatten(compiled.graph.output_structure)
-    parts = leaves_of(compiled.graph.output_structure, table)
+    shapes, structure = jtu.tree_flatten(compiled.outline.outputs)
+    parts = leaves_of(compiled.outline.outputs, table)
     leaves = [jnp.asarray(part.astype(s.dtype)) for part, s in zip(parts, shapes, strict=True)]
     return jtu.tree_unflatten(structure, leaves)
 
@@ -172,12 +182,10 @@ def _run(
         )
         return [outputs.T, *(recorded or ())]
     run = _recording_run(compiled, table.shape[1], room, quick)
-    if wants is _Wanted.KNOWN_COLUMNS:
+    if wants is _Wanted.COLUMNS:
         assert rows is not None
         return _HELD_BACK.columns(compiled, table, rows, room, run)
-    if wants is _Wanted.OUTPUTS:
-        return [_HELD_BACK.ran(compiled, table, run)[0].T]
-    return [_HELD_BACK.outputs(compiled, table, run).T]
+    return [_HELD_BACK.ran(compiled, table, run).T]
 
 
 def _recording_run(
@@ -205,13 +213,14 @@ def _shapes(
     wants: _Wanted,
     **_: Any,
 ) -> list[Any]:
-    numbers = len(compiled.graph.recorded)
-    if wants is _Wanted.KNOWN_COLUMNS:
+    numbers = compiled.outline.recorded
+    if wants is _Wanted.COLUMNS:
+        assert numbers is not None
         return [jax.ShapeDtypeStruct((count, 1 + room), jnp.float64)] * numbers
-    leaves = jtu.tree_leaves(compiled.graph.output_structure)
+    leaves = jtu.tree_leaves(compiled.outline.outputs)
     size = sum(int(np.prod(leaf.shape)) for leaf in leaves)
     found = [jax.ShapeDtypeStruct((count, size), jnp.float64)]
-    if compiled.graph.recording is not None and wants is _Wanted.ALL:
+    if numbers is not None and wants is _Wanted.ALL:
         room = room if schedule is None else len(schedule.times)
         found.append(jax.ShapeDtypeStruct((count, room, numbers), jnp.float64))
         found.append(jax.ShapeDtypeStruct((count,), jnp.int64))
@@ -237,9 +246,14 @@ def _lowered(context: Any, *operands: Any, **params: Any) -> Any:
     def run(*given: np.ndarray) -> tuple[np.ndarray, ...]:
         return tuple(_run(*given, **params))
 
-    if params["wants"].runs:
+    if params["wants"] is not _Wanted.COLUMNS:
         # While XLA compiles the rest, this compiles as well.
-        params["compiled"].make_ready(context.avals_in[0].shape[0])
+        compiled, waiting = params["compiled"], _UNTRACED.get()
+        compiled.make_ready(context.avals_in[0].shape[0])
+        if waiting is None:
+            compiled.check()
+        else:
+            waiting.append(compiled)
     results, _, _ = mlir.emit_python_callback(
         context,
         run,

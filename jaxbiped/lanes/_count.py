@@ -37,7 +37,7 @@ def operation_counts(scene: Scene | RigidScene) -> dict[str, int]:
     every = Block(once)
     arrays = [inputs_of(every, number) for _ in state]
     parameters = [inputs_of(once, number) for _ in jtu.tree_leaves(given)]
-    results, _ = emitted(
+    results = emitted(
         every, lambda y, args: field(0.0, y, args), (state, given), [*arrays, *parameters]
     )
     needed = Needed([value for array in results for value in array.ravel()])

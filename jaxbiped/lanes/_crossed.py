@@ -13,7 +13,7 @@ class Crossing(NamedTuple):
         by_state: columns of the first m directions, shape (m, c).
         by_parameter: of the others, shape (p, c).
         sizes: by how much these move their parameter, shape (p,).
-        steered: whether these are carried at all (0 or 1), or stay what they are.
+        steered: whether these are carried at all (0 or 1).
         state_floors, parameter_floors: below which errors of columns are absolute, (m,) and (p,).
         rtol, tangent_rtol: tolerances of state and columns.
         time_limit: longest time to the section [s]; from `almost` on, a step there ends there.

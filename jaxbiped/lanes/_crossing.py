@@ -34,15 +34,13 @@ def cross(
     max_solver_steps: int,
     steered: Any = True,
     save_nodes: bool = False,
-    again: bool = False,
 ) -> tuple[Crossed, Recording | None]:
     """Solves from `y0` to the section, a misfortune or `time_limit` [s].
 
     Of the columns the last p move one parameter each, by `sizes`, shape (p,), in the order of the
-    active leaves; the columns before move none. Where not `steered`, the last p are not carried and
-    stay what they are. Seeds are not looked at. Records are the time and
-    the state at the ends of the accepted steps; with them
-    the same solve `again` takes no time.
+    active leaves; the columns before move none. Where not `steered`, the last p are not carried,
+    and NaN in the end. Seeds are not looked at. Records are the time and the state at the ends of
+    the accepted steps.
     """
     m = y0.columns.shape[1] - len(args.active)
     inputs = Crossing(
@@ -65,7 +63,7 @@ def cross(
     quick = max_solver_steps <= _QUICK
     if save_nodes:
         room = max_solver_steps
-        return call_recording(compiled, inputs, room=room, quick=quick, again=again)
+        return call_recording(compiled, inputs, room=room, quick=quick)
     return call(compiled, inputs, quick=quick)[0], None
 
 

@@ -1,6 +1,8 @@
 """Programs run over many simulations at once: queues, threads and arrays."""
 
+import contextlib
 import ctypes
+import functools
 import os
 import threading
 from collections.abc import Callable
@@ -11,16 +13,18 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped.lanes._emit import UnknownPrimitiveError
 from jaxbiped.lanes._host import host
 from jaxbiped.lanes._kernel import ENTRY, kernel_text
 from jaxbiped.lanes._lane_by_lane import FIELDS
 from jaxbiped.lanes._machine_code import MachineCode, assembly, machine_code
-from jaxbiped.lanes._program import Graph, Program, graph_of, leaves_of
+from jaxbiped.lanes._program import Graph, Outline, Program, graph_of, leaves_of, outline_of
 
 THREADS_VARIABLE = "JAXBIPED_THREADS"
 """Environment variable: threads to use, else as many as the process has cores."""
 _MANY = 8
 """Vectors for each thread from which on two are computed side by side."""
+_TRACING = threading.Lock()
 _POLL = 0.1
 """How long to wait before looking whether the user interrupts [s]."""
 
@@ -49,17 +53,40 @@ class CompiledProgram:
     """A program compiled for inputs of one structure."""
 
     def __init__(self, program: Program, inputs: PyTree) -> None:
-        """Traces a program; `inputs` are those of one simulation, or their shapes and dtypes.
+        """A program is traced when it is needed; `inputs` are one simulation's, or their shapes."""
+        # The outline and the graph need these: compiled by themselves, they are traced once.
+        self._program = program._replace(
+            start=jax.jit(program.start),
+            finish=jax.jit(program.finish),
+            record=None if program.record is None else jax.jit(program.record),
+        )
+        self._inputs = jtu.tree_map(lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype), inputs)
+        self._graph: Graph | None = None
+        self._code: dict[int, MachineCode] = {}
+        self._begun: set[int] = set()
+        self._lock, self._making = threading.Lock(), threading.Lock()
+
+    @functools.cached_property
+    def outline(self) -> Outline:
+        """What leaves it."""
+        return outline_of(self._program, self._inputs)
+
+    def check(self) -> None:
+        """Waits until it is traced.
 
         Raises:
             UnknownPrimitiveError: it holds an operation that lanes do not have.
         """
-        self.graph: Graph = graph_of(program, inputs)
-        self._shapes = [jax.ShapeDtypeStruct(x.shape, x.dtype) for x in jtu.tree_leaves(inputs)]
-        self._maps = any(value.op == "map" for value in self.graph.body.values)
-        self._code: dict[int, MachineCode] = {}
-        self._begun: set[int] = set()
-        self._lock, self._making = threading.Lock(), threading.Lock()
+        assert self.graph
+
+    @property
+    def graph(self) -> Graph:
+        """Its operations."""
+        # One after the other: what is traced first can be compiled while the next one is traced.
+        with _TRACING:
+            if self._graph is None:
+                self._graph = graph_of(self._program, self._inputs)
+            return self._graph
 
     def text(self, width: int) -> str:
         """The program as LLVM's text."""
@@ -85,17 +112,24 @@ class CompiledProgram:
         """
         if count <= threads:
             return 1
-        many = count >= _MANY * threads * host().width
-        return host().width * (2 if many and not self._maps else 1)
+        if count < _MANY * threads * host().width:
+            return host().width
+        maps = any(value.op == "map" for value in self.graph.body.values)
+        return host().width * (1 if maps else 2)
 
     def make_ready(self, count: int) -> None:
-        """Begins to compile, in the background, what running `count` simulations needs."""
+        """Begins to trace and compile, in the background, what running `count` of them needs."""
         width = self.width(count, default_threads())
         with self._lock:
             begun = width in self._code or width in self._begun
             self._begun.add(width)
         if not begun:
-            threading.Thread(target=self.code, args=(width,)).start()
+            threading.Thread(target=self._prepare, args=(width,)).start()
+
+    def _prepare(self, width: int) -> None:
+        # Who needs the program is told why there is none.
+        with contextlib.suppress(UnknownPrimitiveError):
+            self.code(width)
 
     def run(
         self,
@@ -126,7 +160,7 @@ class CompiledProgram:
         count = leaves[0].shape[0]
         rows = [
             np.moveaxis(leaf, 0, -1).reshape(int(np.prod(shape.shape)), count)
-            for leaf, shape in zip(leaves, self._shapes, strict=True)
+            for leaf, shape in zip(leaves, jtu.tree_leaves(self._inputs), strict=True)
         ]
         table = np.concatenate(rows).astype(np.float64)
         found, recorded = self.run_table(
@@ -200,8 +234,8 @@ class CompiledProgram:
         return whole
 
     def _outputs(self, table: np.ndarray) -> PyTree:
-        shapes, structure = jtu.tree_flatten(self.graph.output_structure)
-        parts = leaves_of(self.graph.output_structure, table)
+        shapes, structure = jtu.tree_flatten(self.outline.outputs)
+        parts = leaves_of(self.outline.outputs, table)
         with np.errstate(invalid="ignore"):
             leaves = [
                 np.moveaxis(part, -1, 0).astype(shape.dtype)

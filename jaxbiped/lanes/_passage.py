@@ -27,7 +27,6 @@ def passage_by_lanes(
     time_limit: Any,
     max_solver_steps: int,
     steered: Any,
-    again: bool,
 ) -> Passage:
     """`passage` for columns as `cross` takes them; nodes are told as a `Recording`."""
     found, recording = cross(
@@ -41,7 +40,6 @@ def passage_by_lanes(
         max_solver_steps=max_solver_steps,
         steered=steered,
         save_nodes=True,
-        again=again,
     )
     return Passage(
         y=Tangents(found.state, found.columns.T),

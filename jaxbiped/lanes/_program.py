@@ -41,6 +41,18 @@ class Program(NamedTuple):
     tape: int = 0
 
 
+class Outline(NamedTuple):
+    """What leaves a program, known before its operations are.
+
+    Attributes:
+        outputs: pytree of outputs, with shapes and dtypes.
+        recorded: how many numbers are in a record; None where nothing is recorded.
+    """
+
+    outputs: PyTree
+    recorded: int | None
+
+
 class Graph(NamedTuple):
     """A program's operations.
 
@@ -54,7 +66,6 @@ class Graph(NamedTuple):
         outputs: 64-bit floating-point numbers, all; `constants` those that are always the same, by
             their places, which `outputs` leaves out.
         next_time: of the schedule. `recording`, `recorded`: see `Program.record`.
-        output_structure: of the pytree of outputs, with shapes and dtypes.
     """
 
     prepare: Block
@@ -74,7 +85,17 @@ class Graph(NamedTuple):
     recording: Value | None
     recorded: list[Value]
     scheduled: bool
-    output_structure: PyTree
+
+
+def outline_of(program: Program, inputs: PyTree) -> Outline:
+    """Of a program for inputs of these shapes and dtypes."""
+    carried = jax.eval_shape(program.start, inputs)
+    outputs = jax.eval_shape(program.finish, inputs, carried)
+    if program.record is None:
+        return Outline(outputs, None)
+    time = jax.ShapeDtypeStruct((), jnp.float64)
+    _, values = jax.eval_shape(program.record, inputs, carried, time)
+    return Outline(outputs, sum(int(np.prod(value.shape)) for value in values))
 
 
 def graph_of(program: Program, inputs: PyTree) -> Graph:
@@ -85,7 +106,7 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
     given = [inputs_of(prepare, leaf) for leaf in jtu.tree_leaves(inputs)]
     carried_shape = jax.eval_shape(program.start, inputs)
     carried = [inputs_of(body, leaf) for leaf in jtu.tree_leaves(carried_shape)]
-    first, _ = emitted(begin, program.start, (inputs,), given)
+    first = emitted(begin, program.start, (inputs,), given)
     shapes: tuple[Any, ...] = (inputs, carried_shape)
     arguments = [*given, *carried]
     row: list[Value] = []
@@ -93,14 +114,14 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
         shape = jax.ShapeDtypeStruct((program.tape,), jnp.float64)
         shapes, arguments = (*shapes, shape), [*arguments, inputs_of(body, shape)]
         row = list(arguments[-1])
-    following, _ = emitted(body, program.attempt, shapes, arguments)
-    finals, structure = emitted(end, program.finish, (inputs, carried_shape), [*given, *carried])
+    following = emitted(body, program.attempt, shapes, arguments)
+    finals = emitted(end, program.finish, (inputs, carried_shape), [*given, *carried])
     next_time = Value("input", (), Kind.F64, notes)
     recording, recorded = None, []
     if program.record is not None:
         time = jax.ShapeDtypeStruct((), jnp.float64)
         arguments = [*given, *carried, array_of([next_time], ())]
-        mask, *values = emitted(notes, program.record, (inputs, carried_shape, time), arguments)[0]
+        mask, *values = emitted(notes, program.record, (inputs, carried_shape, time), arguments)
         recording = mask.item()
         recorded = [converted(notes, v, Kind.F64) for a in values for v in a.ravel()]
     *following, done = following
@@ -123,7 +144,6 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
         recording=recording,
         recorded=recorded,
         scheduled=program.scheduled,
-        output_structure=structure,
     )
 
 
@@ -146,10 +166,10 @@ def inputs_of(block: Block, leaf: Any) -> Array:
 
 def emitted(
     block: Block, function: Callable[..., Any], shapes: tuple[Any, ...], arrays: list[Array]
-) -> tuple[list[Array], PyTree]:
-    """A function's operations added to a block: its results, and their structure."""
-    closed, structure = jax.make_jaxpr(function, return_shape=True)(*shapes)
-    return emit(block, closed.jaxpr, closed.consts, arrays), structure
+) -> list[Array]:
+    """A function's operations added to a block: its results."""
+    closed = jax.make_jaxpr(function)(*shapes)
+    return emit(block, closed.jaxpr, closed.consts, arrays)
 
 
 def _matched(block: Block, arrays: list[Array], like: list[Array]) -> list[Array]:

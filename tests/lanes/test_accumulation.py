@@ -92,6 +92,6 @@ def _operations(function, numbers):
     """Of the graph that lanes make of it."""
     block = Block()
     shape = jax.ShapeDtypeStruct((), jnp.float64)
-    found, _ = emitted(block, function, tuple(numbers), [inputs_of(block, shape) for _ in numbers])
+    found = emitted(block, function, tuple(numbers), [inputs_of(block, shape) for _ in numbers])
     needed = Needed([value for array in found for value in array.ravel()])
     return sum(value in needed and value.op != "const" for value in block.values)

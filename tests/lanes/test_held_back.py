@@ -59,9 +59,9 @@ def runs(powers, monkeypatch):
     return counts
 
 
-def _recording(powers, factor, steps, again=False):
+def _recording(powers, factor, steps):
     given = (jnp.asarray(factor), jnp.asarray(steps))
-    return call_recording(powers, given, room=ROOM, quick=True, again=again)
+    return call_recording(powers, given, room=ROOM, quick=True)
 
 
 def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
@@ -70,21 +70,18 @@ def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
     nothing = [np.nan] * (ROOM - 4)
     np.testing.assert_array_equal(counts, [0, 1, 2, 3, 4, *nothing])
     np.testing.assert_array_equal(values, [1, 3, 9, 27, 81, *nothing])
-    assert float(last) == float(_recording(powers, 3.0, 4.0, again=True)[0]) == 81.0
+    assert float(last) == 81.0
     assert runs == [1]
     _recording(powers, 3.0, 4.0)
     assert runs == [1, 1]
 
 
-def test_what_nobody_ran_is_run(powers, runs):
-    _recording(powers, 1.5, 2.0)
-
-    def last(factor):
-        return _recording(powers, factor, 2.0, again=True)[0]
-
-    found = jax.jit(jax.vmap(last))(jnp.array([1.25, 1.5, 1.75]))
-    np.testing.assert_allclose(found, [1.25**2, 1.5**2, 1.75**2])
-    assert runs == [1, 2]
+def test_what_is_no_longer_held_is_run_again(powers, runs, monkeypatch):
+    monkeypatch.setattr("jaxbiped.lanes._call._HELD_BACK", HeldBack(most=0))
+    _, recording = _recording(powers, 1.5, 2.0)
+    _, values = recording.columns(np.array([0.0, 1.0]))
+    np.testing.assert_array_equal(values[:3], [1.0, 1.5, 2.25])
+    assert runs == [1, 1]
 
 
 def test_a_recording_is_another_programs_tape(powers, runs):
@@ -118,13 +115,13 @@ def test_what_came_first_goes_first():
         ran.extend(table[0])
         return table.copy(), np.ones((table.shape[1], 3, 1)), np.full(table.shape[1], 2)
 
-    # An output and two records of one number each: 24 bytes a simulation.
-    held = HeldBack(most=60)
+    # Two records of one number each: 16 bytes a simulation.
+    held = HeldBack(most=40)
     for number in (1.0, 2.0, 3.0):
-        held.ran("program", np.array([[number]]), run)
-    held.outputs("program", np.array([[3.0, 2.0]]), run)
+        np.testing.assert_array_equal(held.ran("program", np.array([[number]]), run), [[number]])
+    held.rows("program", np.array([[3.0, 2.0]]), run)
     assert ran == [1.0, 2.0, 3.0]
-    np.testing.assert_array_equal(held.outputs("program", np.array([[1.0, 3.0]]), run), [[1, 3]])
+    assert held.rows("program", np.array([[1.0, 3.0]]), run).shape == (2, 2, 1)
     assert ran == [1.0, 2.0, 3.0, 1.0]
-    held.outputs("another", np.array([[3.0]]), run)
+    held.rows("another", np.array([[3.0]]), run)
     assert ran == [1.0, 2.0, 3.0, 1.0, 3.0]
