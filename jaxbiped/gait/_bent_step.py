@@ -14,7 +14,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait._crossings import SIDES, Crossings, jump_of
 from jaxbiped.gait._radau import RADAU, Path
 from jaxbiped.lanes._accumulation import jacobian
-from jaxbiped.solve._elimination import inverse, solution
+from jaxbiped.solve._elimination import inverse_by_blocks, solution_by_blocks
 from jaxbiped.solve._landing import MARGIN
 from jaxbiped.solve._linearisation import linearise
 
@@ -159,7 +159,10 @@ def _collocated(
     stages = Stages.of(order, share, found)
     residual = order.sorted(points - path.before - (RADAU * share) @ velocities)
     unforced = jnp.zeros((3, len(order.kept)))
-    off = stages.solve(residual, unforced, lambda right: solution(stages.matrix, right))
+    size = len(order.kept)
+    off = stages.solve(
+        residual, unforced, lambda right: solution_by_blocks(stages.matrix, right, size)
+    )
     return points - order.restored(off)
 
 
@@ -168,11 +171,13 @@ class _Rows:
 
     def __init__(self, field: Field, order: Order, parameters: Any) -> None:
         self.field, self.order, self.parameters = field, order, list(parameters)
+        # Compiled by themselves, these are traced once, not at each use.
+        self.by_state, self.bend = jax.jit(self._by_state), jax.jit(self._bend)
 
     def velocity(self, y: Any) -> Any:
         return jnp.stack(self.field(list(y), self.parameters))
 
-    def by_state(self, y: Any) -> Any:
+    def _by_state(self, y: Any) -> Any:
         """Derivatives of the kept rates by the components, (k, c)."""
         return self.order.sorted(jacobian(lambda z: self._kept(z, self.parameters), list(y)))
 
@@ -180,7 +185,7 @@ class _Rows:
         """Derivatives of the kept rates, (k, n)."""
         return self._by_all(self._kept, list(y))
 
-    def bend(self, y: Any, along: Any) -> Any:
+    def _bend(self, y: Any, along: Any) -> Any:
         """Derivatives of the kept rates' derivative along a tangent of the state, (k, n)."""
         tangent = list(along)
 
@@ -234,8 +239,7 @@ def tangent_step(
         kept = linear.at_start[:, :c] @ tangent + forcing
         return jnp.concatenate([tangent[d : 2 * d], kept]) if d else kept
 
-    inverted = inverse([list(row) for row in stages.matrix])
-    matrix = jnp.stack([jnp.stack(row) for row in inverted])
+    matrix = inverse_by_blocks(stages.matrix, len(order.kept))
 
     def carried(start: Any, forcing: Any) -> Any:
         """At the collocation points, (3, c)."""

@@ -13,7 +13,6 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped.lanes._emit import UnknownPrimitiveError
 from jaxbiped.lanes._host import host
 from jaxbiped.lanes._kernel import ENTRY, kernel_text
 from jaxbiped.lanes._lane_by_lane import FIELDS
@@ -83,10 +82,16 @@ class CompiledProgram:
     def graph(self) -> Graph:
         """Its operations."""
         # One after the other: what is traced first can be compiled while the next one is traced.
-        with _TRACING:
-            if self._graph is None:
-                self._graph = graph_of(self._program, self._inputs)
-            return self._graph
+        if self._graph is None:
+            with _TRACING:
+                if self._graph is None:
+                    self._graph = graph_of(self._program, self._inputs)
+        return self._graph
+
+    @functools.cached_property
+    def maps(self) -> bool:
+        """Whether it loops over entries of arrays."""
+        return any(value.op == "map" for value in self.graph.body.values)
 
     def text(self, width: int) -> str:
         """The program as LLVM's text."""
@@ -94,14 +99,16 @@ class CompiledProgram:
 
     def instructions(self) -> int:
         """How many machine instructions the program has, for vectors of the host's width."""
-        lines = assembly(self.text(host().width), host()).splitlines()
+        text = self.text(host().width)
+        lines = assembly(text, host(), as_written=self.maps).splitlines()
         return sum(line.startswith("\t") and not line.startswith("\t.") for line in lines)
 
     def code(self, width: int) -> MachineCode:
         """The machine code, for vectors of this width."""
         with self._making:
             if width not in self._code:
-                self._code[width] = machine_code(self.text(width), ENTRY, host())
+                text = self.text(width)
+                self._code[width] = machine_code(text, ENTRY, host(), as_written=self.maps)
             return self._code[width]
 
     def width(self, count: int, threads: int) -> int:
@@ -114,8 +121,7 @@ class CompiledProgram:
             return 1
         if count < _MANY * threads * host().width:
             return host().width
-        maps = any(value.op == "map" for value in self.graph.body.values)
-        return host().width * (1 if maps else 2)
+        return host().width * (1 if self.maps else 2)
 
     def make_ready(self, count: int) -> None:
         """Begins to trace and compile, in the background, what running `count` of them needs."""
@@ -128,7 +134,7 @@ class CompiledProgram:
 
     def _prepare(self, width: int) -> None:
         # Who needs the program is told why there is none.
-        with contextlib.suppress(UnknownPrimitiveError):
+        with contextlib.suppress(Exception):
             self.code(width)
 
     def run(

@@ -34,34 +34,41 @@ _LOADED: dict[str, MachineCode] = {}
 _LOCK = threading.Lock()
 
 
-def machine_code(text: str, entry: str, host: Host) -> MachineCode:
-    """The code of a module, compiled where neither the process nor the disk has it."""
-    key = hashlib.sha256("\n".join([text, entry, *map(str, host), *_versions()]).encode())
-    name = key.hexdigest()
+def machine_code(text: str, entry: str, host: Host, *, as_written: bool) -> MachineCode:
+    """The code of a module, compiled where neither the process nor the disk has it.
+
+    A module may be compiled `as_written`, without LLVM's passes. These take out of a long loop all
+    that its turns share, which then waits in memory for want of registers.
+    """
+    parts = [text, entry, str(as_written), *map(str, host), *_versions()]
+    name = hashlib.sha256("\n".join(parts).encode()).hexdigest()
     with _LOCK:
         if name not in _LOADED:
-            _LOADED[name] = _loaded(text, entry, host, _folder(), name)
+            _LOADED[name] = _loaded(text, entry, host, as_written, _folder(), name)
         return _LOADED[name]
 
 
-def assembly(text: str, host: Host) -> str:
-    """A module as the host's assembly, to look at."""
-    machine = _target_machine(host)
-    return str(machine.emit_assembly(_optimised(text, machine)))
+def assembly(text: str, host: Host, *, as_written: bool) -> str:
+    """A module as the host's assembly, to look at; see `machine_code`."""
+    machine = _target_machine(host, as_written)
+    return str(machine.emit_assembly(_module(text, machine, as_written)))
 
 
 def _versions() -> tuple[str, str]:
     return str(llvmlite.__version__), str(llvm.llvm_version_info)
 
 
-def _target_machine(host: Host) -> Any:
+def _target_machine(host: Host, as_written: bool) -> Any:
     target = llvm.Target.from_triple(host.triple)
-    return target.create_target_machine(cpu=host.cpu, features=host.features, opt=2, jit=True)
+    effort = 1 if as_written else 2
+    return target.create_target_machine(cpu=host.cpu, features=host.features, opt=effort, jit=True)
 
 
-def _optimised(text: str, machine: Any) -> Any:
+def _module(text: str, machine: Any, as_written: bool) -> Any:
     module = llvm.parse_assembly(text)
     module.verify()
+    if as_written:
+        return module
     # No vectorisers: the vectors are there. Sums are never reordered, so results stay the same.
     options = llvm.create_pipeline_tuning_options(speed_level=1)
     options.slp_vectorization = options.loop_vectorization = False
@@ -70,12 +77,14 @@ def _optimised(text: str, machine: Any) -> Any:
     return module
 
 
-def _loaded(text: str, entry: str, host: Host, folder: Path | None, name: str) -> MachineCode:
-    machine = _target_machine(host)
+def _loaded(
+    text: str, entry: str, host: Host, as_written: bool, folder: Path | None, name: str
+) -> MachineCode:
+    machine = _target_machine(host, as_written)
     path = None if folder is None else folder / f"{name}.o"
     stored = None if path is None else _read(path)
     if stored is None:
-        stored = bytes(machine.emit_object(_optimised(text, machine)))
+        stored = bytes(machine.emit_object(_module(text, machine, as_written)))
         if path is not None:
             _write(path, stored)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)

@@ -59,6 +59,45 @@ def solution(matrix: Scalar, right: Scalar) -> Scalar:
     return jnp.stack(found[::-1])
 
 
+def inverse_by_blocks(matrix: Scalar, size: int) -> Scalar:
+    """The inverse of a matrix (n, n) of square blocks, each of so many rows.
+
+    Only the rows of a block take turns as pivots: for a method's stages, whose blocks on the
+    diagonal are those of implicit steps, which have inverses.
+    """
+    count = len(matrix) // size
+    unit = jnp.eye(len(matrix))
+    rows = jnp.split(jnp.concatenate([matrix, unit], axis=1), count)
+    for k in range(count):
+        heads, rows = [row[:, :size] for row in rows], [row[:, size:] for row in rows]
+        rows[k] = _inverted(heads[k]) @ rows[k]
+        for i in range(count):
+            if i != k:
+                rows[i] = rows[i] - heads[i] @ rows[k]
+    return jnp.concatenate(rows)
+
+
+def solution_by_blocks(matrix: Scalar, right: Scalar, size: int) -> Scalar:
+    """The solution (n,) of a square system as `inverse_by_blocks` takes it."""
+    count = len(matrix) // size
+    rows = jnp.split(jnp.concatenate([matrix, right[:, None]], axis=1), count)
+    for k in range(count):
+        heads = [row[:, :size] for row in rows]
+        rows[k:] = [row[:, size:] for row in rows[k:]]
+        rows[k] = _inverted(heads[k]) @ rows[k]
+        for i in range(k + 1, count):
+            rows[i] = rows[i] - heads[i] @ rows[k]
+    found = rows[-1][:, -1]
+    for row in reversed(rows[:-1]):
+        # What is right of a block's unit belongs to the unknowns behind it.
+        found = jnp.concatenate([row[:, -1] - row[:, :-1] @ found, found])
+    return found
+
+
+def _inverted(block: Scalar) -> Scalar:
+    return jnp.stack([jnp.stack(row) for row in inverse([list(row) for row in block])])
+
+
 def _largest_first(rows: list[Scalar], k: int) -> None:
     """Brings the row with the largest first entry to place `k`, of those from there on."""
     for i in range(k + 1, len(rows)):

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.solve._elimination import inverse, times
+from jaxbiped.solve._elimination import inverse, inverse_by_blocks, solution_by_blocks, times
 
 BATCH = 50
 
@@ -82,3 +82,21 @@ def test_derivative_of_a_solution():
     _, tangent = jax.jvp(mine, (jnp.asarray(A),), (jnp.asarray(dA),))
     truth = -np.linalg.solve(A, dA @ np.linalg.solve(A, b))
     np.testing.assert_allclose(tangent, truth, rtol=1e-11)
+
+
+@pytest.mark.parametrize(("size", "count"), [(1, 3), (2, 3), (4, 3), (5, 1)])
+def test_by_blocks(size, count):
+    """Blocks on the diagonal that have inverses; rows of each take turns as pivots."""
+    rng = np.random.default_rng(size)
+    n = size * count
+    for _ in range(20):
+        matrix = 0.2 * rng.normal(size=(n, n))
+        for k in range(0, n, size):
+            # Exchanged rows: without pivots inside of blocks there are zeros to divide by.
+            matrix[k : k + size, k : k + size] += np.eye(size)[::-1] * 2.0
+            matrix[k, k] *= 0.0 if size > 1 else 1.0
+        right = rng.normal(size=n)
+        found = inverse_by_blocks(jnp.asarray(matrix), size)
+        np.testing.assert_allclose(found, np.linalg.inv(matrix), rtol=1e-11, atol=1e-12)
+        solved = solution_by_blocks(jnp.asarray(matrix), jnp.asarray(right), size)
+        np.testing.assert_allclose(solved, np.linalg.solve(matrix, right), rtol=1e-11, atol=1e-12)
