@@ -26,7 +26,7 @@ def _run(scale=3.0):
 def test_compiled_code_is_stored_once_and_read_again(cache, monkeypatch):
     _run()
     (stored,) = cache.iterdir()
-    monkeypatch.setattr(_machine_code, "_optimised", None)  # compiling would fail now
+    monkeypatch.setattr(_machine_code, "_module", None)  # compiling would fail now
     _run()
     assert list(cache.iterdir()) == [stored]
 
