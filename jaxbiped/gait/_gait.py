@@ -62,7 +62,9 @@ class Gait(eqx.Module):
             period and the step length; shape (m + 2, m).
         unit_multiplier_error: distance from 1 of the multiplier that must be exactly 1.
         bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
-        sensitivities: derivatives of the measures by each parameter, leaves of shape (p,).
+        sensitivities: derivatives of the measures by each parameter, leaves of shape (p,). By
+            lanes NaN where the search never came near a gait: until then only the state is
+            differentiated by.
         sensitivity_errors: their estimated errors: what a ten times looser solve changes.
         elasticities: d log |measure| / d log parameter, leaves of shape (p,); zero for a parameter
             that is zero, NaN for a measure that is.
