@@ -76,7 +76,7 @@ class CompiledProgram:
         Raises:
             UnknownPrimitiveError: it holds an operation that lanes do not have.
         """
-        assert self.graph
+        _ = self.graph
 
     @property
     def graph(self) -> Graph:

@@ -28,10 +28,7 @@ class HeldBack:
         self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
     ) -> np.ndarray:
         """Outputs of what `run` finds for inputs (numbers, n); its records are then known."""
-        outputs, records, counts = run(inputs)
-        found = [each[:n].copy() for each, n in zip(records, counts, strict=True)]
-        self._keep(program, inputs, found)
-        return outputs
+        return self._ran(program, inputs, run)[0]
 
     def rows(
         self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
@@ -73,21 +70,25 @@ class HeldBack:
             known = {key: self._records[key] for key in keys if key in self._records}
         missing = [i for i, key in enumerate(keys) if key not in known]
         if missing:
-            _, records, counts = run(inputs[:, missing])
-            found = [each[:n].copy() for each, n in zip(records, counts, strict=True)]
-            self._keep(program, inputs[:, missing], found)
+            _, found = self._ran(program, inputs[:, missing], run)
             known |= {keys[i]: each for i, each in zip(missing, found, strict=True)}
         return [known[key] for key in keys]
 
-    def _keep(self, program: Any, inputs: np.ndarray, records: list[np.ndarray]) -> None:
+    def _ran(
+        self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Outputs and records of each simulation, which are held from now on."""
+        outputs, records, counts = run(inputs)
+        found = [each[:n].copy() for each, n in zip(records, counts, strict=True)]
         with self._lock:
-            for column, each in zip(inputs.T, records, strict=True):
+            for column, each in zip(inputs.T, found, strict=True):
                 key = program, column.tobytes()
                 self._drop(key)
                 self._records[key] = each
                 self._size += each.nbytes
             while self._size > self._most:
                 self._drop(next(iter(self._records)))
+        return outputs, found
 
     def _drop(self, key: Any) -> None:
         records = self._records.pop(key, None)
