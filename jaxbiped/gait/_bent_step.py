@@ -14,7 +14,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait._crossings import SIDES, Crossings, jump_of
 from jaxbiped.gait._radau import RADAU, Path
 from jaxbiped.lanes._accumulation import jacobian
-from jaxbiped.solve._elimination import inverse_by_blocks, solution_by_blocks
+from jaxbiped.solve._elimination import solution_by_blocks
 from jaxbiped.solve._landing import MARGIN
 from jaxbiped.solve._linearisation import linearise
 
@@ -161,7 +161,9 @@ def _collocated(
     unforced = jnp.zeros((3, len(order.kept)))
     size = len(order.kept)
     off = stages.solve(
-        residual, unforced, lambda right: solution_by_blocks(stages.matrix, right, size)
+        residual,
+        unforced,
+        lambda right: solution_by_blocks(stages.matrix, right[:, None], size)[:, 0],
     )
     return points - order.restored(off)
 
@@ -239,7 +241,8 @@ def tangent_step(
         kept = linear.at_start[:, :c] @ tangent + forcing
         return jnp.concatenate([tangent[d : 2 * d], kept]) if d else kept
 
-    matrix = inverse_by_blocks(stages.matrix, len(order.kept))
+    unit = jnp.eye(len(stages.matrix))
+    matrix = solution_by_blocks(stages.matrix, unit, len(order.kept))
 
     def carried(start: Any, forcing: Any) -> Any:
         """At the collocation points, (3, c)."""

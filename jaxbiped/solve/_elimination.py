@@ -59,15 +59,14 @@ def solution(matrix: Scalar, right: Scalar) -> Scalar:
     return jnp.stack(found[::-1])
 
 
-def inverse_by_blocks(matrix: Scalar, size: int) -> Scalar:
-    """The inverse of a matrix (n, n) of square blocks, each of so many rows.
+def solution_by_blocks(matrix: Scalar, right: Scalar, size: int) -> Scalar:
+    """The solutions of a system (n, n) of square blocks of so many rows, right sides (n, m).
 
     Only the rows of a block take turns as pivots: for a method's stages, whose blocks on the
     diagonal are those of implicit steps, which have inverses.
     """
     count = len(matrix) // size
-    unit = jnp.eye(len(matrix))
-    rows = jnp.split(jnp.concatenate([matrix, unit], axis=1), count)
+    rows = jnp.split(jnp.concatenate([matrix, right], axis=1), count)
     for k in range(count):
         heads, rows = [row[:, :size] for row in rows], [row[:, size:] for row in rows]
         rows[k] = _inverted(heads[k]) @ rows[k]
@@ -75,23 +74,6 @@ def inverse_by_blocks(matrix: Scalar, size: int) -> Scalar:
             if i != k:
                 rows[i] = rows[i] - heads[i] @ rows[k]
     return jnp.concatenate(rows)
-
-
-def solution_by_blocks(matrix: Scalar, right: Scalar, size: int) -> Scalar:
-    """The solution (n,) of a square system as `inverse_by_blocks` takes it."""
-    count = len(matrix) // size
-    rows = jnp.split(jnp.concatenate([matrix, right[:, None]], axis=1), count)
-    for k in range(count):
-        heads = [row[:, :size] for row in rows]
-        rows[k:] = [row[:, size:] for row in rows[k:]]
-        rows[k] = _inverted(heads[k]) @ rows[k]
-        for i in range(k + 1, count):
-            rows[i] = rows[i] - heads[i] @ rows[k]
-    found = rows[-1][:, -1]
-    for row in reversed(rows[:-1]):
-        # What is right of a block's unit belongs to the unknowns behind it.
-        found = jnp.concatenate([row[:, -1] - row[:, :-1] @ found, found])
-    return found
 
 
 def _inverted(block: Scalar) -> Scalar:

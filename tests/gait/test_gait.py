@@ -41,6 +41,21 @@ def test_no_turn_is_solved_twice(found, monkeypatch):
     np.testing.assert_array_equal(again.orbit[0], found.orbit[0])
 
 
+def test_far_from_a_gait_only_the_state_is_differentiated_by(found):
+    """By lanes: the return map's slopes are right there, of parameters nothing is claimed."""
+    gait = jb.find_gait(jb.seed_scene(), most_turns=2)
+    assert gait.outcome == jb.Search.NOT_CONVERGED
+    assert np.isnan(gait.sensitivities.period).all()
+    start, h = gait.measures.state, 1e-6
+    moved = [
+        jb.return_map(jb.seed_scene(), start._replace(omega_2=start.omega_2 + step)).time
+        for step in (-h, h)
+    ]
+    m = len(start) - 1
+    slope = float(moved[1] - moved[0]) / (2.0 * h)
+    np.testing.assert_allclose(gait.return_jacobian[m, m - 1], slope, rtol=2e-3)
+
+
 def test_a_start_that_falls_gives_no_gait():
     state = jb.seed_state()._replace(omega_2=jnp.asarray(-3.0), hip_vx=jnp.asarray(1.5))
     gait = jb.find_gait(jb.seed_scene(), state)
