@@ -23,15 +23,6 @@ class Bent(NamedTuple):
     second: Scalar
 
 
-Each = Callable[[Callable[[Scalar], Scalar]], Callable[[Scalar], Scalar]]
-"""Of a function of a vector: the same of a matrix, column by column."""
-
-
-def at_once(function: Callable[[Scalar], Scalar]) -> Callable[[Scalar], Scalar]:
-    """All columns at once."""
-    return jax.vmap(function, in_axes=-1, out_axes=-1)
-
-
 def renewed(
     flow: Flow,
     z: Scalar,
@@ -40,18 +31,14 @@ def renewed(
     count: int,
     *,
     final: bool,
-    each: Each = at_once,
-) -> tuple[Bent, Scalar]:
-    """Tangents after an arrival at `z`, and the time's mixed second tangents, shape (q, v).
+) -> Bent:
+    """Tangents after an arrival at `z`.
 
-    Of the `final` arrival tangents on the section; of one before it at a fixed time, whose second
-    tangents are zero.
+    Of the `final` arrival tangents on the section; of one before it at a fixed time.
     """
-    time = jnp.zeros(bent.second.shape[1:])
     if final:
-        bent, times = on_surface(flow, flow.section, z, bent, seeds, count, each)
-        time = times.second
-    return bend(flow.renewed, z, bent, seeds, count), time
+        bent = on_surface(flow, flow.section, z, bent, seeds, count)
+    return bend(flow.renewed, z, bent, seeds, count)
 
 
 def on_surface(
@@ -61,14 +48,12 @@ def on_surface(
     bent: Bent,
     seeds: Scalar,
     count: int,
-    each: Each = at_once,
-) -> tuple[Bent, Bent]:
+) -> Bent:
     """Tangents at a fixed time turned into tangents on the surface g = 0 that `z` lies on.
 
     A tangent V moves the arrival by τ_V = −dg·V/ġ and becomes V + f τ_V. Differentiated once more,
     C becomes C + (J V) τ_Q + (J Q) τ_V + (J f) τ_V τ_Q + f τ_VQ, where τ_VQ keeps it
     on the surface.
-    Also the times: τ_V as `first` (v + q,) and τ_VQ as `second` (q, v).
     """
     c = bent.first.shape[0]
     moved = jnp.concatenate([bent.first, seeds])
@@ -83,7 +68,7 @@ def on_surface(
     slope = gradient @ flow
     times = -(gradient @ moved) / slope
     on = moved + flow[:, None] * times
-    bends = each(turned)(moved)
+    bends = jax.vmap(turned, in_axes=-1, out_axes=-1)(moved)
     by_v, by_q = times[:count], times[count:]
     second = bent.second + jnp.einsum("cv,q->cqv", bends[:, :count], by_q)
     second = second + jnp.einsum("cq,v->cqv", bends[:, count:], by_v)
@@ -91,7 +76,7 @@ def on_surface(
     curved = jnp.einsum("aq,ab,bv->qv", on[:, count:], jax.hessian(surface)(z), on[:, :count])
     both = -(curved + jnp.einsum("c,cqv->qv", gradient[:c], second)) / slope
     second = second + jnp.einsum("c,qv->cqv", rate, both)
-    return Bent(on[:c], second), Bent(times, both)
+    return Bent(on[:c], second)
 
 
 def bend(

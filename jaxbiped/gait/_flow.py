@@ -42,6 +42,10 @@ class Flow(eqx.Module):
         state, scene = self._parts(z)
         return jtu.tree_leaves(self.field(jnp.zeros(()), state, scene))
 
+    def apart(self, y: Sequence[Scalar], parameters: Sequence[Scalar]) -> list[Scalar]:
+        """The rates of components and parameters that come apart."""
+        return self([*y, *parameters])
+
     def surfaces(self, z: Scalar) -> tuple[Switch, ...]:
         """The switches."""
         state, scene = self._parts(z)

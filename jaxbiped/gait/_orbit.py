@@ -119,13 +119,14 @@ def _radius_slopes(
     m = last.recurring.shape[0]
     jacobian = last.jacobian[:, :m]
     vector, left = _leading(jacobian)
-    turned = jnp.stack([vector.real, vector.imag], axis=1)
+    value = left @ (jacobian.astype(vector.dtype) @ vector)
+    # d|λ| is the real part of dλ in the direction of λ.
+    weight = jnp.conj(value) / jnp.abs(value) * left
+    turned = jnp.stack([vector.real, vector.imag])
+    weights = jnp.stack([weight.real, -weight.imag])
     family = slopes_of(last).recurring
     seeds, sizes = seeded(args, active, m)
-    second = second_turn(turning, seeds, like, last, turned, family, sizes)
-    change = left @ jax.lax.complex(second[:m, :, 0], second[:m, :, 1])
-    value = left @ (jacobian.astype(vector.dtype) @ vector)
-    slopes = (jnp.conj(value) * change).real / jnp.abs(value)
+    slopes = second_turn(turning, seeds, like, last, turned, weights, family, sizes)
     # Second derivatives across a jump of the force itself would need more than its Jacobians'.
     return jnp.where(last.jumps > 0, jnp.nan, slopes)
 

@@ -3,7 +3,7 @@
 import contextlib
 import contextvars
 import enum
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import equinox as eqx
@@ -16,10 +16,11 @@ from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, PyTree
 
 from jaxbiped.lanes._engine import CompiledProgram, Recorded, default_threads
-from jaxbiped.lanes._held_back import HeldBack, Tables
 from jaxbiped.lanes._program import leaves_of
+from jaxbiped.lanes._recorder import Recorder
 
-_HELD_BACK = HeldBack(most=1 << 28)
+_BLOCK = 512
+"""Simulations that read at once what others recorded: of more, that takes much memory."""
 _UNTRACED: contextvars.ContextVar[list[CompiledProgram] | None] = contextvars.ContextVar(
     "programs that may not be expressible", default=None
 )
@@ -58,21 +59,19 @@ class Recording(eqx.Module):
     """The records of one simulation, told by its inputs: arrays of them travel nowhere.
 
     Attributes:
-        numbers: the inputs' leaves one behind the other, shape (k,).
-        compiled: the program; `room` for how many records; `quick`: see `call`.
+        numbers: the inputs' leaves one behind the other, and then those of what was read, (k,).
+        recorder: how it was run.
     """
 
     numbers: Any
-    compiled: CompiledProgram = eqx.field(static=True)
-    room: int = eqx.field(static=True)
-    quick: bool = eqx.field(static=True)
+    recorder: Recorder = eqx.field(static=True)
 
     def columns(self, first: Any) -> list[Any]:
-        """For each number in a record `first`'s and then those recorded, NaN beyond the last.
+        """For each of the first k numbers `first`'s and then those recorded, NaN beyond the last.
 
-        `first` has shape (numbers,), the arrays (1 + room,).
+        `first` has shape (k,), the arrays (1 + room,).
         """
-        params = _params(self.compiled, room=self.room, quick=self.quick, wants=_Wanted.COLUMNS)
+        params = _params(self.recorder.compiled, recorder=self.recorder, wants=_Wanted.COLUMNS)
         return _bound([self.numbers, first], params)
 
 
@@ -96,30 +95,36 @@ def call(
     """
     recorder, rows = None, [] if tape is None else [tape]
     if isinstance(tape, Recording):
-        recorder, rows = (tape.compiled, tape.room, tape.quick), [tape.numbers]
+        recorder, rows = tape.recorder, [tape.numbers]
     params = _params(compiled, schedule=schedule, room=room, quick=quick, recorder=recorder)
     table, *rest = _bound([_numbers(inputs), *rows], params)
     return _outputs(compiled, table), Recorded(*rest) if rest else None
 
 
 def call_recording(
-    compiled: CompiledProgram, inputs: PyTree, *, room: int, quick: bool
+    compiled: CompiledProgram,
+    inputs: PyTree,
+    *,
+    room: int,
+    quick: bool,
+    tape: Recording | None = None,
 ) -> tuple[PyTree, Recording]:
     """`call`, but the records stay on the host."""
-    numbers = _numbers(inputs)
-    params = _params(compiled, room=room, quick=quick, wants=_Wanted.OUTPUTS)
-    (table,) = _bound([numbers], params)
-    return _outputs(compiled, table), Recording(numbers, compiled, room, quick)
+    reads = None if tape is None else tape.recorder
+    recorder = Recorder(compiled, room, quick, reads)
+    numbers = _numbers(inputs if tape is None else (inputs, tape.numbers))
+    (table,) = _bound([numbers], _params(compiled, recorder=recorder, wants=_Wanted.OUTPUTS))
+    return _outputs(compiled, table), Recording(numbers, recorder)
 
 
 def _params(
     compiled: CompiledProgram,
     *,
-    room: int,
-    quick: bool,
+    room: int = 0,
+    quick: bool = False,
     schedule: Schedule | None = None,
     wants: _Wanted = _Wanted.ALL,
-    recorder: tuple[CompiledProgram, int, bool] | None = None,
+    recorder: Recorder | None = None,
 ) -> dict[str, Any]:
     """Of the operation: what is run and how, and which part of what that gives is wanted."""
     return dict(
@@ -164,61 +169,54 @@ def _run(
     room: int,
     quick: bool,
     wants: _Wanted,
-    recorder: tuple[CompiledProgram, int, bool] | None,
+    recorder: Recorder | None,
 ) -> list[np.ndarray]:
     """Of inputs (n, k) and their tapes: outputs (n, o), and what was recorded."""
-    table = np.asarray(numbers).T
+    given = np.asarray(numbers)
+    if recorder is not None and wants is _Wanted.OUTPUTS:
+        return [recorder.outputs(given).T]
+    if recorder is not None and wants is _Wanted.COLUMNS:
+        return recorder.columns(given, np.asarray(tape))
     times = None if schedule is None else schedule.times
-    room = room if times is None else len(times)
-    rows = None if tape is None else np.asarray(tape)
-    if recorder is not None:
-        recording, length, short = recorder
-        found = _recording_run(recording, tape.shape[0], length, short)
-        rows = _HELD_BACK.rows(recording, np.asarray(tape).T, found)
-    if wants is _Wanted.ALL:
-        alone = quick and table.shape[1] == 1
+    alone = quick and len(given) == 1
+    width = compiled.width(len(given), default_threads())
+
+    def run(part: slice, rows: Sequence[np.ndarray] | None) -> list[np.ndarray]:
         outputs, recorded = compiled.run_table(
-            table, schedule=times, tape=rows, room=room, quick=alone
+            given[part].T,
+            schedule=times,
+            tape=rows,
+            room=room if times is None else len(times),
+            quick=alone,
+            width=width,
         )
         return [outputs.T, *(recorded or ())]
-    run = _recording_run(compiled, table.shape[1], room, quick)
-    if wants is _Wanted.COLUMNS:
-        assert rows is not None
-        return _HELD_BACK.columns(compiled, table, rows, room, run)
-    return [_HELD_BACK.ran(compiled, table, run).T]
 
-
-def _recording_run(
-    compiled: CompiledProgram, count: int, room: int, quick: bool
-) -> Callable[[np.ndarray], Tables]:
-    """Runs those of `count` simulations that nobody ran yet."""
-    # Also where these are few: another width would have to be compiled.
-    width = compiled.width(count, default_threads())
-
-    def run(table: np.ndarray) -> Tables:
-        alone = quick and table.shape[1] == 1
-        found, recorded = compiled.run_table(table, room=room, quick=alone, width=width)
-        assert recorded is not None
-        return found, *recorded
-
-    return run
+    if recorder is None:
+        return run(slice(None), None if tape is None else list(np.asarray(tape)))
+    parts = [slice(k, k + _BLOCK) for k in range(0, max(1, len(given)), _BLOCK)]
+    found = [run(part, recorder.rows(np.asarray(tape)[part])) for part in parts]
+    return [np.concatenate(each) for each in zip(*found, strict=True)]
 
 
 def _shapes(
-    count: int,
+    leaves: tuple[Any, ...],
     *,
     compiled: CompiledProgram,
     schedule: Schedule | None,
     room: int,
     wants: _Wanted,
+    recorder: Recorder | None,
     **_: Any,
 ) -> list[Any]:
-    numbers = compiled.outline.recorded
+    count = leaves[0].shape[0]
     if wants is _Wanted.COLUMNS:
-        assert numbers is not None
-        return [jax.ShapeDtypeStruct((count, 1 + room), jnp.float64)] * numbers
-    leaves = jtu.tree_leaves(compiled.outline.outputs)
-    size = sum(int(np.prod(leaf.shape)) for leaf in leaves)
+        assert recorder is not None
+        column = jax.ShapeDtypeStruct((count, 1 + recorder.room), jnp.float64)
+        return [column] * leaves[1].shape[1]
+    numbers = compiled.outline.recorded
+    outputs = jtu.tree_leaves(compiled.outline.outputs)
+    size = sum(int(np.prod(leaf.shape)) for leaf in outputs)
     found = [jax.ShapeDtypeStruct((count, size), jnp.float64)]
     if numbers is not None and wants is _Wanted.ALL:
         room = room if schedule is None else len(schedule.times)
@@ -232,7 +230,7 @@ def _implemented(*leaves: Any, **params: Any) -> list[Array]:
 
 
 def _abstract(*leaves: Any, **params: Any) -> list[Any]:
-    shapes = _shapes(leaves[0].shape[0], **params)
+    shapes = _shapes(leaves, **params)
     return [jax.core.ShapedArray(shape.shape, shape.dtype) for shape in shapes]
 
 

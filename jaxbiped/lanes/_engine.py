@@ -5,7 +5,7 @@ import ctypes
 import functools
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -18,6 +18,7 @@ from jaxbiped.lanes._kernel import ENTRY, kernel_text
 from jaxbiped.lanes._lane_by_lane import FIELDS
 from jaxbiped.lanes._machine_code import MachineCode, assembly, machine_code
 from jaxbiped.lanes._program import Graph, Outline, Program, graph_of, leaves_of, outline_of
+from jaxbiped.lanes._tapes import tapes_of
 
 THREADS_VARIABLE = "JAXBIPED_THREADS"
 """Environment variable: threads to use, else as many as the process has cores."""
@@ -64,6 +65,16 @@ class CompiledProgram:
         self._code: dict[int, MachineCode] = {}
         self._begun: set[int] = set()
         self._lock, self._making = threading.Lock(), threading.Lock()
+
+    @property
+    def backwards(self) -> bool:
+        """Whether it reads tapes from the last row on."""
+        return self._program.backwards
+
+    @functools.cached_property
+    def size(self) -> int:
+        """How many numbers the inputs of one simulation are."""
+        return sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(self._inputs))
 
     @functools.cached_property
     def outline(self) -> Outline:
@@ -142,7 +153,7 @@ class CompiledProgram:
         inputs: PyTree,
         *,
         schedule: np.ndarray | None = None,
-        tape: np.ndarray | None = None,
+        tape: Sequence[np.ndarray] | None = None,
         room: int = 0,
         threads: int | None = None,
         width: int | None = None,
@@ -153,7 +164,8 @@ class CompiledProgram:
         Args:
             inputs: of all simulations; 64-bit floating-point numbers, whatever they stand for.
             schedule: increasing times of the records, shape (m,), where the program has such.
-            tape: rows for each simulation, shape (n, rows, numbers), where the program reads such.
+            tape: rows for each simulation, n arrays (rows, numbers), where the program reads such;
+                from the last one on where it reads `backwards`.
             room: records that each simulation has room for.
             threads: how many to use; the environment's or the machine's choice unless given.
             width: simulations in one vector; the results do not depend on it.
@@ -185,7 +197,7 @@ class CompiledProgram:
         table: np.ndarray,
         *,
         schedule: np.ndarray | None = None,
-        tape: np.ndarray | None = None,
+        tape: Sequence[np.ndarray] | None = None,
         room: int = 0,
         threads: int | None = None,
         width: int | None = None,
@@ -196,10 +208,7 @@ class CompiledProgram:
         count = table.shape[1]
         outputs = np.full((len(self.graph.outputs), count), np.nan)
         times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
-        rows = np.zeros((count, 1, 0)) if tape is None else tape
-        rows = np.ascontiguousarray(rows, dtype=np.float64)
-        assert rows.shape[1] > 0
-        assert (rows.shape[0], rows.shape[2]) == (count, len(self.graph.row))
+        tapes = tapes_of(tape, count, len(self.graph.row), backwards=self.backwards)
         records = np.zeros((count, room, len(self.graph.recorded)))
         if schedule is not None:
             records[:] = np.nan
@@ -214,10 +223,11 @@ class CompiledProgram:
             records=records,
             record_counts=record_counts,
             schedule=times,
-            tape=rows,
+            tapes=tapes.starts,
+            tape_lengths=tapes.lengths,
         )
         numbers = dict(
-            count=count, record_room=room, schedule_length=len(times), tape_length=rows.shape[1]
+            count=count, record_room=room, schedule_length=len(times), tape_stride=tapes.stride
         )
         fields = np.array(
             [arrays[n].ctypes.data if n in arrays else numbers[n] for n in FIELDS], dtype=np.int64

@@ -10,6 +10,9 @@ import numpy as np
 Tables = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Of n simulations: outputs (numbers, n), records (n, room, numbers), and how many these are."""
 
+_BLOCK = 512
+"""Simulations that are run at once: there is room for as many records of each as it may make."""
+
 
 class HeldBack:
     """What simulations recorded, by program and inputs, as long as there is room for it.
@@ -32,14 +35,10 @@ class HeldBack:
 
     def rows(
         self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
-    ) -> np.ndarray:
-        """Records (n, longest, numbers), zeros beyond the last ones."""
+    ) -> list[np.ndarray]:
+        """Records of each simulation (records, numbers), or zeros where it made none."""
         known = self._known(program, inputs, run)
-        longest = max(1, *(len(records) for records in known))
-        found = np.zeros((len(known), longest, known[0].shape[1]))
-        for rows, records in zip(found, known, strict=True):
-            rows[: len(records)] = records
-        return found
+        return [each if len(each) else np.zeros((1, each.shape[1])) for each in known]
 
     def columns(
         self,
@@ -49,14 +48,14 @@ class HeldBack:
         room: int,
         run: Callable[[np.ndarray], Tables],
     ) -> list[np.ndarray]:
-        """Each number in a record as an array (n, 1 + room), NaN beyond the last record.
+        """The first k numbers in a record, each as an array (n, 1 + room), NaN beyond the last.
 
-        Before those recorded comes that of `first`, shape (n, numbers).
+        Before those recorded comes that of `first`, shape (n, k).
         """
         known = self._known(program, inputs, run)
         found = [np.empty((len(known), 1 + room)) for _ in first.T]
         for i, records in enumerate(known):
-            for column, start, values in zip(found, first[i], records.T, strict=True):
+            for column, start, values in zip(found, first[i], records.T, strict=False):
                 column[i, 0], column[i, 1 : 1 + len(values)] = start, values
                 column[i, 1 + len(values) :] = np.nan
         return found
@@ -78,8 +77,12 @@ class HeldBack:
         self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
     ) -> tuple[np.ndarray, list[np.ndarray]]:
         """Outputs and records of each simulation, which are held from now on."""
-        outputs, records, counts = run(inputs)
-        found = [each[:n].copy() for each, n in zip(records, counts, strict=True)]
+        every, found = [], []
+        for first in range(0, inputs.shape[1], _BLOCK):
+            outputs, records, counts = run(inputs[:, first : first + _BLOCK])
+            every.append(outputs)
+            found += [each[:n] for each, n in zip(records, counts, strict=True)]
+        outputs = np.concatenate(every, axis=1)
         with self._lock:
             for column, each in zip(inputs.T, found, strict=True):
                 key = program, column.tobytes()

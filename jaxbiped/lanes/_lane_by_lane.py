@@ -17,11 +17,12 @@ FIELDS = (
     "record_room",
     "schedule",
     "schedule_length",
-    "tape",
-    "tape_length",
+    "tapes",
+    "tape_lengths",
+    "tape_stride",
 )
 """What a kernel's entry takes: 64-bit numbers one behind the other, addresses among them."""
-_NUMBERS = ("count", "record_room", "schedule_length", "tape_length")
+_NUMBERS = ("count", "record_room", "schedule_length", "tape_stride")
 
 
 class Sizes(NamedTuple):
@@ -127,15 +128,17 @@ class Lanes:
         at = t.address(self.bits["rows"], Kind.I64, lane)
         place = t.assign(f"load i64, ptr {at}")
         index = t.assign(f"load i64, ptr {t.address(self.bits['index'], Kind.I64, lane)}")
-        first = t.assign(f"mul i64 {index}, {self.field['tape_length']}")
-        row = t.assign(f"mul i64 {t.assign(f'add i64 {first}, {place}')}, {self.sizes.row}")
+        first = t.assign(f"load i64, ptr {t.address(self.field['tapes'], Kind.I64, index)}")
+        first = t.assign(f"inttoptr i64 {first} to ptr")
+        row = t.assign(f"mul i64 {place}, {self.field['tape_stride']}")
         for k in range(self.sizes.row):
-            there = t.address(self.field["tape"], Kind.F64, t.assign(f"add i64 {row}, {k}"))
+            there = t.address(first, Kind.F64, t.assign(f"add i64 {row}, {k}"))
             number = t.assign(f"load double, ptr {there}")
             here = t.assign(f"add i64 {lane}, {k * self.width}")
             t.line(f"store double {number}, ptr {t.address(self.rooms.row, Kind.F64, here)}")
         following = t.assign(f"add i64 {place}, 1")
-        more = t.assign(f"icmp slt i64 {following}, {self.field['tape_length']}")
+        length = t.assign(f"load i64, ptr {t.address(self.field['tape_lengths'], Kind.I64, index)}")
+        more = t.assign(f"icmp slt i64 {following}, {length}")
         t.line(f"store i64 {t.assign(f'select i1 {more}, i64 {following}, i64 {place}')}, ptr {at}")
 
     def _copy(self, many: int, own: str, lane: str, array: str, index: str, *, out: bool) -> None:

@@ -26,6 +26,7 @@ class Program(NamedTuple):
             whether the simulation is over (boolean).
         tape: numbers in each row of a tape, of which every attempt reads the next row as a third
             argument, shape (tape,); behind the last row that one again. 0: there is none.
+        backwards: whether a tape is read from its last row on.
         finish: outputs, `finish(inputs, carried)`.
         record: `record(inputs, carried, next_time)` gives whether there is something to record
             (boolean) and what, a list of numbers. It is asked until it has nothing more where
@@ -39,6 +40,7 @@ class Program(NamedTuple):
     record: Callable[[PyTree, PyTree, Scalar], tuple[Scalar, Sequence[Scalar]]] | None = None
     scheduled: bool = False
     tape: int = 0
+    backwards: bool = False
 
 
 class Outline(NamedTuple):

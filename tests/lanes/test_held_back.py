@@ -30,7 +30,23 @@ def _powers():
     return CompiledProgram(program, (NUMBER, NUMBER))
 
 
-def _last_sum():
+def _doubled():
+    """Records twice the second number of each row; gives how many."""
+
+    def attempt(steps, carried, row):
+        count = carried[1] + 1.0
+        return (2.0 * row[1], count), count >= steps
+
+    def record(steps, carried, time):
+        return carried[1] > 0.0, [carried[1], carried[0]]
+
+    start = lambda steps: (jnp.zeros(()), jnp.zeros(()))
+    return CompiledProgram(
+        Program(start, attempt, lambda _, c: c[1], record=record, tape=2), NUMBER
+    )
+
+
+def _last_sum(*, backwards=False):
     """Σ of the second numbers in as many rows as the input says."""
 
     def attempt(steps, carried, row):
@@ -38,7 +54,8 @@ def _last_sum():
         return (total + row[1], count + 1.0), count + 1.0 >= steps
 
     start = lambda steps: (jnp.zeros(()), jnp.zeros(()))
-    return CompiledProgram(Program(start, attempt, lambda _, c: c[0], tape=2), NUMBER)
+    program = Program(start, attempt, lambda _, c: c[0], tape=2, backwards=backwards)
+    return CompiledProgram(program, NUMBER)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +94,7 @@ def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
 
 
 def test_what_is_no_longer_held_is_run_again(powers, runs, monkeypatch):
-    monkeypatch.setattr("jaxbiped.lanes._call._HELD_BACK", HeldBack(most=0))
+    monkeypatch.setattr("jaxbiped.lanes._recorder._HELD_BACK", HeldBack(most=0))
     _, recording = _recording(powers, 1.5, 2.0)
     _, values = recording.columns(np.array([0.0, 1.0]))
     np.testing.assert_array_equal(values[:3], [1.0, 1.5, 2.25])
@@ -98,6 +115,46 @@ def test_a_recording_is_another_programs_tape(powers, runs):
     np.testing.assert_allclose(np.nansum(values, axis=1), totals)
     assert runs == [3]
     assert float(both(jnp.asarray(2.0), jnp.asarray(3.0))[0]) == 14.0
+
+
+def test_a_recording_can_be_read_backwards(powers):
+    reader = _last_sum(backwards=True)
+
+    def last_two(factor, steps):
+        _, recording = _recording(powers, factor, steps)
+        return call(reader, jnp.asarray(2.0), tape=recording)[0]
+
+    factors, steps = jnp.array([2.0, 3.0, 0.5]), jnp.array([3.0, 4.0, 5.0])
+    sums = jax.jit(jax.vmap(last_two))(factors, steps)
+    np.testing.assert_allclose(sums, [12.0, 108.0, 0.09375])
+
+
+@pytest.mark.parametrize("most", [0, 1 << 20])
+def test_what_reads_a_recording_may_record_as_well(powers, monkeypatch, most):
+    monkeypatch.setattr("jaxbiped.lanes._recorder._HELD_BACK", HeldBack(most=most))
+    doubled, reader = _doubled(), _last_sum()
+
+    def total(factor, steps):
+        _, recording = _recording(powers, factor, steps)
+        count, twice = call_recording(doubled, steps, room=ROOM, quick=True, tape=recording)
+        return count, call(reader, steps, tape=twice)[0], twice.columns(jnp.zeros(1))[0]
+
+    factors, steps = jnp.array([2.0, 3.0]), jnp.array([3.0, 2.0])
+    counts, sums, numbers = jax.jit(jax.vmap(total))(factors, steps)
+    np.testing.assert_array_equal(counts, steps)
+    np.testing.assert_allclose(sums, [28.0, 24.0])
+    np.testing.assert_array_equal(numbers[:, :4], [[0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0, np.nan]])
+
+
+def test_more_than_are_run_at_once(powers):
+    reader = _last_sum()
+
+    def total(factor):
+        _, recording = _recording(powers, factor, jnp.asarray(2.0))
+        return call(reader, jnp.asarray(2.0), tape=recording)[0]
+
+    factors = jnp.linspace(0.1, 2.0, 1200)
+    np.testing.assert_allclose(jax.vmap(total)(factors), factors + factors**2)
 
 
 def test_leaves_can_be_stacked(powers):
@@ -121,7 +178,8 @@ def test_what_came_first_goes_first():
         np.testing.assert_array_equal(held.ran("program", np.array([[number]]), run), [[number]])
     held.rows("program", np.array([[3.0, 2.0]]), run)
     assert ran == [1.0, 2.0, 3.0]
-    assert held.rows("program", np.array([[1.0, 3.0]]), run).shape == (2, 2, 1)
+    rows = held.rows("program", np.array([[1.0, 3.0]]), run)
+    assert [each.shape for each in rows] == [(2, 1), (2, 1)]
     assert ran == [1.0, 2.0, 3.0, 1.0]
     held.rows("another", np.array([[3.0]]), run)
     assert ran == [1.0, 2.0, 3.0, 1.0, 3.0]

@@ -59,3 +59,12 @@ def test_tapes_under_jit_and_vmap():
 def test_a_tape_of_another_size_is_refused():
     with pytest.raises(AssertionError):
         _summing().run((np.ones(2), np.ones(2)), tape=np.ones((1, 3, 2)))
+
+
+def test_a_tape_can_be_read_backwards():
+    program = _summing()._program._replace(backwards=True)
+    number = jax.ShapeDtypeStruct((), jnp.float64)
+    backwards = CompiledProgram(program, (number, number))
+    tape = [np.arange(6.0).reshape(3, 2), np.arange(4.0).reshape(2, 2)]
+    total, _ = backwards.run((np.ones(2), np.ones(2)), tape=tape).outputs
+    np.testing.assert_array_equal(total, [4.0 + 10.0, 2.0 + 6.0])
