@@ -121,9 +121,9 @@ def _radius_slopes(
     vector, left = _leading(jacobian)
     value = left @ (jacobian.astype(vector.dtype) @ vector)
     # d|λ| is the real part of dλ in the direction of λ.
-    weight = jnp.conj(value) / jnp.abs(value) * left
+    weight = jnp.conj(value) * left
     turned = jnp.stack([vector.real, vector.imag])
-    weights = jnp.stack([weight.real, -weight.imag])
+    weights = jnp.stack([weight.real, -weight.imag]) / jnp.abs(value)
     family = slopes_of(last).recurring
     seeds, sizes = seeded(args, active, m)
     slopes = second_turn(turning, seeds, like, last, turned, weights, family, sizes)
