@@ -16,11 +16,10 @@ from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, PyTree
 
 from jaxbiped.lanes._engine import CompiledProgram, Recorded, default_threads
+from jaxbiped.lanes._held_back import BLOCK
 from jaxbiped.lanes._program import leaves_of
 from jaxbiped.lanes._recorder import Recorder
 
-_BLOCK = 512
-"""Simulations that read at once what others recorded: of more, that takes much memory."""
 _UNTRACED: contextvars.ContextVar[list[CompiledProgram] | None] = contextvars.ContextVar(
     "programs that may not be expressible", default=None
 )
@@ -194,7 +193,7 @@ def _run(
 
     if recorder is None:
         return run(slice(None), None if tape is None else list(np.asarray(tape)))
-    parts = [slice(k, k + _BLOCK) for k in range(0, max(1, len(given)), _BLOCK)]
+    parts = [slice(k, k + BLOCK) for k in range(0, max(1, len(given)), BLOCK)]
     found = [run(part, recorder.rows(np.asarray(tape)[part])) for part in parts]
     return [np.concatenate(each) for each in zip(*found, strict=True)]
 

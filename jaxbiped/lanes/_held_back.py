@@ -10,8 +10,8 @@ import numpy as np
 Tables = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Of n simulations: outputs (numbers, n), records (n, room, numbers), and how many these are."""
 
-_BLOCK = 512
-"""Simulations that are run at once: there is room for as many records of each as it may make."""
+BLOCK = 512
+"""Simulations that record, or read records, at once: all together would take much memory."""
 
 
 class HeldBack:
@@ -78,10 +78,13 @@ class HeldBack:
     ) -> tuple[np.ndarray, list[np.ndarray]]:
         """Outputs and records of each simulation, which are held from now on."""
         every, found = [], []
-        for first in range(0, inputs.shape[1], _BLOCK):
-            outputs, records, counts = run(inputs[:, first : first + _BLOCK])
+        for first in range(0, inputs.shape[1], BLOCK):
+            outputs, records, counts = run(inputs[:, first : first + BLOCK])
             every.append(outputs)
-            found += [each[:n] for each, n in zip(records, counts, strict=True)]
+            # Where they fill most of their room, that stays; else it would be held for little.
+            filled = 2 * np.sum(counts) >= records.shape[0] * records.shape[1]
+            own = [each[:n] for each, n in zip(records, counts, strict=True)]
+            found += own if filled else [each.copy() for each in own]
         outputs = np.concatenate(every, axis=1)
         with self._lock:
             for column, each in zip(inputs.T, found, strict=True):
