@@ -13,6 +13,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait._adjoint_step import Adjoints, adjoint_step
 from jaxbiped.gait._bent import Bent, renewed
 from jaxbiped.gait._collocated_step import Rows, linear_about
+from jaxbiped.gait._crossings import earlier_at
 from jaxbiped.gait._flow import Arrival, Flow
 from jaxbiped.gait._system import AbstractSystem
 from jaxbiped.gait._turned_solve import (
@@ -38,22 +39,21 @@ class _Given(NamedTuple):
     Attributes:
         args: parameters.
         arrival: time and state where the motion arrives.
-        turned: tangents V there, (v, c).
-        after: adjoints behind the arrival. As V, of components in their own order.
-        steps: how many the motion has.
+        turned: what `carried` gave.
+        after: adjoints behind the arrival, of components in their own order.
     """
 
     args: PyTree
     arrival: Any
-    turned: Any
+    turned: Turned
     after: Adjoints
-    steps: Any
 
 
 class _Now(NamedTuple):
-    """What is carried: adjoints where a step starts, in order, and how many steps are read."""
+    """What is carried: adjoints, in order, and the state where a step starts; steps read so far."""
 
     adjoints: Adjoints
+    state: Any
     count: Any
 
 
@@ -62,7 +62,7 @@ def carried(flow: Flow, nodes: Nodes, turned: Scalar) -> tuple[Turned, Recording
     given = TurnedGiven(flow.args.args, nodes.start, nodes.arrival, turned, nodes.steps)
     compiled = _compiled(_kind(flow), None)
     room = nodes.ends.recorder.room
-    return call_recording(compiled, given, room=room, quick=True, tape=nodes.ends)
+    return call_recording(compiled, given, room=room, quick=True, tape=nodes.ends, once=True)
 
 
 def pulled_back(
@@ -73,11 +73,11 @@ def pulled_back(
     Args:
         flow: what moves.
         nodes: of the motion.
-        turned, steps: of the turned tangents along it.
+        turned, steps: from `carried` along it.
         after: adjoints behind the arrival.
         final: whether the turn ends there: of that arrival tangents on the section are told.
     """
-    given = _Given(flow.args.args, nodes.arrival, turned.turned, after, turned.steps)
+    given = _Given(flow.args.args, nodes.arrival, turned, after)
     return call(_compiled(_kind(flow), final), given, tape=steps, quick=True)[0]
 
 
@@ -118,8 +118,8 @@ def _compiled(kind: _Kind, final: bool | None) -> CompiledProgram:
         given = TurnedGiven(args, row, row, turned, numbers())
         return CompiledProgram(TurnedSolve(flow, 1 + c).program(), given)
     after = Adjoints(turned, numbers(c), numbers(p))
-    program = _AdjointSolve(flow, Step.shape(c, p, COUNT), final).program()
-    return CompiledProgram(program, _Given(args, row, turned, after, numbers()))
+    program = _AdjointSolve(flow, Step.shape(c, COUNT), final).program()
+    return CompiledProgram(program, _Given(args, row, Turned(turned, numbers(c), numbers()), after))
 
 
 class _AdjointSolve:
@@ -142,7 +142,7 @@ class _AdjointSolve:
         after = given.after
 
         def behind(before: Adjoints) -> tuple[Scalar, Scalar]:
-            first = jnp.concatenate([given.turned, before.family[None]]).T
+            first = jnp.concatenate([given.turned.turned, before.family[None]]).T
             idle = jnp.zeros((COUNT, len(parameters)))
             seeds = jnp.concatenate([idle, before.parameters[None]]).T
             bent = Bent(first, before.second.T[:, None, :])
@@ -156,17 +156,22 @@ class _AdjointSolve:
             order.sorted(before.family),
             before.parameters + after.parameters,
         )
-        return _Now(adjoints, jnp.zeros(()))
+        return _Now(adjoints, given.turned.state, jnp.zeros(()))
 
     def attempt(self, given: _Given, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
         flow = self.flow(given)
         order, parameters = field_order(flow)
         step = Step.read(row, self.step)
         rows = Rows(flow.apart, order, list(parameters))
-        ends = (step.before, step.after)
-        linear = linear_about(rows, *ends, step.points, step.share, step.crossed)
-        count = now.count + 1.0
-        return _Now(adjoint_step(rows, linear, step, now.adjoints), count), count >= given.steps
+        crossed, ends = step.which > 0.0, (step.before, now.state)
+        linear = linear_about(rows, *ends, step.points, step.share, crossed)
+        early = jax.lax.cond(
+            crossed,
+            lambda: earlier_at(flow, flow.surfaces, now.state, step.which, parameters),
+            lambda: jnp.zeros(len(now.state) + len(parameters)),
+        )
+        before, count = adjoint_step(rows, linear, step, early, now.adjoints), now.count + 1.0
+        return _Now(before, step.before, count), count >= given.turned.steps
 
     def finish(self, given: _Given, now: _Now) -> Adjoints:
         order, _ = field_order(self.flow(given))

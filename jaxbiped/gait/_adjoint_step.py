@@ -24,8 +24,8 @@ class Adjoints(NamedTuple):
     parameters: Any
 
 
-def adjoint_step(rows: Rows, linear: Linear, step: Step, after: Adjoints) -> Adjoints:
-    """Adjoints before a step, from those behind it."""
+def adjoint_step(rows: Rows, linear: Linear, step: Step, early: Any, after: Adjoints) -> Adjoints:
+    """Adjoints before a step, from those behind it; `early` as from `earlier_at`."""
     order, stages = rows.order, linear.stages
     c, d, count = len(order.every), order.direct, len(step.turned)
     nowhere = jnp.zeros(c)
@@ -44,10 +44,10 @@ def adjoint_step(rows: Rows, linear: Linear, step: Step, after: Adjoints) -> Adj
     # By how much earlier the switch is crossed, which times the jump.
     jumps = [(linear.jump @ at_stages[v, 2]) @ after.second[v, d:] for v in range(count)]
     soon = sum(jumps[1:], jumps[0])
-    by_end = after.family + soon * order.sorted(step.early[:c])
+    by_end = after.family + soon * order.sorted(early[:c])
     family, forcing = pulled(curved[:, :c] + jnp.stack([nowhere, nowhere, by_end]))
     by_parameter = jnp.einsum("jk,jkp->p", forcing, linear.by_parameter)
-    own = jnp.sum(curved[:, c:], axis=0) + soon * step.early[c:]
+    own = jnp.sum(curved[:, c:], axis=0) + soon * early[c:]
     without = Adjoints(second, family, after.parameters + by_parameter + own)
     return _with_flow(linear, step, lost, without)
 

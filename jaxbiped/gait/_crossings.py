@@ -22,17 +22,19 @@ class Crossings(NamedTuple):
     No step is taken to cross two at once.
 
     Attributes:
-        crossed: whether there is one.
+        which: its number, counted from one; 0 where there is none.
         past: time from the switch to the step's end [s]; 0 where there is none.
         landed: states on the switch, or the steps' ends where there is none, shape (steps, c).
-        early: how much earlier a change of components and parameters makes the crossing,
-            shape (steps, c + p).
     """
 
-    crossed: Scalar
+    which: Scalar
     past: Scalar
     landed: Scalar
-    early: Scalar
+
+    @property
+    def crossed(self) -> Scalar:
+        """Whether there is one."""
+        return self.which > 0
 
 
 def crossings_of(
@@ -59,7 +61,7 @@ def crossing_of(
 ) -> Crossings:
     """The crossing of one step: the first in the switches' order, where there are several."""
     old, new = (jnp.concatenate([y, parameters]) for y in (before, after))
-    idle = jnp.zeros_like(parameters)
+    rate = _rate(rates, parameters)
 
     def values(z: Scalar) -> list[Scalar]:
         return [surface.value for surface in surfaces(z)]
@@ -67,40 +69,57 @@ def crossing_of(
     def live(z: Scalar) -> list[Any]:
         return [surface.live for surface in surfaces(z)]
 
-    def rate(z: Scalar) -> Scalar:
-        return jnp.concatenate([stacked(rates)(z), idle])
-
     velocity = rate(new)
     beyond, slopes = jax.jvp(values, (new,), (velocity,))
     changed = [(a > 0.0) != (b > 0.0) for a, b in zip(values(old), beyond, strict=True)]
-    found, chosen = jnp.asarray(False), []
-    for change, was, is_ in zip(changed, live(old), live(new), strict=True):
-        chosen.append(change & (was | is_) & ~found)
-        found = found | chosen[-1]
-
-    def picked(each: Sequence[Scalar], value: Any) -> Scalar:
-        for here, candidate in zip(chosen, each, strict=True):
-            value = jnp.where(here, candidate, value)
-        return value
+    which = jnp.asarray(0)
+    for number, (change, was, is_) in enumerate(zip(changed, live(old), live(new), strict=True)):
+        which = jnp.where(change & (was | is_) & (which == 0), 1 + number, which)
 
     def back(past: Scalar) -> Scalar:
         return new - past * rate(new - 0.5 * past * velocity)
 
-    def crossed() -> tuple[Scalar, Scalar, Scalar]:
-        slope = picked(slopes, 1.0)
-        first = picked(beyond, 0.0) / slope
+    def crossed() -> tuple[Scalar, Scalar]:
+        slope = _picked(which, slopes, 1.0)
+        first = _picked(which, beyond, 0.0) / slope
         # The switch's rate changes fast: once more from there.
-        past = first + picked(values(back(first)), 0.0) / slope
-        z = back(past)
-        rows = jax.jacrev(lambda z: jnp.stack([jnp.zeros(()), *values(z)]))(z)
-        gradient = picked(list(rows[1:]), jnp.zeros_like(z))
-        return past, z, gradient / jnp.where(found, gradient @ rate(z), 1.0)
+        past = first + _picked(which, values(back(first)), 0.0) / slope
+        return past, back(past)
 
-    def not_crossed() -> tuple[Scalar, Scalar, Scalar]:
-        return jnp.zeros(()), new, jnp.zeros_like(new)
+    past, z = jax.lax.cond(which > 0, crossed, lambda: (jnp.zeros(()), new))
+    return Crossings(which, past, z[: after.shape[0]])
 
-    past, z, early = jax.lax.cond(found, crossed, not_crossed)
-    return Crossings(found, past, z[: after.shape[0]], early)
+
+def earlier_at(
+    rates: Rates,
+    surfaces: Callable[[Scalar], Sequence[Switch]],
+    landed: Scalar,
+    which: Scalar,
+    parameters: Scalar,
+) -> Scalar:
+    """How much earlier a change of components and parameters makes a crossing, shape (c + p,).
+
+    Of the switch of number `which` at `landed`; zeros where there is none.
+    """
+    z = jnp.concatenate([landed, parameters])
+
+    def values(z: Scalar) -> Scalar:
+        return jnp.stack([jnp.zeros(()), *(surface.value for surface in surfaces(z))])
+
+    gradient = _picked(which, list(jax.jacrev(values)(z)[1:]), jnp.zeros_like(z))
+    return gradient / jnp.where(which > 0, gradient @ _rate(rates, parameters)(z), 1.0)
+
+
+def _rate(rates: Rates, parameters: Scalar) -> Callable[[Scalar], Scalar]:
+    """The rate of components and parameters, which do not change."""
+    return lambda z: jnp.concatenate([stacked(rates)(z), jnp.zeros_like(parameters)])
+
+
+def _picked(which: Scalar, each: Sequence[Scalar], value: Any) -> Scalar:
+    """That of the switch of this number, or `value` where there is none."""
+    for number, candidate in enumerate(each):
+        value = jnp.where(which == 1 + number, candidate, value)
+    return value
 
 
 def sides_of(rates: Rates, crossings: Crossings, parameters: Scalar) -> Scalar:
@@ -121,10 +140,8 @@ def jump_of(at_sides: Scalar) -> Scalar:
     return (new - old) / 3.0
 
 
-def bent_by(
-    jump: Scalar, crossings: Crossings, firsts: Scalar, seeds: Scalar, count: int
-) -> Scalar:
-    """Jumps of C at the end of each step, shape (steps, c, q, v); zero where none is crossed."""
+def bent_by(jump: Scalar, early: Scalar, firsts: Scalar, seeds: Scalar, count: int) -> Scalar:
+    """Jumps of C at the end of each step, shape (steps, c, q, v), from its `earlier_at`."""
     moved = with_seeds(firsts, seeds)
-    early = jnp.einsum("sz,szq->sq", crossings.early, moved[..., count:])
-    return jnp.einsum("scv,sq->scqv", jump @ moved[..., :count], early)
+    times = jnp.einsum("sz,szq->sq", early, moved[..., count:])
+    return jnp.einsum("scv,sq->scqv", jump @ moved[..., :count], times)

@@ -26,6 +26,7 @@ from jaxbiped.gait._crossings import (
     Crossings,
     bent_by,
     crossings_of,
+    earlier_at,
     jump_of,
     sides_of,
 )
@@ -167,7 +168,7 @@ def _linear(rates: Rates, path: Path, crossings: Crossings, parameters: Scalar) 
 
 
 def _chunk(
-    rates: Rates,
+    flow: Flow,
     path: Path,
     crossings: Crossings,
     parameters: Scalar,
@@ -176,7 +177,7 @@ def _chunk(
     count: int,
 ) -> Bent:
     c = path.before.shape[1]
-    linear = _linear(rates, path, crossings, parameters)
+    linear = _linear(flow, path, crossings, parameters)
     stages = collocation(path, linear.jacobians)
     step_map = stages.steps()
 
@@ -193,12 +194,15 @@ def _chunk(
     moved = with_seeds(at_stages[..., count:], seeds[:, count:])
 
     def source(turned: Scalar, turned_seeds: Scalar) -> Scalar:
-        bend = gradients(rates, linear.points, parameters, turned, turned_seeds)
+        bend = gradients(flow, linear.points, parameters, turned, turned_seeds)
         return stages.forced(bend @ moved)
 
     by_direction = jax.vmap(source, in_axes=(-1, -1), out_axes=-1)
     sources = by_direction(at_stages[..., :count], seeds[:, :count])
-    sources = sources + bent_by(linear.jump, crossings, ends, seeds, count)
+    early = jax.vmap(lambda y, which: earlier_at(flow, flow.surfaces, y, which, parameters))(
+        crossings.landed, crossings.which
+    )
+    sources = sources + bent_by(linear.jump, early, ends, seeds, count)
     shifted = _shifted(linear, arrived, shifts, seeds, count)
 
     def gather(second: Scalar, step: tuple[Scalar, ...]) -> tuple[Scalar, None]:

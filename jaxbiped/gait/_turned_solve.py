@@ -21,20 +21,18 @@ class Step(NamedTuple):
     """A step by collocation of the motion and its v turned tangents.
 
     Attributes:
-        before, after: states where it starts and ends, (c,).
+        before: state where it starts, (c,).
         points, share: as from `collocated`.
-        fresh, crossed: whether it starts, and whether it ends on a switch.
-        early: how much earlier a change of components and parameters makes it cross that, (c + p,).
+        fresh: whether it starts on a switch.
+        which: the number of the switch that it ends on, as in `Crossings`.
         turned: tangents where it starts, in order, before the flow is taken out of them, (v, c).
     """
 
     before: Any
-    after: Any
     points: Any
     share: Any
     fresh: Any
-    crossed: Any
-    early: Any
+    which: Any
     turned: Any
 
     def row(self) -> Scalar:
@@ -53,21 +51,18 @@ class Step(NamedTuple):
         return jax.tree.unflatten(structure, parts)
 
     @staticmethod
-    def shape(components: int, parameters: int, count: int) -> "Step":
+    def shape(components: int, count: int) -> "Step":
         """Shapes of a step's arrays."""
 
         def numbers(*shape: int) -> Any:
             return jax.ShapeDtypeStruct(shape, jnp.float64)
 
-        mark: Any = jax.ShapeDtypeStruct((), jnp.bool_)
         return Step(
             before=numbers(components),
-            after=numbers(components),
             points=numbers(3, components),
             share=numbers(3),
-            fresh=mark,
-            crossed=mark,
-            early=numbers(components + parameters),
+            fresh=jax.ShapeDtypeStruct((), jnp.bool_),
+            which=numbers(),
             turned=numbers(count, components),
         )
 
@@ -90,9 +85,10 @@ class TurnedGiven(NamedTuple):
 
 
 class Turned(NamedTuple):
-    """Outputs: tangents before the arrival (v, c), without flow; and the number of steps."""
+    """Outputs: tangents before the arrival (v, c), the state there, and the number of steps."""
 
     turned: Any
+    state: Any
     steps: Any
 
 
@@ -140,7 +136,7 @@ class TurnedSolve:
         order, parameters = field_order(flow)
         known = flow.earlier(given.start, parameters)
         t, state = known[0], known[1:]
-        shape = Step.shape(len(state), len(parameters), given.turned.shape[0])
+        shape = Step.shape(len(state), given.turned.shape[0])
         none, zero = jnp.asarray(False), jnp.zeros(())
         return _Now(
             node=state,
@@ -187,12 +183,10 @@ class TurnedSolve:
             taken=now.taken + 1.0,
             step=Step(
                 before=now.state,
-                after=crossing.landed,
                 points=points,
                 share=share,
                 fresh=now.fresh,
-                crossed=crossing.crossed,
-                early=crossing.early,
+                which=crossing.which.astype(float),
                 turned=now.turned,
             ),
             ends=jnp.asarray(True),
@@ -207,7 +201,7 @@ class TurnedSolve:
 
     def finish(self, given: TurnedGiven, now: _Now) -> Turned:
         order, _ = field_order(self.flow(given))
-        return Turned(order.restored(now.turned), now.taken)
+        return Turned(order.restored(now.turned), now.state, now.taken)
 
 
 def without_flow(turned: Scalar, velocity: Scalar, fresh: Scalar) -> tuple[Scalar, Scalar]:

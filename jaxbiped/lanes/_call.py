@@ -107,10 +107,11 @@ def call_recording(
     room: int,
     quick: bool,
     tape: Recording | None = None,
+    once: bool = False,
 ) -> tuple[PyTree, Recording]:
-    """`call`, but the records stay on the host."""
+    """`call`, but the records stay on the host; not for longer where they are read but `once`."""
     reads = None if tape is None else tape.recorder
-    recorder = Recorder(compiled, room, quick, reads)
+    recorder = Recorder(compiled, room, quick, once, reads)
     numbers = _numbers(inputs if tape is None else (inputs, tape.numbers))
     (table,) = _bound([numbers], _params(compiled, recorder=recorder, wants=_Wanted.OUTPUTS))
     return _outputs(compiled, table), Recording(numbers, recorder)

@@ -17,6 +17,7 @@ from jaxbiped.lanes._host import host
 from jaxbiped.lanes._kernel import ENTRY, kernel_text
 from jaxbiped.lanes._lane_by_lane import FIELDS
 from jaxbiped.lanes._machine_code import MachineCode, assembly, machine_code
+from jaxbiped.lanes._memory import Memory
 from jaxbiped.lanes._program import Graph, Outline, Program, graph_of, leaves_of, outline_of
 from jaxbiped.lanes._tapes import tapes_of
 
@@ -199,17 +200,22 @@ class CompiledProgram:
         schedule: np.ndarray | None = None,
         tape: Sequence[np.ndarray] | None = None,
         room: int = 0,
+        memory: Memory | None = None,
         threads: int | None = None,
         width: int | None = None,
         quick: bool = False,
     ) -> tuple[np.ndarray, Recorded | None]:
-        """`run` of inputs and outputs as tables (numbers, n), their leaves' entries in order."""
+        """`run` of inputs and outputs as tables (numbers, n), their leaves' entries in order.
+
+        Beyond records in given `memory` there is anything.
+        """
         table = np.ascontiguousarray(table, dtype=np.float64)
         count = table.shape[1]
         outputs = np.full((len(self.graph.outputs), count), np.nan)
         times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
         tapes = tapes_of(tape, count, len(self.graph.row), backwards=self.backwards)
-        records = np.zeros((count, room, len(self.graph.recorded)))
+        shape = (count, room, len(self.graph.recorded))
+        records = np.zeros(shape) if memory is None else memory.array(shape)
         if schedule is not None:
             records[:] = np.nan
         record_counts = np.zeros(count, dtype=np.int64)

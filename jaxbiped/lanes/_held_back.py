@@ -34,10 +34,22 @@ class HeldBack:
         return self._ran(program, inputs, run)[0]
 
     def rows(
-        self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
+        self,
+        program: Any,
+        inputs: np.ndarray,
+        run: Callable[[np.ndarray], Tables],
+        *,
+        once: bool = False,
     ) -> list[np.ndarray]:
-        """Records of each simulation (records, numbers), or zeros where it made none."""
+        """Records of each simulation (records, numbers), or zeros where it made none.
+
+        Those asked for but `once` are then held no longer.
+        """
         known = self._known(program, inputs, run)
+        if once:
+            with self._lock:
+                for column in inputs.T:
+                    self._drop((program, column.tobytes()))
         return [each if len(each) else np.zeros((1, each.shape[1])) for each in known]
 
     def columns(

@@ -7,8 +7,10 @@ import numpy as np
 
 from jaxbiped.lanes._engine import CompiledProgram, default_threads
 from jaxbiped.lanes._held_back import HeldBack, Tables
+from jaxbiped.lanes._memory import Memory
 
 _HELD_BACK = HeldBack(most=1 << 29)
+_MEMORY = Memory(most=1 << 29)
 
 
 class Recorder(NamedTuple):
@@ -19,12 +21,14 @@ class Recorder(NamedTuple):
     Attributes:
         compiled: the program; `room` for how many records, at most one for each row that it reads.
         quick: see `call`.
+        once: whether its records are read only once.
         reads: what recorded its tape, if it reads one.
     """
 
     compiled: CompiledProgram
     room: int
     quick: bool
+    once: bool = False
     reads: Optional["Recorder"] = None
 
     def outputs(self, numbers: np.ndarray) -> np.ndarray:
@@ -33,7 +37,8 @@ class Recorder(NamedTuple):
 
     def rows(self, numbers: np.ndarray) -> list[np.ndarray]:
         """Their records, as `HeldBack.rows`."""
-        return _HELD_BACK.rows(self, numbers.T, self._run_for(len(numbers)))
+        run = self._run_for(len(numbers))
+        return _HELD_BACK.rows(self, numbers.T, run, once=self.once)
 
     def columns(self, numbers: np.ndarray, first: np.ndarray) -> list[np.ndarray]:
         """Each number in their records, as `HeldBack.columns`."""
@@ -53,7 +58,7 @@ class Recorder(NamedTuple):
                 room = min(room, max(len(each) for each in rows))
             alone = self.quick and table.shape[1] == 1
             found, recorded = self.compiled.run_table(
-                own, tape=rows, room=room, quick=alone, width=width
+                own, tape=rows, room=room, memory=_MEMORY, quick=alone, width=width
             )
             assert recorded is not None
             return found, *recorded
