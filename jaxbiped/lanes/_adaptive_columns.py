@@ -88,8 +88,14 @@ class AdaptiveColumns:
 
     def attempt(self, given: Crossing, now: _Now) -> tuple[_Now, Scalar]:
         now = self._leapt(given, now)
+        times = (now.t, now.next_t)
         step = differentiated_step(
-            self.solver.tableau, self.watch.field, now.t, now.next_t, now.state, self._seeded(given)
+            self.solver.tableau,
+            self.watch.field,
+            *times,
+            now.state,
+            self._seeded(given),
+            steered=given.steered > 0.0,
         )
         moved, worst = self._columns(given, now, step)
         error = jtu.tree_map(lambda e: jnp.where(jnp.isnan(e), jnp.inf, e), step.error)

@@ -53,10 +53,13 @@ def differentiated_step(
     t1: Any,
     y0: PyTree,
     args: Seeded,
+    *,
+    steered: Any,
 ) -> Differentiated:
     """A step of an autonomous system of scalars, with all that its derivatives share.
 
-    Of the arguments the active leaves are differentiated by, p of them.
+    Of the arguments the active leaves are differentiated by, p of them; only where `steered`, else
+    these derivatives are zero.
     """
     start, join = split(y0)
     parameters = active_leaves(args)
@@ -73,7 +76,9 @@ def differentiated_step(
             every = rates(t0, y, q)
             return [every[i] for i in kept_in_order(stages)]
 
-        by_state, by_curvature, by_parameter = _derivatives(tableau, stages, kept_rates, parameters)
+        by_state, by_curvature, by_parameter = _derivatives(
+            tableau, stages, kept_rates, parameters, steered
+        )
     return Differentiated(
         tableau=tableau,
         stages=stages,
@@ -97,6 +102,7 @@ def _derivatives(
     stages: Stages,
     kept_rates: Callable[[Components, Sequence[Scalar]], Components],
     parameters: Sequence[Scalar],
+    steered: Any,
 ) -> tuple[Any, Any, Any]:
     """Of all stages A_i and B_i by components (stages, kept, c), A_i + B_i by parameters."""
     start, size = stages.start, len(tableau.alpha)
@@ -110,23 +116,28 @@ def _derivatives(
     def rates(z: Components) -> Components:
         return kept_rates(z[:count], z[count:])
 
-    def at_point(point: Any) -> Any:
-        return jacobian(rates, [*point, *parameters])
+    def apart(found: Any, known: Any) -> tuple[Any, Any]:
+        """By components, and by parameters what is known and what is found."""
+        nothing = jnp.zeros((len(found), len(parameters)))
+        by_parameter = known + found[:, count:]
+        return found[:, :count], jax.lax.cond(steered, lambda: by_parameter, lambda: nothing)
+
+    def at_point(point: Any) -> tuple[Any, Any]:
+        return apart(jacobian(rates, [*point, *parameters]), 0.0)
 
     def at_start(both: tuple[Any, Any]) -> tuple[Any, Any]:
-        along, by_parameter = list(both[0]), both[1]
+        along, known = list(both[0]), both[1]
 
         def turned(z: Components) -> Components:
             return jax.jvp(lambda y: kept_rates(y, z[count:]), (z[:count],), (along,))[1]
 
-        found = jacobian(turned, [*start, *parameters])
-        return found[:, :count], by_parameter + found[:, count:]
+        return apart(jacobian(turned, [*start, *parameters]), known)
 
     # Two short loops: what one keeps in registers and caches the other one need not.
     stacked = [jnp.stack([jnp.stack(each) for each in array]) for array in (points, directions)]
-    by_point = jax.lax.map(at_point, stacked[0])
-    by_start, by_parameter = jax.lax.map(at_start, (stacked[1], by_point[..., count:]))
-    return by_point[..., :count], by_start, by_parameter
+    by_point, known = jax.lax.map(at_point, stacked[0])
+    by_start, by_parameter = jax.lax.map(at_start, (stacked[1], known))
+    return by_point, by_start, by_parameter
 
 
 def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple[Any, Any]:

@@ -28,13 +28,7 @@ def kernel_text(graph: Graph, width: int, host: Host) -> str:
 class _Kernel:
     def __init__(self, graph: Graph, width: int, host: Host) -> None:
         self.graph, self.width = graph, width
-        results = [
-            *(v for group in (graph.first, graph.following) for a in group for v in a.ravel()),
-            graph.done,
-            *graph.outputs,
-            *([] if graph.recording is None else [graph.recording, *graph.recorded]),
-        ]
-        self.needed = Needed(results)
+        self.needed = Needed(graph.results())
         self.writer = Writer(width, host.width, host.scales, self.needed)
         self.t = self.writer.text
         sizes = Sizes(len(graph.inputs), len(graph.outputs), len(graph.recorded), len(graph.row))

@@ -39,7 +39,7 @@ class Needed:
                 continue
             self.values.add(id(value))
             found.append(value)
-            sources = [*_sources(value)]
+            sources = [*sources_of(value)]
             self._uses.update(id(s) for s in sources)
             stack.extend(sources)
         return found
@@ -53,7 +53,7 @@ class Needed:
                 return
 
 
-def _sources(value: Value) -> Iterable[Value]:
+def sources_of(value: Value) -> Iterable[Value]:
     """What a value is computed from; of a region, only what this one result needs."""
     if value.op in ("if", "map", "held", "taken"):
         # Its parts ask for what they need.

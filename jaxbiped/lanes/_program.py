@@ -13,6 +13,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.lanes._elements import KINDS, Array, array_of, converted
 from jaxbiped.lanes._emit import emit
 from jaxbiped.lanes._graph import Block, Kind, Value
+from jaxbiped.lanes._sunk import sink
 
 
 class Program(NamedTuple):
@@ -88,6 +89,12 @@ class Graph(NamedTuple):
     recorded: list[Value]
     scheduled: bool
 
+    def results(self) -> list[Value]:
+        """All that its operations are for."""
+        carried = [v for group in (self.first, self.following) for a in group for v in a.ravel()]
+        notes = [] if self.recording is None else [self.recording, *self.recorded]
+        return [*carried, self.done, *self.outputs, *notes]
+
 
 def outline_of(program: Program, inputs: PyTree) -> Outline:
     """Of a program for inputs of these shapes and dtypes."""
@@ -128,7 +135,7 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
         recorded = [converted(notes, v, Kind.F64) for a in values for v in a.ravel()]
     *following, done = following
     outputs = [converted(end, v, Kind.F64) for array in finals for v in array.ravel()]
-    return Graph(
+    graph = Graph(
         prepare=prepare,
         begin=begin,
         body=body,
@@ -147,6 +154,8 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
         recorded=recorded,
         scheduled=program.scheduled,
     )
+    sink(graph.results())
+    return graph
 
 
 def leaves_of(structure: PyTree, table: Any) -> list[Any]:
