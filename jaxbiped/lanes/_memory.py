@@ -8,11 +8,15 @@ import numpy as np
 
 
 class Memory:
-    """Gives arrays, and takes their memory back when nobody refers to them or to views of them."""
+    """Gives arrays, and takes their memory back when nobody refers to them or to views of them.
+
+    Attributes:
+        kept: bytes that wait to be used again.
+    """
 
     def __init__(self, most: int) -> None:
         """Keeps at most about `most` bytes that nobody uses."""
-        self._most, self._kept = most, 0
+        self.kept, self._most = 0, most
         self._free: defaultdict[int, list[np.ndarray]] = defaultdict(list)
 
     def array(self, shape: tuple[int, ...]) -> np.ndarray:
@@ -23,7 +27,7 @@ class Memory:
         capacity = max(-(-size // unit), 1) * unit
         try:
             owner = self._free[capacity].pop()
-            self._kept -= owner.nbytes
+            self.kept -= owner.nbytes
         except IndexError:
             owner = np.empty(capacity)
         # Views of an array refer to its owner: this one owns nothing, so they refer to it.
@@ -33,6 +37,6 @@ class Memory:
 
     def _take_back(self, owner: np.ndarray) -> None:
         # Called wherever garbage is found, by any thread: nothing here may wait for a lock.
-        if self._kept + owner.nbytes <= self._most:
-            self._kept += owner.nbytes
+        if self.kept + owner.nbytes <= self._most:
+            self.kept += owner.nbytes
             self._free[len(owner)].append(owner)

@@ -117,6 +117,15 @@ def test_a_recording_is_another_programs_tape(powers, runs):
     assert float(both(jnp.asarray(2.0), jnp.asarray(3.0))[0]) == 14.0
 
 
+def test_what_is_read_but_once_is_then_no_longer_held(powers, runs):
+    given = (jnp.asarray(0.25), jnp.asarray(2.0))
+    _, recording = call_recording(powers, given, room=ROOM, quick=True, once=True)
+    reader = _last_sum()
+    sums = [float(call(reader, jnp.asarray(2.0), tape=recording)[0]) for _ in range(3)]
+    assert sums == [0.3125] * 3
+    assert runs == [1, 1, 1]
+
+
 def test_a_recording_can_be_read_backwards(powers):
     reader = _last_sum(backwards=True)
 
