@@ -1,5 +1,6 @@
 """Memory that is used again: only what nobody refers to any more."""
 
+import concurrent.futures
 import gc
 
 import numpy as np
@@ -38,18 +39,46 @@ def test_memory_that_a_view_refers_to_is_not_given_again():
 
 
 def test_no_more_is_kept_than_allowed():
-    memory = Memory(most=10_000)
+    memory = Memory(most=20_000)
     arrays = [memory.array((1000,)) for _ in range(3)]
     places = [_address(each) for each in arrays]
-    owners = [each.base for each in arrays]
-    del arrays
-    while owners:
-        owners.pop(0)
-    # There is room for one of 8192 bytes: what came first.
-    assert memory.kept == 8192
-    again = memory.array((1000,))
-    assert _address(again) == places[0]
+    while arrays:
+        arrays.pop(0)
+    # There is room for two of 8192 bytes: the last ones.
+    assert memory.kept == 2 * 8192
+    again = [memory.array((1000,)) for _ in range(2)]
+    assert [_address(each) for each in again] == [places[2], places[1]]
     assert memory.kept == 0
+    del again
+    memory.array((10_000,))
+    assert memory.kept == 2 * 8192
+
+
+def test_other_sizes_make_room():
+    memory = Memory(most=20_000)
+    for size in (100, 1000, 1500, 2000):
+        array = memory.array((size,))
+        where = _address(array)
+        del array
+        assert _address(memory.array((size,))) == where
+        assert memory.kept <= 20_000
+
+
+def test_threads_never_share_memory():
+    memory = Memory(most=1 << 20)
+
+    def use(number):
+        for _ in range(300):
+            array = memory.array((50,))
+            array[:] = number
+            view = array[10:]
+            del array
+            if not np.all(view == number):
+                return False
+        return True
+
+    with concurrent.futures.ThreadPoolExecutor(8) as threads:
+        assert all(threads.map(use, range(8)))
 
 
 @pytest.mark.parametrize("shape", [(0, 5), (1,), (3, 0), (7, 11, 13)])
