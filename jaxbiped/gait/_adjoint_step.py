@@ -13,7 +13,6 @@ import jax.numpy as jnp
 
 from jaxbiped.gait._collocated_step import Linear, Rows
 from jaxbiped.gait._turned_solve import Step, without_flow
-from jaxbiped.solve._elimination import solution_by_blocks
 
 
 class Adjoints(NamedTuple):
@@ -30,13 +29,8 @@ def adjoint_step(rows: Rows, linear: Linear, step: Step, early: Any, after: Adjo
     c, d, count = len(order.every), order.direct, len(step.turned)
     nowhere = jnp.zeros(c)
     begun, lost = without_flow(step.turned, linear.velocity, step.fresh)
-    inverse = solution_by_blocks(stages.matrix, jnp.eye(len(stages.matrix)), len(order.kept))
-    at_stages = stages.carried(begun, lambda right: inverse @ right)
-
-    def pulled(u: Any) -> tuple[Any, Any]:
-        return stages.pulled(u, lambda found: inverse.T @ found)
-
-    ends = [pulled(jnp.stack([nowhere, nowhere, each])) for each in after.second]
+    at_stages = stages.carried(begun)
+    ends = [stages.pulled(jnp.stack([nowhere, nowhere, each])) for each in after.second]
     second = jnp.stack([start for start, _ in ends])
     weights = jnp.stack([forcing for _, forcing in ends], axis=1)
     tangents = order.restored(jnp.moveaxis(at_stages, 1, 0))
@@ -45,7 +39,7 @@ def adjoint_step(rows: Rows, linear: Linear, step: Step, early: Any, after: Adjo
     jumps = [(linear.jump @ at_stages[v, 2]) @ after.second[v, d:] for v in range(count)]
     soon = sum(jumps[1:], jumps[0])
     by_end = after.family + soon * order.sorted(early[:c])
-    family, forcing = pulled(curved[:, :c] + jnp.stack([nowhere, nowhere, by_end]))
+    family, forcing = stages.pulled(curved[:, :c] + jnp.stack([nowhere, nowhere, by_end]))
     by_parameter = jnp.einsum("jk,jkp->p", forcing, linear.by_parameter)
     own = jnp.sum(curved[:, c:], axis=0) + soon * early[c:]
     without = Adjoints(second, family, after.parameters + by_parameter + own)

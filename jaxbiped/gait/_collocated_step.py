@@ -14,7 +14,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait._crossings import SIDES, jump_of
 from jaxbiped.gait._radau import RADAU, Path
 from jaxbiped.lanes._accumulation import jacobian
-from jaxbiped.solve._elimination import solution_by_blocks
+from jaxbiped.solve._elimination import BlockFactors, factored
 from jaxbiped.solve._landing import MARGIN
 from jaxbiped.solve._linearisation import linearise
 
@@ -65,13 +65,13 @@ class Stages(NamedTuple):
         order: of the components.
         weights: of the rates at the three collocation points in the changes up to each, (3, 3).
         by_direct: Jacobian of the kept rates by the d direct components there, (3, k, d).
-        matrix: of the equations of the kept components at all points, (3 k, 3 k).
+        factors: of the equations of the kept components at all points, 3 k of them.
     """
 
     order: Order
     weights: Any
     by_direct: Any
-    matrix: Any
+    factors: BlockFactors
 
     @staticmethod
     def of(order: Order, share: Any, jacobians: Any) -> "Stages":
@@ -87,37 +87,29 @@ class Stages(NamedTuple):
             nothing = jnp.zeros((3, k, 3, k - d))
             blocks = blocks + jnp.concatenate([twice, nothing], axis=-1)
         matrix = jnp.eye(3 * k) - blocks.reshape(3 * k, 3 * k)
-        return Stages(order, weights, by_direct, matrix)
+        return Stages(order, weights, by_direct, factored(matrix, k))
 
-    def solve(self, right: Any, forcing: Any, solved: Callable[[Any], Any]) -> Any:
-        """u of (I − A ⊗ J) u = r + (A ⊗ I) b, shape (3, c), of r (3, c) and b of the kept (3, k).
-
-        `solved` gives what the matrix takes to a vector.
-        """
+    def solve(self, right: Any, forcing: Any) -> Any:
+        """u of (I − A ⊗ J) u = r + (A ⊗ I) b, shape (3, c); r (3, c), b of the kept (3, k)."""
         d = self.order.direct
         direct, kept = right[:, :d], right[:, d:]
         pushed = forcing + (self.by_direct @ direct[..., None])[..., 0] if d else forcing
-        found = solved((kept + self.weights @ pushed).reshape(-1)).reshape(3, -1)
+        found = self.factors.solve((kept + self.weights @ pushed).reshape(-1)).reshape(3, -1)
         if not d:
             return found
         return jnp.concatenate([direct + self.weights @ found[:, :d], found], axis=1)
 
-    def eliminated(self, right: Any) -> Any:
-        """What the matrix takes to a vector; what several have in common lanes compute once."""
-        return solution_by_blocks(self.matrix, right[:, None], len(self.order.kept))[:, 0]
-
-    def carried(self, tangents: Any, solved: Callable[[Any], Any]) -> Any:
+    def carried(self, tangents: Any) -> Any:
         """Tangents at the points, (v, 3, c), of those where the step starts, (v, c)."""
         unforced = jnp.zeros((3, len(self.order.kept)))
-        every = [self.solve(jnp.stack([start] * 3), unforced, solved) for start in tangents]
+        every = [self.solve(jnp.stack([start] * 3), unforced) for start in tangents]
         return jnp.stack(every)
 
-    def pulled(self, u: Any, solved: Callable[[Any], Any]) -> tuple[Any, Any]:
+    def pulled(self, u: Any) -> tuple[Any, Any]:
         """Derivatives of a sum of u by r, where that is one vector for all points, and by b.
 
         Args:
             u: weights in the sum, (3, c).
-            solved: gives what the transposed matrix takes to a vector.
 
         Returns:
             Shapes (c,) and (3, k).
@@ -127,7 +119,7 @@ class Stages(NamedTuple):
         if d:
             follows = self.weights.T @ direct
             found = found + jnp.concatenate([follows, jnp.zeros_like(found[:, d:])], axis=1)
-        kept = solved(found.reshape(-1)).reshape(3, -1)
+        kept = self.factors.solve_transposed(found.reshape(-1)).reshape(3, -1)
         forcing = self.weights.T @ kept
         by_kept = jnp.sum(kept, axis=0)
         if not d:
@@ -248,4 +240,4 @@ def _corrected(rows: Rows, path: Path, part: Any, share: Any, begins: Any, ends:
     stages = Stages.of(order, share, found)
     residual = order.sorted(points - path.before - (RADAU * share) @ velocities)
     unforced = jnp.zeros((3, len(order.kept)))
-    return points - order.restored(stages.solve(residual, unforced, stages.eliminated))
+    return points - order.restored(stages.solve(residual, unforced))

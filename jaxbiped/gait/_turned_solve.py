@@ -178,7 +178,7 @@ class TurnedSolve:
             state=crossing.landed,
             fresh=crossing.crossed,
             switched=jnp.where(crossing.crossed, end, now.switched),
-            turned=stages.carried(begun, stages.eliminated)[:, 2],
+            turned=stages.carried(begun)[:, 2],
             read=read,
             taken=now.taken + 1.0,
             step=Step(

@@ -7,7 +7,7 @@ XLA repeats operations in each of their consumers, and with a substitution, each
 needs those before, `simulate` took 4.1 s to compile instead of 2.6.
 """
 
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 
@@ -59,21 +59,71 @@ def solution(matrix: Scalar, right: Scalar) -> Scalar:
     return jnp.stack(found[::-1])
 
 
-def solution_by_blocks(matrix: Scalar, right: Scalar, size: int) -> Scalar:
-    """The solutions of a system (n, n) of square blocks of so many rows, right sides (n, m).
+class BlockFactors(NamedTuple):
+    """L and U of a matrix of square blocks, n rows in all. Only those of a block change places.
 
-    Only the rows of a block take turns as pivots: for a method's stages, whose blocks on the
-    diagonal are those of implicit steps, which have inverses.
+    For a method's stages, whose blocks on the diagonal are those of implicit steps, which have
+    inverses.
+
+    Attributes:
+        lower: of each row of blocks, those of L left of its diagonal, which is one.
+        upper: those of U right of its diagonal.
+        inverses: of U's diagonal.
     """
+
+    lower: list[list[Scalar]]
+    upper: list[list[Scalar]]
+    inverses: list[Scalar]
+
+    def solve(self, right: Scalar) -> Scalar:
+        """What the matrix takes to a vector (n,)."""
+        found: list[Scalar] = []
+        for row, part in zip(self.lower, self._parts(right), strict=True):
+            found.append(_without(part, row, found))
+        behind: list[Scalar] = []
+        for part in reversed(found):
+            k = len(found) - 1 - len(behind)
+            behind.insert(0, self.inverses[k] @ _without(part, self.upper[k], behind))
+        return jnp.concatenate(behind)
+
+    def solve_transposed(self, right: Scalar) -> Scalar:
+        """What its transpose takes to a vector (n,)."""
+        found: list[Scalar] = []
+        for k, part in enumerate(self._parts(right)):
+            column = [row[k - 1 - i].T for i, row in enumerate(self.upper[:k])]
+            found.append(self.inverses[k].T @ _without(part, column, found))
+        behind: list[Scalar] = []
+        for part in reversed(found):
+            k = len(found) - 1 - len(behind)
+            column = [row[k].T for row in self.lower[k + 1 :]]
+            behind.insert(0, _without(part, column, behind))
+        return jnp.concatenate(behind)
+
+    def _parts(self, right: Scalar) -> list[Scalar]:
+        return jnp.split(right, len(self.inverses))
+
+
+def factored(matrix: Scalar, size: int) -> BlockFactors:
+    """The factors of a matrix (n, n) of square blocks of so many rows."""
     count = len(matrix) // size
-    rows = jnp.split(jnp.concatenate([matrix, right], axis=1), count)
+    left = [jnp.split(row, count, axis=1) for row in jnp.split(matrix, count)]
+    found = BlockFactors([[] for _ in left], [], [])
     for k in range(count):
-        heads, rows = [row[:, :size] for row in rows], [row[:, size:] for row in rows]
-        rows[k] = _inverted(heads[k]) @ rows[k]
-        for i in range(count):
-            if i != k:
-                rows[i] = rows[i] - heads[i] @ rows[k]
-    return jnp.concatenate(rows)
+        first, *rest = left.pop(0)
+        found.inverses.append(_inverted(first))
+        found.upper.append(rest)
+        for i, row in enumerate(left):
+            head = row.pop(0) @ found.inverses[k]
+            found.lower[k + 1 + i].append(head)
+            row[:] = [entry - head @ above for entry, above in zip(row, rest, strict=True)]
+    return found
+
+
+def _without(part: Scalar, blocks: list[Scalar], known: list[Scalar]) -> Scalar:
+    """What is left of a right side when known unknowns are taken out."""
+    for block, each in zip(blocks, known, strict=True):
+        part = part - block @ each
+    return part
 
 
 def _inverted(block: Scalar) -> Scalar:
