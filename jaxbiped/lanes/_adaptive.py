@@ -1,7 +1,6 @@
 """The adaptive solve of a scene as a program for lanes: the same steps as through diffrax."""
 
 import contextlib
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import diffrax
@@ -13,10 +12,10 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._bristles import state_type
 from jaxbiped.dynamics._motion import vector_field
-from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import State, exchange_legs
+from jaxbiped.dynamics._state import State
 from jaxbiped.lanes._end_of_solve import clipped
 from jaxbiped.lanes._program import Program
+from jaxbiped.lanes._saved import Last, Saved
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import ending_code, ending_events
@@ -26,7 +25,6 @@ from jaxbiped.solve._rosenbrock import AbstractRosenbrock, step_of
 from jaxbiped.solve._step_control import first_step, step_control
 
 _TERM: Any = diffrax.ODETerm(vector_field)
-_BISECTIONS = 50
 
 
 class Solve(NamedTuple):
@@ -78,37 +76,8 @@ class _Now(NamedTuple):
     rejected: Scalar
     events: tuple[Scalar, ...]
     counted: Scalar
-    last: "_Last | None"
+    last: Last | None
     extremes: tuple[PyTree, PyTree] | None
-
-
-class _Last(NamedTuple):
-    """The last attempt: when it began, its dense output, and whether it is of note.
-
-    It is where it was accepted, or where there is a section, where it ended past an arrival there.
-    `changed` is whether the legs' names are exchanged for the next arrival.
-    """
-
-    noted: Scalar
-    changed: Scalar
-    t: Scalar
-    state: State
-    coefficients: tuple[State, ...]
-
-
-class Saved(NamedTuple):
-    """What a program saves of a simulation, besides its end. All hashable.
-
-    Attributes:
-        times: whether it records the state at the times of a schedule.
-        section: where it does; None: nowhere.
-        extremes: a function of (scene, state) whose extremes over the steps' ends are wanted, or
-            None.
-    """
-
-    times: bool = False
-    section: AbstractSection | None = None
-    extremes: Callable[[Scene, State], PyTree] | None = None
 
 
 class AdaptiveSolve:
@@ -132,7 +101,6 @@ class AdaptiveSolve:
         fenced: bool = False,
     ) -> None:
         self.solver, self.counting, self.saved, self.fenced = solver, counting, saved, fenced
-        self.dense = saved.times or saved.section is not None
         self.events = ending_events(watch)
 
     def program(self) -> Program:
@@ -141,7 +109,7 @@ class AdaptiveSolve:
             self.start,
             self.attempt,
             self.finish,
-            record=self.record if self.dense else None,
+            record=self.record if self.saved.within else None,
             scheduled=self.saved.times,
         )
 
@@ -158,11 +126,7 @@ class AdaptiveSolve:
             self._error_order(),
         )
         count = jnp.zeros((), dtype=jnp.int64)
-        last = None
-        if self.dense:
-            nothing = jtu.tree_map(jnp.zeros_like, solve.state)
-            rows = len(self.solver.tableau.dense)
-            last = _Last(none, jnp.asarray(True), zero, nothing, tuple([nothing] * rows))
+        last = self.saved.first(solve.state, self.solver) if self.saved.within else None
         events = tuple([none] * len(self.events))
         extremes = None
         if self.saved.extremes is not None:
@@ -188,6 +152,17 @@ class AdaptiveSolve:
             events.append(happened & none)
             none = none & ~happened
         counted = jnp.asarray(result != diffrax.RESULTS.successful)
+        last = now.last
+        if last is not None:
+            last = self.saved.following(
+                solve.scene,
+                last,
+                began=(now.t, now.state),
+                ended=state,
+                keep=keep,
+                moving=now.accepted > 0,
+                dense=dense,
+            )
         after = _Now(
             t=t,
             next_t=next_t,
@@ -197,7 +172,7 @@ class AdaptiveSolve:
             rejected=now.rejected + (1 - one),
             events=tuple(events),
             counted=counted,
-            last=self._last(solve.scene, now, keep, state, dense) if self.dense else None,
+            last=last,
             extremes=self._extremes(solve.scene, now, keep, state),
         )
         attempts = (after.accepted + after.rejected).astype(solve.most_attempts.dtype)
@@ -219,44 +194,11 @@ class AdaptiveSolve:
         return Solved(now.t, now.state, code, now.accepted, now.rejected, low, high)
 
     def record(self, solve: Solve, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-        """The state at a time within the last step, or at its arrival at the section."""
-        last = now.last
-        assert last is not None
-        dense = self.solver.interpolation_cls(
-            t0=last.t, t1=now.t, y0=last.state, y1=now.state, coefficients=last.coefficients
-        )
-        section = self.saved.section
-        if section is None:
-            return last.noted & (time <= now.t), [time, *dense.evaluate(time)]
-
-        def arrival() -> list[Scalar]:
-            # The names that the arrival went by: they have been exchanged since.
-            def value(state: State) -> Scalar:
-                return section.value(solve.scene, _named(~last.changed, state))
-
-            def halve(_: Any, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
-                middle = 0.5 * (ends[0] + ends[1])
-                before = value(dense.evaluate(middle)) < 0.0
-                return jnp.where(before, middle, ends[0]), jnp.where(before, ends[1], middle)
-
-            time = jax.lax.fori_loop(0, _BISECTIONS, halve, (last.t, now.t))[1]
-            return [time, *dense.evaluate(time)]
-
-        nothing = [jnp.zeros_like(now.t)] * (1 + len(now.state))
-        return last.noted, jax.lax.cond(last.noted, arrival, lambda: nothing)
-
-    def _last(
-        self, scene: Scene, now: _Now, keep: Scalar, state: State, dense: tuple[State, ...]
-    ) -> _Last:
+        """See `Saved.record`."""
         assert now.last is not None
-        section, changed, noted = self.saved.section, now.last.changed, keep
-        if section is not None:
-            before, after = (_named(changed, y) for y in (now.state, state))
-            rises = (section.value(scene, before) < 0.0) & (section.value(scene, after) >= 0.0)
-            # The first step of a solve never counts, so it may start on its section.
-            noted = keep & (now.accepted > 0) & rises & section.counts(scene, after)
-            changed = changed ^ noted
-        return _Last(noted, changed, now.t, now.state, dense)
+        return self.saved.record(
+            solve.scene, now.last, now=(now.t, now.state), due=time, solver=self.solver
+        )
 
     def _extremes(
         self, scene: Scene, now: _Now, keep: Scalar, state: State
@@ -280,11 +222,6 @@ class AdaptiveSolve:
 
     def _error_order(self) -> Any:
         return self.solver.error_order(_TERM)
-
-
-def _named(changed: Scalar, state: State) -> State:
-    """The state with its legs' names exchanged, where they are."""
-    return jtu.tree_map(lambda a, b: jnp.where(changed, a, b), exchange_legs(state), state)
 
 
 def _numbers(values: PyTree) -> PyTree:

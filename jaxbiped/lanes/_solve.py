@@ -14,11 +14,13 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._motion import vector_field
 from jaxbiped.dynamics._state import State
 from jaxbiped.dynamics._switches import switches
-from jaxbiped.lanes._adaptive import AdaptiveSolve, Saved, Solve, Solved, shapes_of
+from jaxbiped.lanes._adaptive import AdaptiveSolve, Solve, Solved, shapes_of
 from jaxbiped.lanes._call import Schedule, call
 from jaxbiped.lanes._crossed import Crossed
 from jaxbiped.lanes._crossing import cross
+from jaxbiped.lanes._emit import UnknownPrimitiveError
 from jaxbiped.lanes._engine import CompiledProgram, Recorded
+from jaxbiped.lanes._saved import Saved
 from jaxbiped.solve._columns import Seeded, Tangents
 from jaxbiped.solve._landing import Watch
 from jaxbiped.solve._passage import Precision
@@ -79,6 +81,15 @@ def solved_and_saved(
     return call(compiled, solve, schedule, room=room, quick=setting.quick)
 
 
+def solved_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[Solved, np.ndarray]:
+    """One simulation, not traced, and the records of its at most so many steps, (n, numbers)."""
+    compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
+    one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], solve)
+    outputs, recorded = compiled.run(one, room=most, width=1, quick=setting.quick)
+    assert recorded is not None
+    return jtu.tree_map(lambda leaf: leaf[0], outputs), recorded.values[0, : recorded.counts[0]]
+
+
 @functools.lru_cache(maxsize=256)
 def compiled_solve(setting: Setting, scene: Any) -> CompiledProgram:
     """The program for scenes of one structure (see `jax.tree.structure`)."""
@@ -87,6 +98,16 @@ def compiled_solve(setting: Setting, scene: Any) -> CompiledProgram:
     )
     placeholder = jtu.tree_unflatten(scene, [0.0] * scene.num_leaves)
     return CompiledProgram(body.program(), shapes_of(placeholder))
+
+
+@functools.lru_cache(maxsize=256)
+def expressible(setting: Setting, scene: Any) -> bool:
+    """Whether lanes have all operations of scenes of this structure (see `jax.tree.structure`)."""
+    try:
+        compiled_solve(setting, scene).check()
+    except UnknownPrimitiveError:
+        return False
+    return True
 
 
 @functools.lru_cache(maxsize=256)

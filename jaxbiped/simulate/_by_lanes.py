@@ -3,16 +3,28 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+import diffrax
 import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import Array
 
 from jaxbiped._types import Scalar
-from jaxbiped.lanes._adaptive import Saved, Solve
+from jaxbiped.dynamics._state import State
+from jaxbiped.lanes._adaptive import Solve, Solved
 from jaxbiped.lanes._end_of_solve import almost
-from jaxbiped.lanes._solve import Setting, compiled_solve, solved, solved_and_saved
+from jaxbiped.lanes._saved import Saved
+from jaxbiped.lanes._solve import (
+    Setting,
+    compiled_solve,
+    expressible,
+    solved,
+    solved_and_saved,
+    solved_step_by_step,
+)
 from jaxbiped.scene._scene import Scene
+from jaxbiped.simulate._recorded_steps import recorded_steps
 from jaxbiped.solve._footstep_limit import PATIENCE
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.solve._trajectory import Trajectory
@@ -27,11 +39,14 @@ _QUICK = 100_000
 
 def by_lanes(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`."""
-    if run.times is None and run.section is None:
+    dense, recorded = None, None
+    if run.save_steps:
+        ended, t, state, dense = _step_by_step(run)
+    elif run.times is None and run.section is None:
         if run.extremes is None:
-            ended, recorded = solved(_solve(run), _setting(run)), None
+            ended = solved(_solve(run), _setting(run))
         else:
-            ended, recorded = solved_and_saved(_solve(run), _setting(run))
+            ended, _ = solved_and_saved(_solve(run), _setting(run))
         t = jnp.reshape(ended.t, (1,))
         state = jtu.tree_map(lambda leaf: jnp.reshape(leaf, (1,)), ended.state)
     else:
@@ -50,12 +65,17 @@ def by_lanes(run: "Simulation") -> Trajectory:
         ending=ended.ending,
         accepted=ended.accepted,
         rejected=ended.rejected,
-        dense=None,
+        dense=dense,
         arrivals=None if run.section is None or recorded is None else jnp.asarray(recorded.counts),
         lowest=ended.lowest,
         highest=ended.highest,
         engine="lanes",
     )
+
+
+def can_by_lanes(run: "Simulation") -> bool:
+    """Whether lanes have all operations that a request needs."""
+    return expressible(_setting(run), jtu.tree_structure(run.scene))
 
 
 def prepared_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
@@ -64,16 +84,29 @@ def prepared_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
     Where only the end is asked for, what JAX does around it is compiled as well.
     """
     compiled_solve(_setting(run), jtu.tree_structure(run.scene)).code(1)
-    return _compiled if run.times is None and run.section is None else by_lanes
+    only_the_end = run.times is None and run.section is None and not run.save_steps
+    return _compiled if only_the_end else by_lanes
 
 
 _compiled = eqx.filter_jit(by_lanes)
 
 
+def _step_by_step(run: "Simulation") -> tuple[Solved, Array, State, diffrax.DenseInterpolation]:
+    setting = _setting(run)
+    ended, rows = solved_step_by_step(_solve(run), setting, most=run.max_solver_steps)
+    ended = jtu.tree_map(jnp.asarray, ended)
+    return ended, *recorded_steps(run.state, rows, setting.solver)
+
+
 def _setting(run: "Simulation") -> Setting:
     assert isinstance(run.solver, AbstractRosenbrock)
     quick = run.max_solver_steps <= _QUICK
-    saved = Saved(run.times is not None, run.section, run.extremes)
+    saved = Saved(
+        steps=run.save_steps,
+        times=run.times is not None,
+        section=run.section,
+        extremes=run.extremes,
+    )
     return Setting(run.solver, run.watch, run.steps is not None, quick, saved)
 
 

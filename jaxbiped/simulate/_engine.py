@@ -31,7 +31,7 @@ def chosen_engine(
         ArgumentError: an unknown name, or lanes for what they cannot do.
     """
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(leaves))
-    obstacle = _obstacle(solver, save_steps, adjoint, leaves, times)
+    obstacle = _obstacle(solver, save_steps, adjoint, leaves, times, traced=traced)
     if redundant or dt is not None:
         what = "redundant coordinates are" if redundant else "steps of one size (dt) are"
         obstacle = f"{what} diffrax's"
@@ -53,12 +53,14 @@ def _by_lanes_only(section: AbstractSection | None, extremes: Any) -> str | None
     return None if extremes is None else "extremes"
 
 
-def _obstacle(solver: Any, save_steps: bool, adjoint: Any, leaves: Any, times: Any) -> str | None:
+def _obstacle(
+    solver: Any, save_steps: bool, adjoint: Any, leaves: Any, times: Any, *, traced: bool
+) -> str | None:
     """Why lanes cannot do what is asked."""
     if not isinstance(solver, AbstractRosenbrock):
         return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
-    if save_steps:
-        return 'it does not save every step (save="steps")'
+    if save_steps and traced:
+        return 'under jit, vmap or derivatives it does not save every step (save="steps")'
     if adjoint is not None:
         return "an adjoint is diffrax's"
     if isinstance(times, jax.core.Tracer):

@@ -17,7 +17,7 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.simulate._by_lanes import by_lanes, prepared_lanes
+from jaxbiped.simulate._by_lanes import by_lanes, can_by_lanes, prepared_lanes
 from jaxbiped.simulate._by_xla import by_xla
 from jaxbiped.simulate._engine import chosen_engine
 from jaxbiped.simulate._saved_times import check_times
@@ -131,6 +131,7 @@ class Simulation(eqx.Module):
     watch: tuple[str, ...] = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)
+    replaceable: bool = eqx.field(static=True)
     section: AbstractSection | None = eqx.field(static=True)
     most_arrivals: int = eqx.field(static=True)
     extremes: Callable[[Scene, State], PyTree] | None = eqx.field(static=True)
@@ -215,6 +216,7 @@ class Simulation(eqx.Module):
             watch=tuple(watch),
             max_solver_steps=int(max_solver_steps),
             engine=chosen,
+            replaceable=engine == "auto" and section is None and extremes is None,
             section=section,
             most_arrivals=int(most_arrivals),
             extremes=extremes,
@@ -222,14 +224,18 @@ class Simulation(eqx.Module):
 
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
-        return by_lanes(self) if self.engine == "lanes" else _trimmed(by_xla(self))
+        return by_lanes(self) if self._lanes_can() else _trimmed(by_xla(self))
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
-        if self.engine == "lanes":
+        if self._lanes_can():
             return CompiledSimulation(prepared_lanes(self), self)
         program = by_xla.lower(self).compile()  # type: ignore[attr-defined]
         return CompiledSimulation(program, self)
+
+    def _lanes_can(self) -> bool:
+        """Whether lanes are to run it: not where the choice is ours and they lack an operation."""
+        return self.engine == "lanes" and (not self.replaceable or can_by_lanes(self))
 
 
 class CompiledSimulation:

@@ -12,7 +12,8 @@ import jax.tree_util as jtu
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
-from jaxbiped.lanes._adaptive import AdaptiveSolve, Saved, Solve
+from jaxbiped.lanes._adaptive import AdaptiveSolve, Solve
+from jaxbiped.lanes._saved import Saved
 from jaxbiped.solve._ending import WATCHES
 from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, whole
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock

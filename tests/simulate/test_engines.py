@@ -1,6 +1,7 @@
 """The two engines give the same motions, and each is refused what it cannot do."""
 
 import diffrax
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
+from jaxbiped.lanes._emit import UnknownPrimitiveError
 from tests.reference import reference_states
 
 SCENES = {
@@ -95,6 +97,63 @@ def test_lanes_under_jit_and_vmap(save):
     )
 
 
+def test_every_step_and_the_motion_between_them_agree():
+    times = np.linspace(0.0, 0.5, 101)
+    ours, theirs = (
+        _end(jb.seed_state(), engine, duration=0.5, rtol=1e-8, save="steps")
+        for engine in ("lanes", "xla")
+    )
+    assert (ours.engine, theirs.engine) == ("lanes", "xla")
+    np.testing.assert_allclose(np.stack(ours.at(times)), np.stack(theirs.at(times)), atol=2e-7)
+    for walk in (ours, theirs):
+        assert walk.t.shape == (int(walk.accepted) + 1,) == walk.state.hip_x.shape
+        assert (float(walk.t[0]), float(walk.t[-1])) == (0.0, 0.5)
+        assert walk.at(walk.t[0]) == jb.seed_state()
+        assert np.isnan(walk.at(0.6).hip_x)
+
+
+@pytest.mark.parametrize("solver", ["rodas3p", "rodas4", "rodas4p", "rodas5p"])
+def test_the_motion_between_steps_is_the_independent_solutions(solver):
+    times, exact = reference_states()
+    walk = _end(jb.seed_state(), "lanes", duration=2.0, solver=solver, rtol=1e-8, save="steps")
+    np.testing.assert_allclose(np.stack(walk.at(times), axis=1), exact, atol=3e-5)
+    # The end of a step is the continuous solution there.
+    np.testing.assert_allclose(np.stack(walk.at(walk.t)), np.stack(walk.state), atol=1e-14)
+
+
+def test_every_step_ends_where_the_end_alone_does():
+    options = dict(duration=3.0, steps=2)
+    end, steps = (_end(jb.seed_state(), "lanes", save=s, **options) for s in ("end", "steps"))
+    assert end.final == steps.final
+    assert end.outcome == steps.outcome == jb.Ending.WALKING
+    assert (int(end.accepted), int(end.rejected)) == (int(steps.accepted), int(steps.rejected))
+    fallen = _end(jb.seed_state(), "lanes", jb.seed_scene(slope=0.04), duration=9.0, save="steps")
+    assert fallen.outcome == jb.Ending.FELL_FORWARD
+    few = _end(jb.seed_state(), "lanes", save="steps", max_solver_steps=5)
+    assert few.outcome == jb.Ending.OUT_OF_STEPS
+    assert len(few.t) == 1 + int(few.accepted) <= 6
+    nothing = _end(jb.seed_state()._replace(omega_1=1e200), "lanes", save="steps")
+    assert nothing.outcome == jb.Ending.SOLVER_FAILED
+
+
+def test_bristles_are_saved_step_by_step():
+    law = jb.LuGre(mu_static=0.5, mu_kinetic=0.4, v_s=1e-3, sigma_0=5e4, sigma_1=100.0)
+    scene = eqx.tree_at(lambda s: s.friction, SCENES["seed"], law)
+    times = jnp.linspace(0.0, 0.1, 31)
+    steps, timed = (_end(jb.seed_state(), "lanes", scene, save=s) for s in ("steps", times))
+    assert len(steps.at(times)) == 10
+    np.testing.assert_allclose(np.stack(steps.at(times)), np.stack(timed.state), atol=1e-13)
+
+
+@pytest.mark.parametrize("transform", [jax.jit, jax.jacfwd])
+def test_what_is_traced_is_not_saved_step_by_step_by_lanes(transform):
+    def run(speed):
+        return _end(jb.seed_state()._replace(hip_vx=speed), "lanes", save="steps").final.hip_x
+
+    with pytest.raises(jb.ArgumentError, match="under jit, vmap or derivatives"):
+        transform(run)(0.5)
+
+
 def test_batches_over_scenes_and_starts_at_once():
     def run(slope, speed):
         state = jb.seed_state()._replace(hip_vx=speed)
@@ -113,7 +172,8 @@ def test_auto_takes_lanes_where_it_can():
 
     assert chosen() == "lanes"
     assert chosen(save=jnp.linspace(0.0, 1.0, 3)) == "lanes"
-    assert chosen(engine="xla") == chosen(save="steps") == chosen(solver="kvaerno3") == "xla"
+    assert chosen(save="steps") == "lanes"
+    assert chosen(engine="xla") == chosen(dt=1e-4) == chosen(solver="kvaerno3") == "xla"
 
     def traced(speed):
         state = jb.seed_state()._replace(hip_vx=speed)
@@ -128,7 +188,6 @@ def test_auto_takes_lanes_where_it_can():
     ("options", "reason"),
     [
         (dict(engine="gpu"), "choose one of auto, xla, lanes"),
-        (dict(engine="lanes", save="steps"), "does not save every step"),
         (dict(engine="lanes", solver="kvaerno3"), "Kvaerno3 is not one of its solvers"),
         (dict(engine="lanes", adjoint=diffrax.ForwardMode()), "an adjoint is diffrax's"),
         (dict(save=jnp.array([0.0, 2.0])), "must be increasing times from 0 to 1"),
@@ -151,3 +210,23 @@ def test_lanes_compute_in_64_bits():
         _end(state, "lanes", soft)
     run = jb.Simulation.prepare(soft, state, duration=0.01, save="end")
     assert run.engine == "xla"
+
+
+class ErrorFunction(jb.AbstractFrictionLaw):
+    """Of an operation that lanes do not have."""
+
+    mu: float
+
+    def force(self, normal_force, slip_speed):
+        return -self.mu * normal_force * jax.scipy.special.erf(slip_speed / 1e-2)
+
+    def switches(self, slip_speed):
+        return ()
+
+
+def test_auto_leaves_to_xla_what_lanes_cannot_express():
+    scene = eqx.tree_at(lambda s: s.friction, SCENES["seed"], ErrorFunction(mu=0.5))
+    walk = _end(jb.seed_state(), "auto", scene, duration=1e-3, save="steps")
+    assert (walk.engine, walk.outcome) == ("xla", jb.Ending.WALKING)
+    with pytest.raises(UnknownPrimitiveError, match="'erf'"):
+        _end(jb.seed_state(), "lanes", scene, duration=1e-3)

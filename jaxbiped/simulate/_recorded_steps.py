@@ -1,0 +1,50 @@
+"""Trajectories from the steps that the lane engine records."""
+
+from typing import Any, NamedTuple
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+from jaxbiped.dynamics._state import State
+from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+
+_FEWEST = 512
+"""Room for steps in the continuous solution, doubled until they fit: few sizes are compiled."""
+
+
+class RecordedSteps(NamedTuple):
+    """The times [s] of a start and of n steps' ends, (n + 1,), the states there, and the rest."""
+
+    t: Array
+    state: State
+    dense: diffrax.DenseInterpolation
+
+
+def recorded_steps(start: State, rows: np.ndarray, solver: AbstractRosenbrock) -> RecordedSteps:
+    """From the records of `Saved(steps=True)`, shape (n, numbers), as diffrax would have them."""
+    kind: Any = type(start)
+    size, count = len(start), len(rows)
+    first = np.array([0.0, *(float(leaf) for leaf in start)])
+    ends = np.vstack([first, rows[:, : 1 + size]]).T.copy()
+    room = max(_FEWEST, 1 << (count - 1).bit_length())
+    times = np.full(room + 1, np.inf)
+    times[: count + 1] = ends[0]
+    infos = np.full((rows.shape[1] + size - 1, room), np.inf)
+    infos[:size, :count] = ends[1:, :-1]
+    infos[size:, :count] = rows[:, 1:].T
+    groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
+    # One transfer for all of them: each costs as much as several steps.
+    times, groups, t, states = jax.device_put((times, groups, ends[0], kind(*ends[1:])))
+    dense = diffrax.DenseInterpolation(
+        ts=times,
+        ts_size=jnp.asarray(count + 1),
+        infos=dict(y0=groups[0], y1=groups[1], coefficients=tuple(groups[2:])),
+        interpolation_cls=solver.interpolation_cls,
+        direction=jnp.asarray(1),
+        t0_if_trivial=jnp.zeros(()),
+        y0_if_trivial=start,
+    )
+    return RecordedSteps(t, states, dense)
