@@ -220,5 +220,4 @@ class SolveOptions:
     atol: float | None = None
     """Absolute tolerance (SI units); a hundredth of the relative one unless given."""
     engine: str = "auto"
-    """What computes: xla, lanes, or auto for the faster one that can; lanes do not save every step,
-    which a table of footsteps needs."""
+    """What computes: xla, lanes, or auto for the faster one that can."""

@@ -1,16 +1,14 @@
 """Footsteps: what a walk is counted and measured in."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped.dynamics._feet import Feet, feet, landings, standing_foot, touches
-from jaxbiped.dynamics._forces import foot_forces
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._contacts import Contacts, contacts
+from jaxbiped.dynamics._feet import Feet, landings, standing_foot
 from jaxbiped.gait._ledger import energy_ledger
-from jaxbiped.gait._samples import at_steps, moments_of_change, observed, sampled
+from jaxbiped.gait._samples import Samples, at_steps, moments_of_change, observed, sampled
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -53,12 +51,6 @@ class Footsteps(NamedTuple):
     energy_residual_J: np.ndarray  # noqa: N815 (joule)
 
 
-class _Load(NamedTuple):
-    normal: Any
-    penetration: Any
-    both: Any
-
-
 def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
     """Heel strikes: the foot ahead comes to touch, the other one having struck before.
 
@@ -66,10 +58,10 @@ def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
         ValueError: a trajectory without its continuous solution, or a batch of them.
     """
     trajectory.require_dense()
-    both, standing = at_steps(scene, trajectory, _feet_and_stance)
+    both = at_steps(scene, trajectory, contacts).feet
     before, after = (_part(both, part) for part in (slice(-1), slice(1, None)))
-    lands = np.stack([np.asarray(landing) for landing in landings(before, after)])
-    last = int(standing[0])
+    lands = np.stack(landings(before, after))
+    last = int(standing_foot(_part(both, 0)))
     found: list[tuple[int, int]] = []
     for k in np.flatnonzero(lands.any(axis=0)):
         for leg in (1, 2):
@@ -78,13 +70,13 @@ def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
                 last = leg
     steps = np.array([k for k, _ in found], dtype=int)
     foot = np.array([leg for _, leg in found], dtype=int)
+
+    def strikes(now: Contacts) -> np.ndarray:
+        first, second = now.touching
+        return np.where(foot[:, None] == 1, first, second)
+
     t = np.asarray(trajectory.t)
-    time = np.zeros(len(found))
-    for leg, condition in ((1, _first_touches), (2, _second_touches)):
-        mine = foot == leg
-        time[mine] = moments_of_change(
-            scene, trajectory, condition, t[steps[mine]], t[steps[mine] + 1]
-        )
+    time = moments_of_change(scene, trajectory, contacts, strikes, t[steps], t[steps + 1])
     return HeelStrikes(time, foot)
 
 
@@ -99,10 +91,10 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     if count == 0:
         return Footsteps(*[np.zeros(0)] * len(Footsteps._fields))
     time, foot = strikes
-    both = observed(scene, trajectory, feet, time)
+    both = observed(scene, trajectory, contacts, time).feet
     place = np.where(foot == 1, both.foot_1.x, both.foot_2.x)
     period, length = np.diff(time), np.diff(place)
-    loads = sampled(scene, trajectory, _loads, time)
+    loads = sampled(scene, trajectory, contacts, time)
     step = np.searchsorted(time, 0.5 * (loads.edges[1:] + loads.edges[:-1])) - 1
     ledger = energy_ledger(scene, trajectory, time)
     weight = float(scene.walker.total_mass * scene.ground.g)
@@ -111,44 +103,34 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
         period_s=period,
         length_m=length,
         speed_m_s=length / period,
-        peak_normal_N=_largest(loads.values.normal, step, count),
-        max_penetration_m=_largest(loads.values.penetration, step, count),
-        double_support_s=_double_support(scene, trajectory, time, loads.edges, loads.values.both),
+        peak_normal_N=_largest(_normal(loads.values), step, count),
+        max_penetration_m=_largest(_depth(loads.values), step, count),
+        double_support_s=_double_support(scene, trajectory, time, loads),
         cost_of_transport=(ledger.damper_loss + ledger.friction_loss) / (weight * length),
         energy_residual_J=ledger.residual,
     )
 
 
-def _feet_and_stance(scene: Scene, state: State) -> tuple[Feet, Any]:
-    both = feet(scene, state)
-    return both, standing_foot(both)
-
-
-def _part(both: Feet, part: slice) -> Feet:
+def _part(both: Feet, part: slice | int) -> Feet:
     return jax.tree_util.tree_map(lambda leaf: leaf[part], both)
 
 
-def _first_touches(scene: Scene, state: State) -> Any:
-    return touches(feet(scene, state).foot_1)
+def _both_carry(now: Contacts) -> np.ndarray:
+    return np.logical_and(*now.carrying)
 
 
-def _second_touches(scene: Scene, state: State) -> Any:
-    return touches(feet(scene, state).foot_2)
+def _normal(now: Contacts) -> np.ndarray:
+    """The larger normal force [N]."""
+    return np.maximum(now.forces.foot_1.normal, now.forces.foot_2.normal)
 
 
-def _both_carry(scene: Scene, state: State) -> Any:
-    forces = foot_forces(scene, state)
-    return (forces.foot_1.normal > 0.0) & (forces.foot_2.normal > 0.0)
-
-
-def _loads(scene: Scene, state: State) -> _Load:
-    forces = foot_forces(scene, state)
-    depths = [jnp.where(touches(foot), foot.penetration, 0.0) for foot in feet(scene, state)]
-    return _Load(
-        normal=jnp.maximum(forces.foot_1.normal, forces.foot_2.normal),
-        penetration=jnp.maximum(*depths),
-        both=(forces.foot_1.normal > 0.0) & (forces.foot_2.normal > 0.0),
+def _depth(now: Contacts) -> np.ndarray:
+    """The larger penetration of a foot that touches [m]."""
+    depths = (
+        np.where(touching, foot.penetration, 0.0)
+        for touching, foot in zip(now.touching, now.feet, strict=True)
     )
+    return np.maximum(*depths)
 
 
 def _largest(values: np.ndarray, step: np.ndarray, count: int) -> np.ndarray:
@@ -160,11 +142,11 @@ def _largest(values: np.ndarray, step: np.ndarray, count: int) -> np.ndarray:
 
 
 def _double_support(
-    scene: Scene, trajectory: Trajectory, time: np.ndarray, edges: np.ndarray, both: np.ndarray
+    scene: Scene, trajectory: Trajectory, time: np.ndarray, loads: Samples
 ) -> np.ndarray:
     """Time from each heel strike but the last until a foot carries nothing again [s]."""
-    durations = np.zeros(len(time) - 1)
-    carried = np.asarray(both.all(axis=1))
+    durations, edges = np.zeros(len(time) - 1), loads.edges
+    carried = np.all(_both_carry(loads.values), axis=1)
     spans = []
     for k, start in enumerate(time[:-1]):
         first = int(np.searchsorted(edges, start))
@@ -173,6 +155,6 @@ def _double_support(
             spans.append((k, edges[first + ends[0] - 1], edges[first + ends[0] + 1]))
     if spans:
         which, left, right = (np.array(column) for column in zip(*spans, strict=True))
-        released = moments_of_change(scene, trajectory, _both_carry, left, right)
+        released = moments_of_change(scene, trajectory, contacts, _both_carry, left, right)
         durations[which] = released - time[which]
     return durations

@@ -4,18 +4,20 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import as_float
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._between_steps import AT_ONCE, joined, parts
 from jaxbiped.solve._trajectory import Trajectory
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
-_BISECTIONS = 48
+_RESOLUTION = 2.0**48
+"""By how much an interval is narrowed down that holds a change."""
 
 
 class Samples(NamedTuple):
@@ -54,11 +56,8 @@ def observed(
     times: np.ndarray,
 ) -> PyTree:
     """`function(scene, state)` at times of any shape, as NumPy arrays of that shape."""
-    padded = _padded(np.ravel(times))
-    values = _observe(function, _as_arrays(scene), trajectory.dense, jnp.asarray(padded))
-    return jax.tree_util.tree_map(
-        lambda leaf: np.asarray(leaf)[: times.size].reshape(times.shape), values
-    )
+    values = applied(scene, trajectory.at(np.ravel(times)), function)
+    return jtu.tree_map(lambda leaf: leaf.reshape(times.shape), values)
 
 
 def at_steps(
@@ -70,62 +69,45 @@ def at_steps(
 
 def applied(scene: Scene, state: State, function: Callable[[Scene, State], PyTree]) -> PyTree:
     """`function(scene, state)` at states with leaves of shape (n,), as NumPy arrays."""
-    size = len(jax.tree_util.tree_leaves(state)[0])
-    states = jax.tree_util.tree_map(lambda leaf: jnp.asarray(_padded(np.asarray(leaf))), state)
-    values = _apply(function, _as_arrays(scene), states)
-    return jax.tree_util.tree_map(lambda leaf: np.asarray(leaf)[:size], values)
+    # With every leaf an array: a plain number would be compiled in.
+    arrays = jtu.tree_map(as_float, scene)
+    leaves, structure = jtu.tree_flatten(state)
+    states = zip(*[parts(np.asarray(leaf)) for leaf in leaves], strict=True)
+    found = [_apply(function, arrays, jtu.tree_unflatten(structure, part)) for part in states]
+    return joined(found, len(leaves[0]))
 
 
 def moments_of_change(
     scene: Scene,
     trajectory: Trajectory,
-    condition: Callable[[Scene, State], Any],
+    function: Callable[[Scene, State], PyTree],
+    condition: Callable[[PyTree], np.ndarray],
     before: np.ndarray,
     after: np.ndarray,
 ) -> np.ndarray:
-    """The times in (before, after) at which a condition changes, by bisection [s], shape (n,).
+    """The times in (before, after) at which a condition changes [s], shape (n,).
 
-    `condition(scene, state)` is a boolean that differs between the two ends.
+    `condition` makes booleans (n, m) of the function's values at m times in each of the n
+    intervals, leaves (n, m); they differ between the two ends.
     """
     if before.size == 0:
         return before
-    left, right = jnp.asarray(_padded(before)), jnp.asarray(_padded(after))
-    found = _bisect(condition, _as_arrays(scene), trajectory.dense, left, right)
-    return np.asarray(found)[: before.size]
-
-
-def _padded(times: np.ndarray) -> np.ndarray:
-    """Times filled up to a power of two, so that few lengths are compiled."""
-    size = max(8, 1 << (len(times) - 1).bit_length())
-    return np.pad(times, (0, size - len(times)), mode="edge")
-
-
-def _as_arrays(scene: Scene) -> Scene:
-    """The scene with every leaf an array: a plain number would be compiled in."""
-    return jax.tree_util.tree_map(as_float, scene)
+    among = max(3, AT_ONCE // len(before))
+    shares = np.linspace(0.0, 1.0, among)
+    left, right, rows = before, after, np.arange(len(before))
+    for _ in range(int(np.ceil(np.log(_RESOLUTION) / np.log(among - 1)))):
+        times = left[:, None] + (right - left)[:, None] * shares
+        times[:, -1] = right
+        holds = condition(observed(scene, trajectory, function, times))
+        changed = holds != holds[:, :1]
+        changed[:, -1] = True
+        first = np.argmax(changed, axis=1)
+        left, right = times[rows, first - 1], times[rows, first]
+    return right
 
 
 @eqx.filter_jit
 def _apply(function: Any, scene: Scene, states: State) -> PyTree:
-    return function(scene, states)
-
-
-@eqx.filter_jit
-def _observe(function: Any, scene: Scene, dense: Any, times: Any) -> PyTree:
-    return function(scene, jax.vmap(dense.evaluate)(times))
-
-
-@eqx.filter_jit
-def _bisect(condition: Any, scene: Scene, dense: Any, left: Any, right: Any) -> Any:
-    def holds(times: Any) -> Any:
-        return condition(scene, jax.vmap(dense.evaluate)(times))
-
-    at_left = holds(left)
-
-    def halve(_: Any, ends: Any) -> Any:
-        left, right = ends
-        middle = 0.5 * (left + right)
-        unchanged = holds(middle) == at_left
-        return jnp.where(unchanged, middle, left), jnp.where(unchanged, right, middle)
-
-    return jax.lax.fori_loop(0, _BISECTIONS, halve, (left, right))[1]
+    values = function(scene, states)
+    shape = jnp.shape(jtu.tree_leaves(states)[0])
+    return jtu.tree_map(lambda leaf: jnp.broadcast_to(leaf, shape), values)

@@ -7,8 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.gait._footsteps import heel_strikes
-from jaxbiped.plot._samples import Contacts, contacts, sampled
+from jaxbiped.gait._samples import applied
+from jaxbiped.plot._samples import sampled
 from jaxbiped.plot._style import (
     LEG_COLOURS,
     LEG_NAMES,
@@ -50,7 +52,7 @@ def contact_forces(
         ValueError: the trajectory was not saved step by step, or has fewer heel strikes.
     """
     samples = sampled(trajectory)
-    found = contacts(scene, samples.state)
+    found = applied(scene, samples.state, contacts)
     times, feet = heel_strikes(scene, trajectory)
     if times.size and not -times.size <= strike < times.size:
         raise ArgumentError(
@@ -87,7 +89,7 @@ def _draw_column(axes: Any, t: np.ndarray, found: Contacts) -> None:
 
 def _draw_strike(axes: Any, scene: Scene, trajectory: Trajectory, time: float, leg: int) -> None:
     near = sampled(trajectory, start=time - _BEFORE, stop=time + _AFTER)
-    found = contacts(scene, near.state)
+    found = applied(scene, near.state, contacts)
     milliseconds = (near.t - time) * 1e3
     _draw_column(axes, milliseconds, found)
     normal = [np.asarray(force.normal) for force in found.forces]

@@ -4,7 +4,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from jaxbiped.plot._samples import contacts, sampled
+from jaxbiped.dynamics._contacts import contacts
+from jaxbiped.gait._samples import applied
+from jaxbiped.plot._samples import sampled
 from jaxbiped.plot._style import (
     LEG_COLOURS,
     LEG_NAMES,
@@ -32,7 +34,7 @@ def penetrations(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None
         ValueError: the trajectory was not saved step by step.
     """
     samples = sampled(trajectory)
-    found = contacts(scene, samples.state)
+    found = applied(scene, samples.state, contacts)
     ax = axes_or_new(ax, 7.2, 3.4)
     deepest = 0.0
     for k, (foot, touching) in enumerate(zip(found.feet, found.touching, strict=True)):

@@ -2,16 +2,10 @@
 
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped.dynamics._feet import Feet, feet, touches
-from jaxbiped.dynamics._forces import FootForces, foot_forces
 from jaxbiped.dynamics._state import State
-from jaxbiped.gait._samples import applied
-from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
 _EVEN = 2048
@@ -23,14 +17,6 @@ class Samples(NamedTuple):
 
     t: np.ndarray
     state: State
-
-
-class Contacts(NamedTuple):
-    """Feet, whether each touches, and the forces on them, at the times of some samples."""
-
-    feet: Feet
-    touching: tuple[Any, Any]
-    forces: FootForces
 
 
 def end_time(trajectory: Trajectory) -> float:
@@ -49,7 +35,7 @@ def state_at(trajectory: Trajectory, t: Any) -> State:
     Raises:
         ValueError: the trajectory was not saved step by step.
     """
-    return _as_numpy(trajectory.at(t))
+    return jtu.tree_map(np.asarray, trajectory.at(t))
 
 
 def sampled(
@@ -75,18 +61,3 @@ def sampled(
         lambda a, b: np.concatenate([a, np.asarray(b)[inside]])[order], filled, trajectory.state
     )
     return Samples(t, state)
-
-
-def contacts(scene: Scene, state: State) -> Contacts:
-    """Feet and forces at states with leaves of shape (n,), as NumPy arrays."""
-    return applied(scene, state, _contacts)
-
-
-def _contacts(scene: Scene, state: State) -> Contacts:
-    both = feet(scene, state)
-    touching = tuple(jnp.broadcast_to(touches(foot), foot.x.shape) for foot in both)
-    return Contacts(both, (touching[0], touching[1]), foot_forces(scene, state))
-
-
-def _as_numpy(state: State) -> State:
-    return jtu.tree_map(np.asarray, jax.device_get(state))

@@ -7,9 +7,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import Array, Float, Int, PyTree
 
 from jaxbiped.dynamics._state import State
+from jaxbiped.solve._between_steps import between_steps
 from jaxbiped.solve._ending import Ending
 
 
@@ -61,10 +63,13 @@ class Trajectory(eqx.Module):
             raise ValueError(
                 'Nothing is known between the saved times: simulate with save="steps".'
             )
-        dense = self.dense
         flat = jnp.ravel(jnp.asarray(t, dtype=self.t.dtype))
-        states = _evaluate(dense, flat)
-        return jtu.tree_map(lambda leaf: leaf.reshape(jnp.shape(t)), states)
+        traced = any(isinstance(x, jax.core.Tracer) for x in jtu.tree_leaves((self.dense, flat)))
+        if traced or jnp.ndim(self.dense.ts) > 1 or int(self.dense.ts_size) == 1:
+            states = jax.vmap(self.dense.evaluate)(flat)
+        else:
+            states = between_steps(self.dense, np.asarray(flat))
+        return jtu.tree_map(lambda leaf: jnp.reshape(leaf, jnp.shape(t)), states)
 
     def require_dense(self) -> diffrax.DenseInterpolation:
         """The continuous solution of a single trajectory.
@@ -79,8 +84,3 @@ class Trajectory(eqx.Module):
         if jnp.ndim(self.t) != 1:
             raise ValueError("This is a batch of trajectories: look at one of them at a time.")
         return self.dense
-
-
-@eqx.filter_jit
-def _evaluate(dense: diffrax.DenseInterpolation, t: Array) -> State:
-    return jax.vmap(dense.evaluate)(t)

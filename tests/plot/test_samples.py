@@ -2,7 +2,9 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxbiped as jb
-from jaxbiped.plot._samples import contacts, sampled, state_at
+from jaxbiped.dynamics._contacts import contacts
+from jaxbiped.gait._samples import applied
+from jaxbiped.plot._samples import sampled, state_at
 
 
 def test_samples_hold_every_step_of_the_solver(seed_walk):
@@ -27,7 +29,7 @@ def test_samples_between_two_times(seed_walk):
 def test_contacts_are_feet_and_forces(seed_walk):
     scene, walk = seed_walk
     state = state_at(walk, np.linspace(0.0, 2.0, 11))
-    found = contacts(scene, state)
+    found = applied(scene, state, contacts)
     forces = jb.foot_forces(scene, jb.State(*(jnp.asarray(leaf) for leaf in state)))
     np.testing.assert_allclose(found.forces.foot_1.normal, np.asarray(forces.foot_1.normal))
     np.testing.assert_allclose(found.forces.foot_2.tangential, np.asarray(forces.foot_2.tangential))

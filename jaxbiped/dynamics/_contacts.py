@@ -1,0 +1,28 @@
+"""What the ground does to both feet."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from jaxbiped.dynamics._feet import Feet, feet, touches
+from jaxbiped.dynamics._forces import FootForces, foot_forces
+
+
+class Contacts(NamedTuple):
+    """Feet, whether each touches, and the forces on them; leaves shaped as the state's."""
+
+    feet: Feet
+    touching: tuple[Any, Any]
+    forces: FootForces
+
+    @property
+    def carrying(self) -> tuple[Any, Any]:
+        """Whether each foot carries anything (booleans)."""
+        return self.forces.foot_1.normal > 0.0, self.forces.foot_2.normal > 0.0
+
+
+def contacts(scene: Any, state: Any) -> Contacts:
+    """Both feet's contacts with the ground."""
+    both = feet(scene, state)
+    first, second = (jnp.broadcast_to(touches(foot), foot.x.shape) for foot in both)
+    return Contacts(both, (first, second), foot_forces(scene, state))
