@@ -146,6 +146,15 @@ def _endless():
     )
 
 
+@pytest.fixture
+def _heard():
+    """What a shell starts in the background ignores interrupts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("_heard")
 def test_an_interrupt_ends_a_run_within_a_second():
     program = _endless()
     program.code(host().width)
