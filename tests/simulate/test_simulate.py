@@ -160,7 +160,7 @@ def test_a_block_on_bengisu_akay_friction(law):
 
 def test_saving_only_the_end_or_given_times_changes_nothing(seed_walk):
     scene, walk = seed_walk
-    options = dict(duration=2.0, accuracy="tight", engine="xla")
+    options = dict(duration=2.0, accuracy="tight")
     end = jb.simulate(scene, jb.seed_state(), save="end", **options)
     times = jnp.array([0.5, 1.0, 2.0])
     some = jb.simulate(scene, jb.seed_state(), save=times, **options)
