@@ -69,6 +69,12 @@ def test_extremes_are_those_of_the_steps(seed_walk):
         assert found["speeds"][0] == pytest.approx(float(reduce(whole.state.hip_vx)), abs=1e-4)
 
 
+def test_extremes_beside_every_step():
+    walk = _walk(extremes=_heights)
+    for found, reduce in ((walk.lowest, np.min), (walk.highest, np.max)):
+        assert float(found["hip"]) == float(reduce(walk.state.hip_z))
+
+
 def test_many_give_what_each_gives_alone():
     speeds = jnp.array([0.1, 0.35, 0.38, 0.4, 0.9])
 
@@ -94,7 +100,6 @@ def test_many_give_what_each_gives_alone():
     ("options", "sentence"),
     [
         (dict(save=jb.HeelStrike(), engine="xla"), "only lanes do that"),
-        (dict(extremes=_heights), "does not save every step"),
         (dict(save="end", extremes=_heights, solver="kvaerno3"), "Kvaerno3 is not one"),
         (dict(save=jb.MidStance(), most_arrivals=0), "most_arrivals = 0 is not allowed"),
         (dict(save=jb.MidStance(), engine="fast"), "choose one of auto, xla, lanes"),
