@@ -1,6 +1,7 @@
 """Printing for people and for programs."""
 
 import json
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,15 +18,24 @@ class Report:
     def say(self, text: str = "") -> None:
         """Prints a text, unless standard output belongs to the JSON."""
         if not self._only_json:
-            print(text, flush=True)
+            _write(text + "\n")
 
     def finish(self, numbers: dict[str, Any]) -> None:
         """Writes the numbers."""
         text = json.dumps(numbers, indent=2) + "\n"
         if self._only_json:
-            sys.stdout.write(text)
+            _write(text)
         elif self._path is not None:
             self._path.write_text(text)
+
+
+def _write(text: str) -> None:
+    """Writes to standard output; nobody need read it to the end for files to be written."""
+    try:
+        print(text, end="", flush=True)
+    except BrokenPipeError:
+        # What is left in the buffer goes nowhere, instead of raising once more at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], most: int) -> str:

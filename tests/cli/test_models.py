@@ -1,6 +1,8 @@
 """`jaxbiped models`, and the flags that choose a model."""
 
 import json
+import subprocess
+import sys
 
 import jax
 import pytest
@@ -36,6 +38,20 @@ def test_prints_a_table(capsys):
     out = capsys.readouterr().out
     assert "hunt-crossley" in out
     assert "N·s/m²" in out
+
+
+def test_who_reads_no_further_does_not_keep_files_from_being_written(tmp_path):
+    numbers = tmp_path / "numbers.json"
+    with subprocess.Popen(
+        [sys.executable, "-m", "jaxbiped", "models", "--json", str(numbers)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as command:
+        command.stdout.close()
+        said = command.stderr.read()
+    assert (command.returncode, "BrokenPipe" in said) == (0, False)
+    assert "normal" in json.loads(numbers.read_text())
 
 
 def test_flags_build_the_scene():
