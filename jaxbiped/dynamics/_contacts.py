@@ -16,9 +16,9 @@ class Contacts(NamedTuple):
     forces: FootForces
 
     @property
-    def carrying(self) -> tuple[Any, Any]:
-        """Whether each foot carries anything (booleans)."""
-        return self.forces.foot_1.normal > 0.0, self.forces.foot_2.normal > 0.0
+    def both_carry(self) -> Any:
+        """Whether both feet carry something (boolean): double support."""
+        return (self.forces.foot_1.normal > 0.0) & (self.forces.foot_2.normal > 0.0)
 
 
 def contacts(scene: Any, state: Any) -> Contacts:

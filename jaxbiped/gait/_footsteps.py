@@ -115,10 +115,6 @@ def _part(both: Feet, part: slice | int) -> Feet:
     return jax.tree_util.tree_map(lambda leaf: leaf[part], both)
 
 
-def _both_carry(now: Contacts) -> np.ndarray:
-    return np.logical_and(*now.carrying)
-
-
 def _normal(now: Contacts) -> np.ndarray:
     """The larger normal force [N]."""
     return np.maximum(now.forces.foot_1.normal, now.forces.foot_2.normal)
@@ -146,7 +142,7 @@ def _double_support(
 ) -> np.ndarray:
     """Time from each heel strike but the last until a foot carries nothing again [s]."""
     durations, edges = np.zeros(len(time) - 1), loads.edges
-    carried = np.all(_both_carry(loads.values), axis=1)
+    carried = loads.values.both_carry.all(axis=1)
     spans = []
     for k, start in enumerate(time[:-1]):
         first = int(np.searchsorted(edges, start))
@@ -155,6 +151,8 @@ def _double_support(
             spans.append((k, edges[first + ends[0] - 1], edges[first + ends[0] + 1]))
     if spans:
         which, left, right = (np.array(column) for column in zip(*spans, strict=True))
-        released = moments_of_change(scene, trajectory, contacts, _both_carry, left, right)
+        released = moments_of_change(
+            scene, trajectory, contacts, lambda now: now.both_carry, left, right
+        )
         durations[which] = released - time[which]
     return durations

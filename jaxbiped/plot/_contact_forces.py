@@ -93,7 +93,7 @@ def _draw_strike(axes: Any, scene: Scene, trajectory: Trajectory, time: float, l
     milliseconds = (near.t - time) * 1e3
     _draw_column(axes, milliseconds, found)
     normal = [np.asarray(force.normal) for force in found.forces]
-    both = milliseconds[(normal[0] > 0.0) & (normal[1] > 0.0)]
+    both = milliseconds[found.both_carry]
     for ax in axes:
         if both.size:
             ax.axvspan(both[0], both[-1], color=SHADE_COLOUR, linewidth=0, label="double support")

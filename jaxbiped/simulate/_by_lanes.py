@@ -39,20 +39,20 @@ _QUICK = 100_000
 
 def by_lanes(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`."""
-    dense, recorded = None, None
+    dense, recorded, setting = None, None, _setting(run)
     if run.save_steps:
-        ended, t, state, dense = _step_by_step(run)
-    elif run.times is None and run.section is None:
+        ended, t, state, dense = _step_by_step(run, setting)
+    elif not setting.saved.within:
         if run.extremes is None:
-            ended = solved(_solve(run), _setting(run))
+            ended = solved(_solve(run), setting)
         else:
-            ended, _ = solved_and_saved(_solve(run), _setting(run))
+            ended, _ = solved_and_saved(_solve(run), setting)
         t = jnp.reshape(ended.t, (1,))
         state = jtu.tree_map(lambda leaf: jnp.reshape(leaf, (1,)), ended.state)
     else:
         times = None if run.times is None else np.asarray(run.times)
         room = 0 if run.section is None else run.most_arrivals
-        ended, recorded = solved_and_saved(_solve(run), _setting(run), times=times, room=room)
+        ended, recorded = solved_and_saved(_solve(run), setting, times=times, room=room)
         assert recorded is not None
         # As diffrax has it: infinite where the solve ended before.
         reached = jnp.arange(recorded.values.shape[0]) < recorded.counts
@@ -83,16 +83,17 @@ def prepared_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
 
     Where only the end is asked for, what JAX does around it is compiled as well.
     """
-    compiled_solve(_setting(run), jtu.tree_structure(run.scene)).code(1)
-    only_the_end = run.times is None and run.section is None and not run.save_steps
-    return _compiled if only_the_end else by_lanes
+    setting = _setting(run)
+    compiled_solve(setting, jtu.tree_structure(run.scene)).code(1)
+    return by_lanes if setting.saved.within else _compiled
 
 
 _compiled = eqx.filter_jit(by_lanes)
 
 
-def _step_by_step(run: "Simulation") -> tuple[Solved, Array, State, diffrax.DenseInterpolation]:
-    setting = _setting(run)
+def _step_by_step(
+    run: "Simulation", setting: Setting
+) -> tuple[Solved, Array, State, diffrax.DenseInterpolation]:
     ended, rows = solved_step_by_step(_solve(run), setting, most=run.max_solver_steps)
     ended = jtu.tree_map(jnp.asarray, ended)
     return ended, *recorded_steps(run.state, rows, setting.solver)

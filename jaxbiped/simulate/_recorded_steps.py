@@ -11,9 +11,6 @@ from jaxtyping import Array
 from jaxbiped.dynamics._state import State
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 
-_FEWEST = 512
-"""Room for steps in the continuous solution, doubled until they fit: few sizes are compiled."""
-
 
 class RecordedSteps(NamedTuple):
     """The times [s] of a start and of n steps' ends, (n + 1,), the states there, and the rest."""
@@ -26,21 +23,19 @@ class RecordedSteps(NamedTuple):
 def recorded_steps(start: State, rows: np.ndarray, solver: AbstractRosenbrock) -> RecordedSteps:
     """From the records of `Saved(steps=True)`, shape (n, numbers), as diffrax would have them."""
     kind: Any = type(start)
-    size, count = len(start), len(rows)
+    size = len(start)
     first = np.array([0.0, *(float(leaf) for leaf in start)])
     ends = np.vstack([first, rows[:, : 1 + size]]).T.copy()
-    room = max(_FEWEST, 1 << (count - 1).bit_length())
-    times = np.full(room + 1, np.inf)
-    times[: count + 1] = ends[0]
-    infos = np.full((rows.shape[1] + size - 1, room), np.inf)
-    infos[:size, :count] = ends[1:, :-1]
-    infos[size:, :count] = rows[:, 1:].T
+    # One step more than there are: where there are none, diffrax looks into one all the same.
+    times = np.append(ends[0], np.inf)
+    infos = np.vstack([ends[1:, :-1], rows[:, 1:].T])
+    infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
     groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
     # One transfer for all of them: each costs as much as several steps.
     times, groups, t, states = jax.device_put((times, groups, ends[0], kind(*ends[1:])))
     dense = diffrax.DenseInterpolation(
         ts=times,
-        ts_size=jnp.asarray(count + 1),
+        ts_size=jnp.asarray(len(rows) + 1),
         infos=dict(y0=groups[0], y1=groups[1], coefficients=tuple(groups[2:])),
         interpolation_cls=solver.interpolation_cls,
         direction=jnp.asarray(1),

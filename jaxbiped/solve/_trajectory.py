@@ -57,18 +57,15 @@ class Trajectory(eqx.Module):
         """States at times `t` [s] of any shape, to the order of the solver's dense output.
 
         Raises:
-            ValueError: only the final state or given times were saved.
+            ValueError: only the final state or given times were saved, or this is a batch.
         """
-        if self.dense is None:
-            raise ValueError(
-                'Nothing is known between the saved times: simulate with save="steps".'
-            )
+        dense = self.require_dense()
         flat = jnp.ravel(jnp.asarray(t, dtype=self.t.dtype))
-        traced = any(isinstance(x, jax.core.Tracer) for x in jtu.tree_leaves((self.dense, flat)))
-        if traced or jnp.ndim(self.dense.ts) > 1 or int(self.dense.ts_size) == 1:
-            states = jax.vmap(self.dense.evaluate)(flat)
+        traced = any(isinstance(x, jax.core.Tracer) for x in jtu.tree_leaves((dense, flat)))
+        if traced or int(dense.ts_size) == 1:
+            states = jax.vmap(dense.evaluate)(flat)
         else:
-            states = between_steps(self.dense, np.asarray(flat))
+            states = between_steps(dense, np.asarray(flat))
         return jtu.tree_map(lambda leaf: jnp.reshape(leaf, jnp.shape(t)), states)
 
     def require_dense(self) -> diffrax.DenseInterpolation:
