@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 from jaxbiped.lanes._emit import UnknownPrimitiveError
+from jaxbiped.simulate._recorded_steps import recorded_steps
 from tests.reference import reference_states
 
 SCENES = {
@@ -134,6 +135,13 @@ def test_every_step_ends_where_the_end_alone_does():
     assert len(few.t) == 1 + int(few.accepted) <= 6
     nothing = _end(jb.seed_state()._replace(omega_1=1e200), "lanes", save="steps")
     assert nothing.outcome == jb.Ending.SOLVER_FAILED
+
+
+def test_without_a_step_there_is_the_start():
+    start = jb.seed_state()
+    walk = recorded_steps(start, np.zeros((0, 25)), jb.Rodas4())
+    assert walk.state.hip_z == walk.dense.evaluate(0.0).hip_z == start.hip_z
+    assert np.isnan(walk.dense.evaluate(0.1).hip_z)
 
 
 def test_bristles_are_saved_step_by_step():

@@ -158,9 +158,11 @@ def test_a_block_on_bengisu_akay_friction(law):
     assert float(force) == pytest.approx(-9.8 * np.sin(0.1), rel=1e-4)
 
 
-def test_saving_only_the_end_or_given_times_changes_nothing(seed_walk):
-    scene, walk = seed_walk
-    options = dict(duration=2.0, accuracy="tight")
+@pytest.mark.parametrize("engine", ["lanes", "xla"])
+def test_saving_only_the_end_or_given_times_changes_nothing(engine):
+    scene = jb.seed_scene()
+    options = dict(duration=2.0, accuracy="tight", engine=engine)
+    walk = jb.simulate(scene, jb.seed_state(), **options)
     end = jb.simulate(scene, jb.seed_state(), save="end", **options)
     times = jnp.array([0.5, 1.0, 2.0])
     some = jb.simulate(scene, jb.seed_state(), save=times, **options)

@@ -34,7 +34,9 @@ def test_states_are_those_of_diffrax(solver):
     for name in ("x", "v"):
         np.testing.assert_allclose(found[name], expected[name], rtol=1e-14, atol=1e-15)
     assert np.isnan(found["x"][[0, 1, -1]]).all()
-    assert np.isfinite(found["x"][2:-1]).all()
+    # The closed form of the oscillation, to what this tolerance and dense output are good for.
+    np.testing.assert_allclose(found["x"][2:-1], np.cos(times[2:-1] - 0.5), atol=3e-4)
+    np.testing.assert_allclose(found["v"][2:-1], -np.sin(times[2:-1] - 0.5), atol=3e-4)
 
 
 @pytest.mark.parametrize("size", [0, 1, AT_ONCE - 1, AT_ONCE, AT_ONCE + 1, 3 * AT_ONCE])
