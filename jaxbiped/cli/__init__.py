@@ -7,6 +7,7 @@ import tyro
 from tyro.conf import subcommand
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._progress import tell_stages
 from jaxbiped.cli._basin import Basin
 from jaxbiped.cli._constraints import Constraints
 from jaxbiped.cli._gait import FindGait
@@ -31,6 +32,7 @@ def main(arguments: list[str] | None = None) -> None:
 
         print(version("jaxbiped"))
         return
+    tell_stages()
     try:
         sys.exit(command.run())
     except ArgumentError as error:
