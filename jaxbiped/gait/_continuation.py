@@ -18,6 +18,8 @@ _CONVERGED = 2e-5
 """Size of a correction that ends the corrector."""
 _LEAST_COSINE = 0.85
 """Of the angle between the tangents at the two ends of a step."""
+_FOLD_STEPS = 3
+"""Secant steps towards a fold."""
 _BEYOND_FOLD = 40
 """Steps for which a branch is followed behind its last fold."""
 
@@ -122,6 +124,8 @@ def follow_branch(
             if step < _SMALLEST:
                 break
             continue
+        if tangent[-1] * ahead[-1] < 0.0:
+            path += _fold(change, here, (tangent, ahead), length, sizes)
         folded = folded or ahead[-1] < 0.0
         here, tangent = there, ahead
         path.append(here)
@@ -137,6 +141,26 @@ def follow_branch(
     if folded:
         return _branch(path, sizes, BranchEnd.FOLD)
     return _branch(path, sizes, BranchEnd.WALK_ENDS if code else BranchEnd.BREAKS_OFF, code)
+
+
+def _fold(
+    change: Callable[[np.ndarray, float], Change],
+    here: np.ndarray,
+    tangents: tuple[np.ndarray, np.ndarray],
+    length: float,
+    sizes: np.ndarray,
+) -> list[np.ndarray]:
+    """The zero at the fold between two others, by the secant rule; none where it is not found."""
+    lengths, rises = [0.0, length], [tangents[0][-1], tangents[1][-1]]
+    for _ in range(_FOLD_STEPS):
+        (a, b), (u, v) = lengths[-2:], rises[-2:]
+        lengths.append(a - u * (b - a) / (v - u))
+        guess = here + lengths[-1] * tangents[0]
+        found, *_ = _corrected(change, guess, tangents[0], sizes)
+        if found is None:
+            return []
+        rises.append(_tangent(found[1], sizes, tangents[0])[-1])
+    return [found[0]]
 
 
 def _branch(path: list[np.ndarray], sizes: np.ndarray, end: BranchEnd, code: int = 0) -> Branch:
@@ -167,7 +191,7 @@ def _corrected(
         if not size <= max(_CONTRACTION * last, _CONVERGED):
             return None, False, 0
         if size <= _CONVERGED:
-            return (point, known), k <= 2, 0
+            return (point + move, known), k <= 2, 0
         point, last = point + move, size
     return None, False, 0
 

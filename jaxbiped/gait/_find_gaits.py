@@ -1,5 +1,6 @@
 """Periodic gaits from many starts."""
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -29,7 +30,8 @@ class Gaits(NamedTuple):
         gaits: k gaits, every array with a first axis of k.
         reached: from how many starts each was, shape (k,).
         which: the gait that each start led to, −1 where none, shape (n,).
-        ending: code of a `Search` of each start, shape (n,).
+        ending: code of a `Search` of each start, shape (n,): "no walk" where it led to an orbit
+            that is none.
     """
 
     gaits: Gait
@@ -60,6 +62,9 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
         )
 
     gaits = _every(jtu.tree_map(as_float, scene), jtu.tree_map(as_float, starts), options)
+    no_walk = (gaits.ending == int(Search.FOUND)) & ~gaits.sound
+    ending = jnp.where(no_walk, int(Search.NO_WALK), gaits.ending)
+    gaits = dataclasses.replace(gaits, ending=ending)
     first, which = _told_apart(gaits)
     reached = np.bincount(which[which >= 0], minlength=len(first))
     order = np.argsort(-reached, kind="stable")

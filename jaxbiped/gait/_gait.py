@@ -73,6 +73,7 @@ class Gait(eqx.Module):
         turns: cycles that the search took.
         history: residual of each of them, NaN beyond the last.
         solver_steps: solver steps attempted in the last cycle.
+        sound: whether the orbit is a walk: no foot deep underground, and a step downhill (boolean).
         origin: how the search came to it, which other gaits it saw, and where the seed's gait
             ended on the way to this scene; see `found_by` and `others`.
         orbit: times [s] and states at the ends of the last cycle's solver steps, NaN beyond.
@@ -97,6 +98,7 @@ class Gait(eqx.Module):
     turns: Scalar
     history: Scalar
     solver_steps: Scalar
+    sound: Scalar
     origin: Origin
     orbit: tuple[Scalar, Any]
     parameters: tuple[str, ...] = eqx.field(static=True)
@@ -191,6 +193,7 @@ def described(
         turns=found.turns,
         history=found.history,
         solver_steps=last.attempted,
+        sound=found.sound,
         origin=jtu.tree_map(jnp.asarray, origin),
         orbit=_path(last, start),
         parameters=names,
