@@ -151,7 +151,7 @@ def _fold(
     sizes: np.ndarray,
 ) -> list[np.ndarray]:
     """The zero at the fold between two others, by the secant rule; none where it is not found."""
-    lengths, rises = [0.0, length], [tangents[0][-1], tangents[1][-1]]
+    lengths, rises, points = [0.0, length], [tangents[0][-1], tangents[1][-1]], []
     for _ in range(_FOLD_STEPS):
         (a, b), (u, v) = lengths[-2:], rises[-2:]
         lengths.append(a - u * (b - a) / (v - u))
@@ -159,8 +159,10 @@ def _fold(
         found, *_ = _corrected(change, guess, tangents[0], sizes)
         if found is None:
             return []
-        rises.append(_tangent(found[1], sizes, tangents[0])[-1])
-    return [found[0]]
+        point, known = found
+        points.append(point)
+        rises.append(_tangent(known, sizes, tangents[0])[-1])
+    return points[-1:]
 
 
 def _branch(path: list[np.ndarray], sizes: np.ndarray, end: BranchEnd, code: int = 0) -> Branch:
