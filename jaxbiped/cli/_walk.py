@@ -122,13 +122,12 @@ def write_outputs(scene: Any, trajectory: Trajectory, out: Path) -> list[Path]:
         "penetrations.png": plot.penetrations,
         "contact_forces.png": plot.contact_forces,
     }
-    paths = []
+    # The numbers first: no picture that fails takes them away.
+    trajectory_dataset(scene, trajectory).to_netcdf(out / "trajectory.nc")
     for name, draw in figures.items():
         draw(scene, trajectory).savefig(out / name)
-        paths.append(out / name)
     plot.save_animation(plot.animate(scene, trajectory), out / "walk.gif")
-    trajectory_dataset(scene, trajectory).to_netcdf(out / "trajectory.nc")
-    return [*paths, out / "walk.gif", out / "trajectory.nc"]
+    return [out / "trajectory.nc", *(out / name for name in figures), out / "walk.gif"]
 
 
 def _step_list(steps: Footsteps) -> list[dict[str, float]]:
