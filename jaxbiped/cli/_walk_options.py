@@ -9,6 +9,8 @@ from typing import Any
 from jaxbiped._checks import (
     ArgumentError,
     check_choice,
+    check_count,
+    check_positive,
     check_writable_directory,
     check_writable_file,
 )
@@ -35,6 +37,9 @@ _SEED = {
 _START = {name: float(value) for name, value in seed_state()._asdict().items()}
 
 
+MOST_STEPS = 1 << 20
+"""Solver's steps that nobody asked for more than: about 25 minutes of the seed's walk."""
+_STEPS_OF_TEN_SECONDS = 65536
 MODELS = ("compliant", "rigid")
 FORMULATIONS = ("minimal", "redundant")
 _OF_CONTACT = ("n", "K", "c", "mu_static", "mu_kinetic", "v0", "xi")
@@ -219,5 +224,19 @@ class SolveOptions:
     """Relative tolerance."""
     atol: float | None = None
     """Absolute tolerance (SI units); a hundredth of the relative one unless given."""
+    dt: float | None = None
+    """Steps of this size [s], in place of tolerances; what --solver euler needs."""
+    max_solver_steps: int | None = None
+    """Cap on the solver's steps: unless given 65536 for each ten seconds, at most 1048576."""
     engine: str = "auto"
     """What computes: xla, lanes, or auto for the faster one that can."""
+
+    def most_steps(self) -> int:
+        """The cap on the solver's steps; raises `ArgumentError`."""
+        check_positive("duration", self.duration, "s")
+        if self.max_solver_steps is not None:
+            check_count("max_solver_steps", self.max_solver_steps)
+            return self.max_solver_steps
+        if self.dt is not None:
+            return MOST_STEPS
+        return int(min(MOST_STEPS, _STEPS_OF_TEN_SECONDS * max(1.0, self.duration / 10.0)))

@@ -10,7 +10,14 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import Array, PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
+from jaxbiped._checks import (
+    ArgumentError,
+    check_choice,
+    check_count,
+    check_positive,
+    check_type,
+    check_unbatched,
+)
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._consistent import Consistent
 from jaxbiped.dynamics._section import AbstractSection
@@ -62,7 +69,8 @@ def simulate(
             unless the user says otherwise. A redundant scene also takes a redundant state, which
             is put on its constraints first (see `consistent_state`).
         duration: simulated time [s].
-        steps: footsteps (heel strikes) after which to end.
+        steps: footsteps (heel strikes) after which to end; with a `duration`, too, the simulation
+            ends at whichever comes first, and is "walking" either way.
         solver: a name (see `SOLVERS`) or any diffrax solver.
         accuracy: "fast", "balanced" or "tight" (see `ACCURACIES`).
         rtol: relative tolerance, in place of the accuracy's.
@@ -162,16 +170,18 @@ class Simulation(eqx.Module):
         if duration is None and steps is None:
             raise ArgumentError("duration = None and steps = None: say how long to simulate.")
         if steps is not None:
-            check_positive("steps", steps)
+            check_count("steps", steps)
         allowed_time = PATIENCE * steps if steps is not None else 0.0
         time = allowed_time if duration is None else duration
+        for name, value in (("duration", time), ("rtol", rtol), ("atol", atol)):
+            check_unbatched(name, value)
         check_positive("duration", time, "s")
-        check_positive("max_solver_steps", max_solver_steps)
+        check_count("max_solver_steps", max_solver_steps)
         for name in watch:
             check_choice("watch", name, WATCHES)
         if isinstance(save, str):
             check_choice("save", save, ("steps", "end"))
-        check_positive("most_arrivals", most_arrivals)
+        check_count("most_arrivals", most_arrivals)
         section = save if isinstance(save, AbstractSection) else None
         timed = section is None and not isinstance(save, str)
         if timed:

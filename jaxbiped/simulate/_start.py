@@ -4,13 +4,17 @@ from typing import Any
 
 import diffrax
 
-from jaxbiped._checks import ArgumentError, check_positive, holds_somewhere
+from jaxbiped._checks import ArgumentError, check_positive, check_unbatched, holds_somewhere
 from jaxbiped.dynamics._bristles import state_for
 from jaxbiped.dynamics._consistent import Consistent, consistent_state
 from jaxbiped.dynamics._independence import check_independent
 from jaxbiped.dynamics._redundant_motion import coordinates_of
+from jaxbiped.scene._catalogue import FRICTION_LAWS, NORMAL_LAWS
+from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._walker import Walker
 
 
 def start_for(scene: Scene | RedundantScene, state: Any) -> tuple[Any, Consistent | None]:
@@ -19,12 +23,29 @@ def start_for(scene: Scene | RedundantScene, state: Any) -> tuple[Any, Consisten
     Raises:
         ArgumentError: a start that is not allowed, or constraints that the method cannot hold.
     """
+    check_single_scene(scene)
     if not isinstance(scene, RedundantScene):
-        return state_for(scene, state), None
+        start = state_for(scene, state)
+        check_unbatched("state", start, "one start")
+        return start, None
+    check_unbatched("state", state, "one start")
     correction = consistent_state(scene, state)
     q, _ = coordinates_of(scene, correction.state)
     check_independent(scene.linkage, scene.method, q)
     return correction.state, correction
+
+
+def check_single_scene(scene: Scene | RigidScene | RedundantScene) -> None:
+    """Raises `ArgumentError` for a batch of scenes.
+
+    Laws of the user's own may hold arrays.
+    """
+    if isinstance(scene, RedundantScene):
+        scene = scene.scene
+    own = (*NORMAL_LAWS.values(), *FRICTION_LAWS.values(), Walker, Ground)
+    for name, part in vars(scene).items():
+        if type(part) in own:
+            check_unbatched(f"scene.{name}", part, "one scene")
 
 
 def check_steps(solver: Any, dt: float | None, *, most_steps: int, duration: Any) -> None:
@@ -33,6 +54,7 @@ def check_steps(solver: Any, dt: float | None, *, most_steps: int, duration: Any
         if isinstance(solver, diffrax.Euler):
             raise ArgumentError("dt = None is not allowed for solver = euler: give its step [s].")
         return
+    check_unbatched("dt", dt)
     check_positive("dt", dt, "s")
     if holds_somewhere(duration > dt * most_steps):
         raise ArgumentError(
