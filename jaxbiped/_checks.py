@@ -94,11 +94,14 @@ def check_unbatched(name: str, value: Any, one: str = "one number") -> None:
 
 
 def check_at_least(name: str, value: Any, bound_name: str, bound: Any) -> None:
-    """Raises `ArgumentError` unless `value >= bound` in every entry."""
+    """Raises `ArgumentError` unless `value >= bound` in every entry.
+
+    `bound_name` is the argument that sets the bound, or the bound itself in words.
+    """
     if not _is_traced(bound):
         floor = _numbers(bound_name, bound)
         allowed = f"at least {bound_name}"
-        if floor.size == 1:
+        if floor.size == 1 and bound_name.isidentifier():
             allowed += f" = {floor.item():g}"
         _require(name, value, allowed, lambda x: x >= floor)
 

@@ -7,8 +7,10 @@ import numpy as np
 
 from jaxbiped import _clock
 from jaxbiped._checks import ArgumentError
+from jaxbiped._progress import stage
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SolveOptions
+from jaxbiped.cli._warnings import cut_short
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._rigid_walk import RigidWalked, rigid_walk
@@ -28,7 +30,7 @@ def run_rigid_walk(
     """
     output.check()
     usual = SolveOptions()
-    for name in ("solver", "atol"):
+    for name in ("solver", "atol", "dt"):
         if getattr(solve, name) != getattr(usual, name):
             raise ArgumentError(
                 f'{name} = {getattr(solve, name)} is not allowed with model = "rigid": its steps '
@@ -40,11 +42,14 @@ def run_rigid_walk(
         rtol=solve.rtol,
         engine=solve.engine,
         most_arrivals=_MOST_STRIKES,
+        max_solver_steps=solve.most_steps(),
     )
-    rigid_walk(scene, state, **options).t.block_until_ready()
+    with stage("compiling the simulation (first time for this kind of scene)"):
+        rigid_walk(scene, state, **options).t.block_until_ready()
     compiled = time.perf_counter()
-    walk = rigid_walk(scene, state, **options)
-    walk.t.block_until_ready()
+    with stage(f"simulating {solve.duration:g} s"):
+        walk = rigid_walk(scene, state, **options)
+        walk.t.block_until_ready()
     finished = time.perf_counter()
     # The first run compiles; what a run takes by itself is the second one's.
     wall = {
@@ -52,7 +57,7 @@ def run_rigid_walk(
         "compile": 2.0 * compiled - prepared - finished,
         "run": finished - compiled,
     }
-    numbers = {
+    numbers: dict[str, Any] = {
         "model": "rigid",
         "ending": str(walk.outcome),
         "slope_rad": float(scene.ground.slope),
@@ -65,9 +70,12 @@ def run_rigid_walk(
             "attempted": int(walk.attempts),
         },
         "wall_s": wall,
+        "warnings": cut_short(str(walk.outcome), int(walk.attempts)),
     }
     report = Report(output.json)
     _print(report, numbers)
+    for sentence in numbers["warnings"]:
+        report.say(f"WARNING: {sentence}")
     if output.out is not None:
         from jaxbiped import plot
 

@@ -46,12 +46,8 @@ def walk_warnings(scene: Any, numbers: dict[str, Any], *, rtol: float | None) ->
             "no foot touched the ground in all that time: this is free flight, no walk; start "
             "lower (--hip-z) or simulate longer"
         )
-    if numbers["ending"] == str(Ending.OUT_OF_STEPS):
-        steps = numbers["solver"]["accepted"] + numbers["solver"]["rejected"]
-        found.append(
-            f"the walk was cut short at {steps} of the solver's steps: --max-solver-steps allows "
-            "more, a larger --rtol takes fewer"
-        )
+    steps = numbers["solver"]["accepted"] + numbers["solver"]["rejected"]
+    found += cut_short(numbers["ending"], steps)
     share = numbers["energy_residual_relative"]
     bound = _WORST_RESIDUAL if rtol is None else min(_WORST_RESIDUAL, _FAR * rtol)
     if share is not None and share > bound:
@@ -60,6 +56,16 @@ def walk_warnings(scene: Any, numbers: dict[str, Any], *, rtol: float | None) ->
             f"accurate; take a smaller --{'dt' if rtol is None else 'rtol'}"
         )
     return [*found, *friction_warnings(scene)]
+
+
+def cut_short(ending: str, steps: int) -> list[str]:
+    """A sentence where the cap on the solver's steps ended a walk."""
+    if ending != str(Ending.OUT_OF_STEPS):
+        return []
+    return [
+        f"the walk was cut short at {steps} of the solver's steps: --max-solver-steps allows "
+        "more, a larger --rtol takes fewer"
+    ]
 
 
 def friction_warnings(scene: Any) -> list[str]:

@@ -19,6 +19,7 @@ from jaxbiped._checks import (
     check_unbatched,
 )
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._bristles import BristleState
 from jaxbiped.dynamics._consistent import Consistent
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
@@ -29,6 +30,7 @@ from jaxbiped.simulate._by_xla import by_xla
 from jaxbiped.simulate._engine import chosen_engine
 from jaxbiped.simulate._saved_times import check_times
 from jaxbiped.simulate._start import check_steps, start_for
+from jaxbiped.simulate._start_height import check_start_height
 from jaxbiped.solve._accuracy import check_precision, tolerances
 from jaxbiped.solve._ending import WATCHES
 from jaxbiped.solve._footstep_limit import PATIENCE
@@ -166,6 +168,7 @@ class Simulation(eqx.Module):
     ) -> "Simulation":
         """Checks the arguments, which are those of `simulate`."""
         check_type("scene", scene, Scene, RedundantScene)
+        given = state
         state, correction = start_for(scene, state)
         if duration is None and steps is None:
             raise ArgumentError("duration = None and steps = None: say how long to simulate.")
@@ -189,6 +192,8 @@ class Simulation(eqx.Module):
         relative, absolute = tolerances(accuracy, rtol, atol)
         dtype = jnp.result_type(jtu.tree_leaves(state)[0])
         check_precision(scene, dtype)
+        if isinstance(given, State | BristleState):
+            check_start_height(scene, given)
         method = solver_named(solver)
         check_steps(method, dt, most_steps=max_solver_steps, duration=time)
         if isinstance(scene, RedundantScene):

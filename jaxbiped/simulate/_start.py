@@ -52,12 +52,15 @@ def check_steps(solver: Any, dt: float | None, *, most_steps: int, duration: Any
     """Raises `ArgumentError` for steps that a solver cannot make or the cap on steps forbids."""
     if dt is None:
         if isinstance(solver, diffrax.Euler):
-            raise ArgumentError("dt = None is not allowed for solver = euler: give its step [s].")
+            raise ArgumentError(
+                "dt = None is not allowed for solver = euler, whose steps have one size: give it "
+                "in seconds, such as dt = 1e-6."
+            )
         return
     check_unbatched("dt", dt)
     check_positive("dt", dt, "s")
     if holds_somewhere(duration > dt * most_steps):
         raise ArgumentError(
             f"dt = {float(dt):g} is not allowed: {float(duration):g} s of such steps are more than "
-            f"max_solver_steps = {most_steps}."
+            f"max_solver_steps = {most_steps}; simulate less time, or allow more."
         )
