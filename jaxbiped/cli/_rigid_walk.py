@@ -18,6 +18,8 @@ from jaxbiped.solve._ending import Ending
 
 _MOST_ROWS = 24
 _MOST_STRIKES = 4096
+_SHOWN = 60.0
+"""The part of a long walk that is drawn [s]."""
 
 
 def run_rigid_walk(
@@ -62,6 +64,7 @@ def run_rigid_walk(
         "ending": str(walk.outcome),
         "slope_rad": float(scene.ground.slope),
         "duration_s": float(walk.t),
+        "footsteps": max(int(walk.footsteps) - 1, 0),
         "steps": _footsteps(scene, walk),
         "solver": {
             "name": "dopri8",
@@ -72,6 +75,8 @@ def run_rigid_walk(
         "wall_s": wall,
         "warnings": cut_short(str(walk.outcome), int(walk.attempts)),
     }
+    if numbers["footsteps"] > len(numbers["steps"]):
+        numbers["warnings"].append(f"only the first {len(numbers['steps'])} footsteps are listed")
     report = Report(output.json)
     _print(report, numbers)
     for sentence in numbers["warnings"]:
@@ -80,7 +85,7 @@ def run_rigid_walk(
         from jaxbiped import plot
 
         path = output.out / "leg_angles.png"
-        plot.rigid_leg_angles(scene, state, duration=float(walk.t)).savefig(path)
+        plot.rigid_leg_angles(scene, state, duration=min(float(walk.t), _SHOWN)).savefig(path)
         report.say(f"wrote {path}")
     report.finish(numbers)
     return 1 if walk.outcome is Ending.SOLVER_FAILED else 0
@@ -115,8 +120,8 @@ def _print(report: Report, numbers: dict[str, Any]) -> None:
     report.say(table(head, rows, most=_MOST_ROWS))
     solver, wall = numbers["solver"], numbers["wall_s"]
     report.say(
-        f"{numbers['ending']} after {numbers['duration_s']:.4g} s and {len(rows)} whole footsteps "
-        f"on rigid feet on a slope of {numbers['slope_rad']:g} rad"
+        f"{numbers['ending']} after {numbers['duration_s']:.4g} s and {numbers['footsteps']} whole "
+        f"footsteps on rigid feet on a slope of {numbers['slope_rad']:g} rad"
     )
     report.say(
         f"{solver['name']} ({solver['engine']}): {solver['attempted']} steps attempted; "

@@ -60,10 +60,11 @@ class Walk:
             assert isinstance(state, RigidState)
             return run_rigid_walk(scene, state, self.solve, self.output)
         assert isinstance(state, State)
-        request = self._request(scene, state, self.solve.most_steps())
+        with stage("preparing the start"):
+            request = self._request(scene, state)
         self.output.check()
         began = time.perf_counter()
-        trajectory, seconds = self._simulated(scene, state, request)
+        trajectory, seconds = _simulated(request)
         wall = {
             "import": imported - _clock.IMPORT_BEGAN,
             "compile": time.perf_counter() - began - seconds,
@@ -72,19 +73,7 @@ class Walk:
         self._report(scene, trajectory, wall)
         return 1 if trajectory.outcome == Ending.SOLVER_FAILED else 0
 
-    def _simulated(self, scene: Any, state: State, request: Simulation) -> tuple[Trajectory, float]:
-        """The trajectory, and how long the solve took once it was compiled [s]."""
-        most = room = request.max_solver_steps
-        if request.engine == "xla" and request.dt is None:
-            # It makes room beforehand, and time asked for need not be walked.
-            room = min(most, _ROOM)
-        while True:
-            trajectory, seconds = _run(self._request(scene, state, room))
-            if room == most or trajectory.outcome is not Ending.OUT_OF_STEPS:
-                return trajectory, seconds
-            room = min(most, 4 * room)
-
-    def _request(self, scene: Any, state: State, most_steps: int) -> Simulation:
+    def _request(self, scene: Any, state: State) -> Simulation:
         return Simulation.prepare(
             scene,
             state,
@@ -94,7 +83,7 @@ class Walk:
             atol=self.solve.atol,
             dt=self.solve.dt,
             engine=self.solve.engine,
-            max_solver_steps=most_steps,
+            max_solver_steps=self.solve.most_steps(),
         )
 
     def _report(self, scene: Any, trajectory: Trajectory, wall: dict[str, float]) -> None:
@@ -134,6 +123,19 @@ class Walk:
             for path in paths:
                 report.say(f"wrote {path}")
         report.finish(numbers)
+
+
+def _simulated(request: Simulation) -> tuple[Trajectory, float]:
+    """The trajectory, and how long the solve took once it was compiled [s]."""
+    most = room = request.max_solver_steps
+    if request.engine == "xla" and request.dt is None:
+        # It makes room beforehand, and time asked for need not be walked.
+        room = min(most, _ROOM)
+    while True:
+        trajectory, seconds = _run(dataclasses.replace(request, max_solver_steps=room))
+        if room == most or trajectory.outcome is not Ending.OUT_OF_STEPS:
+            return trajectory, seconds
+        room = min(most, 4 * room)
 
 
 def _run(request: Simulation) -> tuple[Trajectory, float]:
