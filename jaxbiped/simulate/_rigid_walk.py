@@ -20,7 +20,7 @@ from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import checked_state
 from jaxbiped.lanes._rigid import rigid_walk_by_lanes
 from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.simulate._start import check_single_scene
+from jaxbiped.simulate._start import check_single_scene, in_one_precision, in_own_precision
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, ending_of, whole
@@ -94,7 +94,7 @@ def rigid_walk(
     """
     check_type("scene", scene, RigidScene)
     scene = jtu.tree_map(as_float, scene)
-    state = checked_state(state, RigidState)
+    state = in_one_precision(checked_state(in_own_precision(state), RigidState))
     check_single_scene(scene)
     check_unbatched("state", state, "one start")
     if duration is None and steps is None:
@@ -123,6 +123,8 @@ def rigid_walk(
         rtol=as_float(tolerance),
         most_attempts=as_float(max_solver_steps),
     )
+    # In the precision of the start, as `simulate` has it.
+    walk = jtu.tree_map(lambda leaf: leaf.astype(state.theta_1.dtype), walk)
     run = _by_lanes if chosen == "lanes" else _by_xla
     return run(walk, int(most_arrivals), duration is None)
 

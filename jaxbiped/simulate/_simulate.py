@@ -67,9 +67,9 @@ def simulate(
     Args:
         scene: what to simulate; a `RedundantScene` for coordinates of each leg.
         state: start, a `State`; where friction has bristles also a `BristleState`, for their
-            part (zero unless given). Its dtype is the precision of the solve: 64 bits
-            unless the user says otherwise. A redundant scene also takes a redundant state, which
-            is put on its constraints first (see `consistent_state`).
+            part (zero unless given). Its dtype, that of the most precise leaf, is the precision
+            of the solve: 64 bits unless the user says otherwise. A redundant scene also takes a
+            redundant state, which is put on its constraints first (see `consistent_state`).
         duration: simulated time [s].
         steps: footsteps (heel strikes) after which to end; with a `duration`, too, the simulation
             ends at whichever comes first, and is "walking" either way.

@@ -3,6 +3,9 @@
 from typing import Any
 
 import diffrax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_positive, check_unbatched, holds_somewhere
 from jaxbiped.dynamics._bristles import state_for
@@ -25,14 +28,34 @@ def start_for(scene: Scene | RedundantScene, state: Any) -> tuple[Any, Consisten
     """
     check_single_scene(scene)
     if not isinstance(scene, RedundantScene):
-        start = state_for(scene, state)
+        start = state_for(scene, in_own_precision(state))
         check_unbatched("state", start, "one start")
-        return start, None
+        return in_one_precision(start), None
+    state = in_own_precision(state)
     check_unbatched("state", state, "one start")
     correction = consistent_state(scene, state)
     q, _ = coordinates_of(scene, correction.state)
     check_independent(scene.linkage, scene.method, q)
     return correction.state, correction
+
+
+def in_own_precision(state: Any) -> Any:
+    """A start with NumPy's floating-point leaves as arrays of JAX, which keep their precision."""
+
+    def kept(leaf: Any) -> Any:
+        own = isinstance(leaf, np.ndarray | np.generic) and np.issubdtype(leaf.dtype, np.floating)
+        return jnp.asarray(leaf) if own else leaf
+
+    return jtu.tree_map(kept, state)
+
+
+def in_one_precision(state: Any) -> Any:
+    """A start with all leaves as precise as the most precise one."""
+    kinds = {leaf.dtype for leaf in jtu.tree_leaves(state)}
+    if len(kinds) == 1:
+        return state
+    finest = max(kinds, key=lambda kind: jnp.finfo(kind).bits)
+    return jtu.tree_map(lambda leaf: leaf.astype(finest), state)
 
 
 def check_single_scene(scene: Scene | RigidScene | RedundantScene) -> None:
