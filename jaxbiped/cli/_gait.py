@@ -60,7 +60,7 @@ class FindGait:
         """Runs the command; returns the exit code."""
         imported = time.perf_counter()
         scene = self.scene.scene()
-        state = self.start.state(scene)
+        state = self.start.state(scene) if self.start.given else None
         if self.section is not None:
             check_choice("section", self.section, _SECTIONS)
         check_count("period", self.period)
