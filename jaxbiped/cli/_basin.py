@@ -12,7 +12,8 @@ import numpy as np
 from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
-from jaxbiped._checks import ArgumentError, check_positive
+from jaxbiped._checks import ArgumentError, check_count
+from jaxbiped._progress import stage
 from jaxbiped.cli._basin_options import StartsOptions
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions
@@ -58,7 +59,7 @@ class SweepOptions:
 
     def executor(self) -> tuple[Executor | None, int]:
         """What runs the chunks, and how many at once; raises `ArgumentError`."""
-        check_positive("workers", self.workers)
+        check_count("workers", self.workers)
         if self.scheduler is not None:
             return cluster_executor(self.scheduler)
         if self.workers > 1:
@@ -98,12 +99,13 @@ class Basin:
             engine=self.sweep.engine,
         )
         effort = checked_effort(scene, **how)
-        check_positive("chunk", self.sweep.chunk)
+        check_count("chunk", self.sweep.chunk)
         self.output.check()
         if self.sweep.store is not None:
             check_store(self.sweep.store)
         executor, workers = self.sweep.executor()
-        known = labelling(scene, parameters=starts.parameters, **how)
+        with stage("finding the gaits that starts are labelled by"):
+            known = labelling(scene, parameters=starts.parameters, **how)
         began = time.perf_counter()
         try:
             found = sweep(
@@ -125,7 +127,9 @@ class Basin:
         report = Report(self.output.json)
         _print(report, numbers)
         if self.output.out is not None:
-            for path in _written(found, known, starts, self.output.out):
+            with stage("drawing the basin"):
+                paths = _written(found, known, starts, self.output.out)
+            for path in paths:
                 report.say(f"wrote {path}")
         numbers["wall_s"] = time.perf_counter() - _clock.IMPORT_BEGAN
         report.finish(numbers)

@@ -11,7 +11,7 @@ import numpy as np
 from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
-from jaxbiped._checks import check_choice
+from jaxbiped._checks import check_choice, check_count
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.dynamics._rigid_checks import rigid_checks
@@ -63,9 +63,10 @@ class FindGait:
         imported = time.perf_counter()
         scene = self.scene.scene()
         # A start that is not told is the search's own choice.
-        state = None if self.start == StartOptions() else self.start.state(scene)
+        state = self.start.state(scene) if self.start.given else None
         if self.section is not None:
             check_choice("section", self.section, _SECTIONS)
+        check_count("period", self.period)
         self.output.check()
         section = None if self.section is None else _SECTIONS[self.section]()
         gait = find_gait(

@@ -13,7 +13,7 @@ import numpy as np
 import optax
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
+from jaxbiped._checks import check_choice, check_count, check_type, check_unbatched
 from jaxbiped._progress import stage
 from jaxbiped._types import as_float
 from jaxbiped.dynamics._bristles import state_for
@@ -107,18 +107,13 @@ def find_gait(
     check_type("scene", scene, Scene, RigidScene, RedundantScene)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_choice("method", method, ("newton", "optax"))
-    check_positive("period", period)
-    if int(period) != period:
-        raise ArgumentError(f"period = {period} is not allowed: it must be a whole number.")
+    check_count("period", period)
+    check_unbatched("scene", scene)
     rigid = isinstance(scene, RigidScene)
     start = _checked_start(scene, seed_start(scene) if guess is None else guess)
-    if jnp.ndim(start.hip_x) != 0:
-        raise ArgumentError(
-            f"guess has leaves of shape {jnp.shape(start.hip_x)}: give one state, and use jax.vmap "
-            "for many."
-        )
+    check_unbatched("guess", start, "one state")
     most = (40 if method == "newton" else 400) if most_turns is None else most_turns
-    check_positive("most_turns", most)
+    check_count("most_turns", most)
     scene = jtu.tree_map(as_float, scene)
     # A redundant scene's leaves begin with those of what it models.
     modelled = scene.scene if isinstance(scene, RedundantScene) else scene

@@ -43,7 +43,8 @@ def animate(
     check_positive("frames_per_second", frames_per_second)
     check_positive("slow_down", slow_down)
     interval = 1.0 / (frames_per_second * slow_down)
-    times = np.arange(int(end_time(trajectory) / interval + 1e-9) + 1) * interval
+    last = end_time(trajectory)
+    times = np.minimum(np.arange(int(last / interval + 1e-9) + 1) * interval, last)
     shown = poses(scene, state_at(trajectory, times))
     figure = new_figure(4.8, 3.0)
     figure.set_dpi(100)
