@@ -50,6 +50,8 @@ class SweepOptions:
     """What computes: xla, lanes, or auto for the faster one that can."""
     store: Path | None = None
     """Zarr store for the results; a run that was killed continues there."""
+    any_version: bool = False
+    """Continue a store that another version or revision of jaxbiped wrote."""
     chunk: int = CHUNK
     """Starts that are labelled and written at once."""
     workers: int = 1
@@ -112,6 +114,7 @@ class Basin:
                 known,
                 starts,
                 store=self.sweep.store,
+                any_version=self.sweep.any_version,
                 chunk=self.sweep.chunk,
                 executor=executor,
                 workers=workers,

@@ -30,6 +30,7 @@ from jaxbiped.sweep._arguments import check_whole
 from jaxbiped.sweep._broadcast import repeated
 from jaxbiped.sweep._family import Family
 from jaxbiped.sweep._follow import Effort, follow
+from jaxbiped.sweep._identity import identity
 from jaxbiped.sweep._label import Label, label_names
 
 _GAP, _GAP_SHARE = 1e-4, 30.0
@@ -146,17 +147,14 @@ class Labelling(eqx.Module):
     def settings(self) -> dict[str, Any]:
         """Everything that the labels depend on, ready for JSON."""
         scene: dict[str, Any] = {k: float(v) for k, v in parameter_values(self.scene).items()}
-        laws = {}
-        if isinstance(self.scene, Scene):
-            parts = ("normal", "friction", "clearance")
-            laws = {part: type(getattr(self.scene, part)).__name__ for part in parts}
         effort = self.effort._asdict() | {"solver": type(self.effort.solver).__name__}
         # Both engines give the same labels; the gap follows from the tolerance.
         del effort["engine"], effort["gap"]
         return {
             "model": "rigid" if isinstance(self.scene, RigidScene) else "compliant",
-            "scene": scene | laws,
+            "scene": scene,
             "effort": effort,
+            "models": {"scene": identity(self.scene), "solver": identity(self.effort.solver)},
             "gaits": self.family.described(),
         }
 

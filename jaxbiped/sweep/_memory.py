@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jaxbiped.sweep._layout import Layout, empty_dataset
-from jaxbiped.sweep._store import SETTINGS
+from jaxbiped.sweep._same_store import SETTINGS
 
 if TYPE_CHECKING:
     import xarray

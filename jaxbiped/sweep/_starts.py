@@ -14,6 +14,7 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._arguments import check_whole
 from jaxbiped.sweep._coordinates import check_coordinates, parameters_among, placed, state_at
+from jaxbiped.sweep._identity import identity
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._points import SAMPLINGS, points
 
@@ -105,7 +106,7 @@ class Grid(AbstractStarts):
 
     def described(self) -> dict[str, Any]:
         values = {name: [float(x) for x in values] for name, values in self.values.items()}
-        return {"grid": values, "place": self.place, "follow": _name_of(self.follow)}
+        return {"grid": values, "place": self.place, "follow": identity(self.follow)}
 
 
 class Sample(AbstractStarts):
@@ -149,7 +150,7 @@ class Sample(AbstractStarts):
 
     def described(self) -> dict[str, Any]:
         bounds = {name: [self.lower[name], self.upper[name]] for name in self.lower}
-        rest = {"place": self.place, "follow": _name_of(self.follow)}
+        rest = {"place": self.place, "follow": identity(self.follow)}
         drawn = {"sample": self.method, "count": self.count, "seed": self.seed}
         return drawn | {"bounds": bounds} | rest
 
@@ -255,7 +256,3 @@ def _check_parameters(scene: Scene | RigidScene, columns: dict[str, np.ndarray])
     """Raises `ArgumentError` for values that the scene's parameters must not have."""
     for name, column in parameters_among(columns).items():
         with_parameters(scene, {name: column})
-
-
-def _name_of(follow: Callable[[Any, Any], Any] | None) -> str | None:
-    return None if follow is None else f"{follow.__module__}.{follow.__qualname__}"

@@ -12,19 +12,14 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.sweep._layout import Layout, empty_dataset
+from jaxbiped.sweep._same_store import ALSO, GAITS, SETTINGS, check_same, check_writers
 
 if TYPE_CHECKING:
     import xarray
 
-SETTINGS = "settings"
-"""Attribute that holds, as JSON, all that the labels depend on."""
-GAITS = "gaits"
-"""Of the settings, what a run finds for itself."""
 _DONE = "done"
 _SETTLED = 2
 """Mark of a chunk that was gone over again after gaits were found late."""
-_CLOSE = 1e-6
-"""Relative difference of two gaits' numbers that counts as none."""
 
 
 class Store:
@@ -44,7 +39,12 @@ class Store:
 
     @staticmethod
     def open(
-        path: Path, layout: Layout, settings: dict[str, Any], attributes: Mapping[str, Any]
+        path: Path,
+        layout: Layout,
+        settings: dict[str, Any],
+        writer: Mapping[str, str],
+        *,
+        any_version: bool = False,
     ) -> "Store":
         """Opens a store.
 
@@ -52,24 +52,33 @@ class Store:
             path: of the store's directory.
             layout: of the results.
             settings: all that the labels depend on; those of a store that is there must be equal.
-            attributes: what else a new store says of itself.
+            writer: the `provenance` of what is written; a new store says it of itself.
+            any_version: whether to continue what another version, revision or user's code wrote.
+                The store then says that this one wrote in it, too.
 
         Raises:
-            ArgumentError: the directory holds something else, or a store made with other settings,
-                or cannot be written.
+            ArgumentError: the directory holds something else, or a store made with other settings
+                or by another version, or cannot be written.
         """
         check_store(path)
         path = path.absolute()
         try:
             if _is_new(path):
-                _create(path, layout, settings, attributes)
-            _check_same(path, settings)
-            return Store(path, layout)
+                _create(path, layout, settings, writer)
+            check_same(path, settings)
+            new = check_writers(path, writer, any_version)
+            store = Store(path, layout)
         except OSError as error:
             raise unwritable(path, error) from None
+        if new:
+            others = [*json.loads(store.noted(ALSO) or "[]"), dict(writer)]
+            store.note({ALSO: json.dumps(others)})
+        return store
 
     @staticmethod
-    def check(path: Path, settings: dict[str, Any]) -> None:
+    def check(
+        path: Path, settings: dict[str, Any], writer: Mapping[str, str], *, any_version: bool
+    ) -> None:
         """Refuses early what `open` would refuse; gaits may be missing from these settings.
 
         Raises:
@@ -78,7 +87,8 @@ class Store:
         path = path.absolute()
         try:
             if not _is_new(path):
-                _check_same(path, settings, but=GAITS)
+                check_same(path, settings, but=GAITS)
+                check_writers(path, writer, any_version)
         except OSError as error:
             raise unwritable(path, error) from None
 
@@ -231,58 +241,3 @@ def _is_new(path: Path) -> bool:
     if path.exists() and not path.is_dir():
         raise ArgumentError(f"store = {str(path)!r} is a file: it must be a directory.")
     return not path.exists() or not any(path.iterdir())
-
-
-def _check_same(path: Path, settings: dict[str, Any], *, but: str = "") -> None:
-    import zarr
-
-    try:
-        group = zarr.open_group(str(path), mode="r", use_consolidated=False)
-        stored = json.loads(str(group.attrs[SETTINGS]))
-    except (KeyError, ValueError, zarr.errors.GroupNotFoundError, FileNotFoundError):
-        raise ArgumentError(
-            f"store = {str(path)!r} holds something else: it must be a new directory, or a store "
-            "of the same sweep."
-        ) from None
-    here = json.loads(json.dumps(settings))
-    for each in (stored, here):
-        each.pop(but, None)
-    difference = _difference(stored, here, "")
-    if difference is not None:
-        raise ArgumentError(
-            f"store = {str(path)!r} was made with other settings: {difference}; give it those, or "
-            "another store."
-        )
-
-
-def _difference(old: Any, new: Any, name: str) -> str | None:
-    """The first difference of two settings in words, None for none."""
-    if isinstance(old, dict) and isinstance(new, dict):
-        for key in dict.fromkeys([*new, *old]):
-            inner = f"{name}.{key}" if name else key
-            if key not in old or key not in new:
-                here = "only in the store" if key in old else "not in the store"
-                return f"{inner} is {here}"
-            found = _difference(old[key], new[key], inner)
-            if found is not None:
-                return found
-        return None
-    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
-        pairs = enumerate(zip(old, new, strict=True))
-        found_ = (_difference(a, b, f"{name}[{i}]") for i, (a, b) in pairs)
-        return next((each for each in found_ if each is not None), None)
-    if old == new or _is_close(old, new, name):
-        return None
-    return f"{name} = {_shown(old)} there, {_shown(new)} here"
-
-
-def _is_close(old: Any, new: Any, name: str) -> bool:
-    """Gaits are found anew by each run, to their tolerance."""
-    numbers = isinstance(old, float) and isinstance(new, float)
-    own = name.startswith("gaits")
-    return numbers and own and abs(old - new) <= _CLOSE * max(1e-3, abs(old))
-
-
-def _shown(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) < 60 else f"{text[:57]}..."

@@ -17,8 +17,9 @@ from jaxbiped.sweep._layout import FIELDS, Layout, fields_of
 from jaxbiped.sweep._memory import Memory
 from jaxbiped.sweep._prepare import Guesses, guesses_among, with_gaits_met, with_guesses
 from jaxbiped.sweep._provenance import provenance
+from jaxbiped.sweep._same_store import GAITS
 from jaxbiped.sweep._starts import AbstractStarts
-from jaxbiped.sweep._store import GAITS, Store, check_store
+from jaxbiped.sweep._store import Store, check_store
 from jaxbiped.sweep._workers import computed
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def sweep(
     workers: int = 1,
     look_for_gaits: bool = True,
     progress: bool = False,
+    any_version: bool = False,
 ) -> "xarray.Dataset":
     """Labels all starts.
 
@@ -59,14 +61,17 @@ def sweep(
         workers: how many chunks the executor runs at once.
         look_for_gaits: whether to look for gaits besides those of the labelling.
         progress: whether to show a bar on stderr.
+        any_version: whether to continue a store that another version or revision of jaxbiped
+            wrote, or one made with laws of yours whose code has changed since.
 
     Returns:
         A dataset with the labels and all else of `Labelled`, along the axes of the starts.
         Its attributes say scene, tolerances, gaits, versions and revision.
 
     Raises:
-        ArgumentError: an argument that is not allowed; a store of other settings, or one that
-            cannot be written; workers that were lost. What is in the store stays.
+        ArgumentError: an argument that is not allowed; a store of other settings or another
+            version, or one that cannot be written; workers that were lost. What is in the store
+            stays.
     """
     check_type("labelling", labelling, Labelling)
     check_type("starts", starts, AbstractStarts)
@@ -79,14 +84,15 @@ def sweep(
     began = time.perf_counter()
     layout = Layout.of(starts, int(chunk))
     own = {"starts": starts.described(), "chunk_shape": list(layout.chunk_shape)}
+    writer = provenance(labelling.scene, labelling.effort.solver, starts)
     if store is not None:
-        Store.check(Path(store), labelling.settings() | own)
+        Store.check(Path(store), labelling.settings() | own, writer, any_version=any_version)
     known = with_gaits_met(labelling, starts) if look_for_gaits else labelling
     settings = known.settings() | own
     sink: Any = (
-        Memory(layout, settings, provenance())
+        Memory(layout, settings, writer)
         if store is None
-        else Store.open(Path(store), layout, settings, provenance())
+        else Store.open(Path(store), layout, settings, writer, any_version=any_version)
     )
     missing = sink.missing()
     sizes = layout.sizes

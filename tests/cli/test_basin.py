@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+import zarr
 from PIL import Image
 
 import jaxbiped as jb
@@ -70,6 +71,16 @@ def test_a_store_of_other_settings_is_refused(basin, capsys):
     outputs = ("--store", basin / "store", "--chunk", 18)
     assert _run(*AXES, *outputs, "--footsteps", 7) == 2
     assert "effort.footsteps = 30 there, 7 here" in capsys.readouterr().err
+
+
+def test_a_store_of_another_revision_is_refused_unless_asked_for(basin, capsys):
+    outputs = ("--store", basin / "store", "--chunk", 18)
+    group = zarr.open_group(str(basin / "store"), mode="r+")
+    group.attrs.update({"git_revision": "another"})
+    assert _run(*AXES, *outputs) == 2
+    assert "--any-version" in capsys.readouterr().err
+    assert _run(*AXES, *outputs, "--any-version") == 0
+    assert "0 of them labelled in this run" in capsys.readouterr().out
 
 
 def test_given_starts(tmp_path, capsys):

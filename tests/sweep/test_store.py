@@ -107,6 +107,34 @@ def test_other_settings_are_refused_before_gaits_are_sought(tmp_path, monkeypatc
         jb.sweep(gaitless(_SLOPE, _GUESS), STARTS, store=tmp_path / "store", chunk=16)
 
 
+@pytest.mark.parametrize("name", ["version_jaxbiped", "git_revision", "user_code"])
+def test_a_store_of_another_version_is_refused_unless_asked_for(tmp_path, name):
+    path = tmp_path / "store"
+    first = _swept(path)
+    group = zarr.open_group(str(path), mode="r+")
+    own = group.attrs[name]
+    group.attrs.update({name: "another"})
+    with pytest.raises(jb.ArgumentError, match=f'{name} = "another" there, .*any_version=True'):
+        _swept(path)
+    found = jb.sweep(
+        LABELLING, STARTS, store=path, chunk=16, look_for_gaits=False, any_version=True
+    )
+    same_results(found, first)
+    assert found.attrs[name] == "another"
+    (other,) = json.loads(found.attrs["also_written_by"])
+    assert other[name] == own
+    with pytest.raises(jb.ArgumentError, match="was written by another version"):
+        _swept(path)
+
+
+def test_another_version_is_refused_before_gaits_are_sought(tmp_path, monkeypatch):
+    _swept(tmp_path / "store")
+    zarr.open_group(str(tmp_path / "store"), mode="r+").attrs.update({"git_revision": "other"})
+    monkeypatch.setattr(SWEEP, "with_gaits_met", None)
+    with pytest.raises(jb.ArgumentError, match="another version"):
+        jb.sweep(LABELLING, STARTS, store=tmp_path / "store", chunk=16)
+
+
 def test_a_directory_of_something_else_is_refused(tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(jb.ArgumentError, match="holds something else"):

@@ -1,0 +1,77 @@
+"""What tells two models apart, and what a user's own code is known by."""
+
+import functools
+import json
+
+import equinox as eqx
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.sweep._identity import code_digests, identity
+from tests.sweep.walkers import gaitless
+
+SEED = jb.seed_scene()
+
+
+def _scene(**parts):
+    kept = {name: getattr(SEED, name) for name in ("walker", "ground", "normal", "friction")}
+    return jb.Scene(**{**kept, **parts})
+
+
+def _settings(**parts):
+    return gaitless(_scene(**parts), jb.seed_state()).settings()
+
+
+class RistowSchafer(jb.RistowSchafer):
+    """A user's law of a name that is taken."""
+
+
+class Wide(jb.AlwaysTouching):
+    """A user's rule with a choice that is no number."""
+
+    how: str = eqx.field(static=True)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (dict(clearance=jb.OneFoot(1)), dict(clearance=jb.OneFoot(2))),
+        (dict(clearance=jb.OneFoot(1)), dict(clearance=jb.AlwaysTouching())),
+        (dict(clearance=Wide("left")), dict(clearance=Wide("right"))),
+        (
+            dict(normal=jb.RistowSchafer(K=1e6, c=1e7, n=1.5)),
+            dict(normal=RistowSchafer(K=1e6, c=1e7, n=1.5)),
+        ),
+    ],
+)
+def test_models_that_differ_in_no_number_have_other_settings(one, other):
+    assert _settings(**one) == _settings(**one)
+    assert json.dumps(_settings(**one)) != json.dumps(_settings(**other))
+
+
+def test_numbers_are_told_once_and_by_name():
+    settings = _settings()
+    assert settings["scene"]["K"] == 1e6
+    assert "K" not in settings["models"]["scene"]["normal"]
+    assert identity(SEED)["normal"]["class"].startswith("jaxbiped.")
+
+
+def test_functions_are_known_by_module_name_and_what_is_bound():
+    def of(k):
+        return identity(functools.partial(max, k))
+
+    assert of(1) != of(2)
+    assert identity(test_numbers_are_told_once_and_by_name).startswith("tests.sweep.test_identity")
+
+
+def test_only_the_code_of_a_user_is_digested():
+    assert code_digests(SEED, jb.grid(SEED, {"theta_swing": [0.0]})) == {}
+    found = code_digests(_scene(normal=RistowSchafer(K=1e6, c=1e7, n=1.5), clearance=Wide("a")))
+    assert [name.rpartition(".")[2] for name in found] == ["RistowSchafer", "Wide"]
+    assert all(len(digest) == 16 for digest in found.values())
+    follow = code_digests(jb.grid(SEED, {"theta_swing": [0.0]}, follow=_kept))
+    assert list(follow) == [f"{__name__}._kept"]
+
+
+def _kept(scene, states):
+    return states
