@@ -52,10 +52,9 @@ def _beside_extremes(t: np.ndarray, found: Contacts) -> np.ndarray:
     """Times that split the intervals beside the extremes of any force."""
     split = np.zeros(len(t) - 1, dtype=bool)
     for kind in zip(*found.forces, strict=True):
-        if kind[0] is None:
-            continue
-        largest = max(float(np.max(np.abs(force))) for force in kind)
-        for force in kind:
+        forces = [np.asarray(force) for force in kind if force is not None]
+        largest = max((float(np.max(np.abs(force))) for force in forces), default=0.0)
+        for force in forces:
             rises = np.diff(force)
             turns = rises[:-1] * rises[1:] < 0.0
             turns &= np.abs(force[1:-1]) > _FLOOR * largest

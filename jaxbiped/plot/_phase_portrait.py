@@ -71,12 +71,11 @@ def phase_portrait(
     return figure_of(ax)
 
 
-def _draw_leg(
-    ax: Axes, k: int, t: np.ndarray, angle: np.ndarray, rate: np.ndarray, since: float
-) -> None:
+def _draw_leg(ax: Axes, k: int, t: np.ndarray, angle: Any, rate: Any, since: float) -> None:
     """The whole walk, faint where a last stride is drawn over it."""
     look: dict[str, Any] = {"color": LEG_COLOURS[k], "linestyle": LEG_STYLES[k]}
-    whole, last = {"linewidth": 1.3, "label": LEG_NAMES[k]}, t >= since
+    whole: dict[str, Any] = {"linewidth": 1.3, "label": LEG_NAMES[k]}
+    last = t >= since
     if since > 0.0:
         whole = {"linewidth": 0.8, "alpha": _FAINT, "label": f"{LEG_NAMES[k]}, whole walk"}
     ax.plot(angle, rate, **look, **whole)
