@@ -22,7 +22,7 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._cluster import cluster_executor, local_executor
-from jaxbiped.sweep._coordinates import COORDINATES, UNITS
+from jaxbiped.sweep._coordinates import COORDINATES
 from jaxbiped.sweep._fractions import basin_fractions
 from jaxbiped.sweep._given_starts import GivenStarts
 from jaxbiped.sweep._label import label_names
@@ -212,18 +212,13 @@ def _written(
             found.label.values,
             found[x].values,
             found[y].values,
-            names=(_words(x), _words(y)),
-            units=(UNITS.get(x, ""), UNITS.get(y, "")),
+            names=(x, y),
             period=found.period.values,
             mark=_mark(known, x, y),
         )
         paths.append(out / "basin.png")
         figure.savefig(paths[1])
     return paths
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def _mark(known: Labelling, x: str, y: str) -> tuple[float, float] | None:
