@@ -152,6 +152,7 @@ from jaxbiped.sweep._fatal_push import fatal_push as fatal_push
 from jaxbiped.sweep._fractions import Fraction as Fraction
 from jaxbiped.sweep._fractions import basin_fractions as basin_fractions
 from jaxbiped.sweep._fractions import wilson_interval as wilson_interval
+from jaxbiped.sweep._gait_sweep import gait_sweep as gait_sweep
 from jaxbiped.sweep._given_starts import GivenStarts as GivenStarts
 from jaxbiped.sweep._label import Label as Label
 from jaxbiped.sweep._label import label_name as label_name
