@@ -5,7 +5,7 @@ import pytest
 import xarray
 
 import jaxbiped as jb
-from jaxbiped.sweep import _gait_sweep
+from jaxbiped.sweep import _gait_grid, _gait_sweep
 
 PLAIN = dict(parameters=("K",), radius_sensitivities=False)
 OVER = {"slope": [0.005, 0.012, 0.02, 0.03], "K": [1e6, 1.1e6]}
@@ -28,7 +28,8 @@ def test_one_stable_branch_is_followed(swept):
 def test_where_there_is_no_gait_numbers_are_nan(swept):
     flat = swept.sel(slope=0.005)
     assert np.all(flat.ending != int(jb.Search.FOUND))
-    assert np.all(np.isnan(flat.period)) and np.all(np.isnan(flat.elasticity_period))
+    assert np.all(np.isnan(flat.period))
+    assert np.all(np.isnan(flat.elasticity_period))
     assert np.all(flat.branch_end == int(jb.BranchEnd.FOLD))
 
 
@@ -53,7 +54,7 @@ def test_a_killed_sweep_continues_from_its_store(tmp_path, monkeypatch):
         return find(scene, *rest, **options)
 
     monkeypatch.setattr(_gait_sweep, "find_gait", counted)
-    monkeypatch.setattr("jaxbiped.sweep._gait_grid._PAUSE", -1.0)
+    monkeypatch.setattr(_gait_grid, "_PAUSE", -1.0)
     with pytest.raises(KeyboardInterrupt):
         jb.gait_sweep(jb.seed_scene(), over, store=tmp_path / "gaits", **PLAIN)
     assert calls[0] == 0.02
