@@ -41,11 +41,16 @@ from jaxbiped.gait._footsteps import footsteps as footsteps
 from jaxbiped.gait._footsteps import heel_strikes as heel_strikes
 from jaxbiped.gait._find_gaits import Gaits as Gaits
 from jaxbiped.gait._find_gaits import find_gaits as find_gaits
-from jaxbiped.gait._find_gaits import rolling_starts as rolling_starts
+from jaxbiped.gait._rolling_starts import rolling_starts as rolling_starts
+from jaxbiped.gait._continuation import BranchEnd as BranchEnd
+from jaxbiped.gait._explain_search import explain_search as explain_search
 from jaxbiped.gait._gait import Gait as Gait
 from jaxbiped.gait._gait import Measures as Measures
 from jaxbiped.gait._find_gait import find_gait as find_gait
 from jaxbiped.gait._gait_measures import gait_measures as gait_measures
+from jaxbiped.gait._origin import FoundBy as FoundBy
+from jaxbiped.gait._origin import Origin as Origin
+from jaxbiped.gait._origin import OtherGait as OtherGait
 from jaxbiped.gait._gradient import AbstractGradient as AbstractGradient
 from jaxbiped.gait._gradient import Forward as Forward
 from jaxbiped.gait._gradient import Implicit as Implicit
@@ -147,6 +152,7 @@ from jaxbiped.sweep._fatal_push import fatal_push as fatal_push
 from jaxbiped.sweep._fractions import Fraction as Fraction
 from jaxbiped.sweep._fractions import basin_fractions as basin_fractions
 from jaxbiped.sweep._fractions import wilson_interval as wilson_interval
+from jaxbiped.sweep._gait_sweep import gait_sweep as gait_sweep
 from jaxbiped.sweep._given_starts import GivenStarts as GivenStarts
 from jaxbiped.sweep._label import Label as Label
 from jaxbiped.sweep._label import label_name as label_name

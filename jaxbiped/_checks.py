@@ -16,12 +16,23 @@ class ArgumentError(ValueError):
     """An argument is not allowed. The message names it, its value and what is allowed."""
 
 
+def is_number(value: Any) -> bool:
+    """Whether a value may stand for a number or many; texts and truth values may not."""
+    if hasattr(value, "dtype"):
+        return bool(jax.dtypes.issubdtype(value.dtype, np.number))
+    if isinstance(value, list | tuple):
+        return all(map(is_number, value))
+    return not isinstance(value, str | bytes | bool)
+
+
 def _is_traced(value: Any) -> bool:
     return isinstance(value, jax.core.Tracer)
 
 
 def _numbers(name: str, value: Any) -> np.ndarray:
     try:
+        if not is_number(value):
+            raise ValueError
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         raise ArgumentError(f"{name} = {value!r} is not a number.") from None
@@ -62,12 +73,35 @@ def check_not_negative(name: str, value: Any, unit: str = "") -> None:
     _require(name, value, f"a finite number of at least 0{_in(unit)}", lambda x: x >= 0)
 
 
+def check_count(name: str, value: Any) -> None:
+    """Raises `ArgumentError` unless `value` is one whole number above zero, known beforehand."""
+    allowed = "a whole number above 0"
+    if _is_traced(value) or np.ndim(value):
+        shown = "a traced value" if _is_traced(value) else f"an array of shape {np.shape(value)}"
+        raise ArgumentError(f"{name} = {shown} is not allowed: it must be {allowed}.")
+    _require(name, value, allowed, lambda x: (x > 0) & (x == np.floor(x)))
+
+
+def check_unbatched(name: str, value: Any, one: str = "one number") -> None:
+    """Raises `ArgumentError` where any leaf of `value` is an array instead of one number."""
+    leaves = jax.tree_util.tree_flatten_with_path(value, is_leaf=lambda x: type(x) in (list, tuple))
+    for path, leaf in leaves[0]:
+        if np.ndim(leaf):
+            full = name + jax.tree_util.keystr(path)
+            raise ArgumentError(
+                f"{full} has the shape {np.shape(leaf)}: give {one}, and use jax.vmap for many."
+            )
+
+
 def check_at_least(name: str, value: Any, bound_name: str, bound: Any) -> None:
-    """Raises `ArgumentError` unless `value >= bound` in every entry."""
+    """Raises `ArgumentError` unless `value >= bound` in every entry.
+
+    `bound_name` is the argument that sets the bound, or the bound itself in words.
+    """
     if not _is_traced(bound):
         floor = _numbers(bound_name, bound)
         allowed = f"at least {bound_name}"
-        if floor.size == 1:
+        if floor.size == 1 and bound_name.isidentifier():
             allowed += f" = {floor.item():g}"
         _require(name, value, allowed, lambda x: x >= floor)
 

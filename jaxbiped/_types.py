@@ -6,6 +6,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from jaxbiped._checks import is_number
+
 Scalar: TypeAlias = Float[Array, "..."]
 """A number: one scalar leaf, or one such leaf for each entry of a batch or a time series."""
 
@@ -18,10 +20,12 @@ def as_float(value: Any) -> Any:
 
     What is no number is returned as it is, for the check that follows to refuse by name.
     """
-    if isinstance(value, jax.Array | jax.core.Tracer):
+    if isinstance(value, jax.core.Tracer) or (isinstance(value, jax.Array) and is_number(value)):
         # A weak type would be a type of its own to `jit`.
         floating = jnp.issubdtype(value.dtype, jnp.floating)
         return jax.lax.convert_element_type(value, value.dtype if floating else float)
+    if not is_number(value):
+        return value
     try:
         return jnp.asarray(value, dtype=float)
     except (TypeError, ValueError):

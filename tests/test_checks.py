@@ -2,6 +2,7 @@
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 import jaxbiped as jb
@@ -18,6 +19,10 @@ import jaxbiped as jb
         (lambda: jb.seed_scene(v0=0.0), ("v0", "0", "above 0")),
         (lambda: jb.seed_scene(xi=-1.0), ("xi", "-1")),
         (lambda: jb.seed_scene(hip_mass="heavy"), ("hip_mass", "heavy", "number")),
+        (lambda: jb.seed_scene(slope="0.02"), ("slope", "'0.02'", "not a number")),
+        (lambda: jb.seed_scene(m=True), ("m", "True", "not a number")),
+        (lambda: jb.seed_scene(m=np.bool_(True)), ("m", "True", "not a number")),
+        (lambda: jb.seed_scene(m=jnp.asarray(True)), ("m", "True", "not a number")),
         (lambda: jb.Hertz(K=0.0), ("K", "0")),
         (lambda: jb.RegularisedCoulomb(mu=0.4, v_d=-1.0), ("v_d", "-1")),
         (lambda: jb.SmoothRistowSchafer(K=1e6, c=1e7, depth_width=0.0), ("depth_width", "0")),
@@ -51,6 +56,15 @@ def test_a_scene_of_wrong_parts_is_refused():
         ({"duration": 1.0, "save": "all"}, ("save", "all", "end")),
         ({"duration": 1.0, "watch": ("falls",)}, ("watch", "falls", "stumble")),
         ({"duration": 1.0, "max_solver_steps": 0}, ("max_solver_steps", "0")),
+        ({"duration": 1.0, "max_solver_steps": 9.5}, ("max_solver_steps", "9.5", "whole")),
+        ({"steps": "3"}, ("steps", "'3'", "not a number")),
+        ({"steps": 1.5}, ("steps", "1.5", "whole number above 0")),
+        ({"steps": True}, ("steps", "True", "not a number")),
+        ({"duration": "1"}, ("duration", "'1'", "not a number")),
+        ({"duration": float("inf")}, ("duration", "inf", "finite")),
+        ({"duration": jnp.array([1.0, 2.0])}, ("duration", "(2,)", "jax.vmap")),
+        ({"duration": [1.0, 2.0]}, ("duration", "(2,)", "jax.vmap")),
+        ({"duration": 1.0, "rtol": [1e-6, 1e-7]}, ("rtol", "(2,)", "jax.vmap")),
     ],
 )
 def test_simulate_arguments(options, words):
@@ -69,6 +83,45 @@ def test_a_start_of_mixed_shapes_is_refused():
     start = jb.seed_state()._replace(theta_1=jnp.zeros(3))
     with pytest.raises(jb.ArgumentError, match="shape"):
         jb.simulate(jb.seed_scene(), start, duration=1.0)
+
+
+_TWO_STARTS = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), jb.seed_state())
+_TWO_SCENES = jb.seed_scene(slope=jnp.array([0.01, 0.02]))
+
+
+@pytest.mark.parametrize(
+    ("run", "name"),
+    [
+        (lambda: jb.simulate(_TWO_SCENES, jb.seed_state(), duration=1.0), "scene.ground.slope"),
+        (lambda: jb.simulate(jb.seed_scene(), _TWO_STARTS, duration=1.0), "state.hip_x"),
+        (
+            lambda: jb.simulate(
+                jb.RedundantScene(jb.seed_scene(), "index1"), _TWO_STARTS, duration=1.0
+            ),
+            "state.hip_x",
+        ),
+        (
+            lambda: jb.rigid_walk(
+                jb.RigidScene(_TWO_SCENES.walker, _TWO_SCENES.ground),
+                jb.rigid_state(jb.seed_state()),
+                steps=1,
+            ),
+            "scene.ground.slope",
+        ),
+        (
+            lambda: jb.rigid_walk(
+                jb.RigidScene(_TWO_SCENES.walker, jb.seed_scene().ground),
+                jb.rigid_state(_TWO_STARTS),
+                steps=1,
+            ),
+            "state.hip_x",
+        ),
+    ],
+)
+def test_batches_are_told_of_vmap(run, name):
+    with pytest.raises(jb.ArgumentError, match=r"jax\.vmap") as caught:
+        run()
+    assert f"{name} has the shape (2,)" in str(caught.value)
 
 
 def test_traced_values_pass():

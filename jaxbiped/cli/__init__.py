@@ -1,7 +1,9 @@
 """The command line: `jaxbiped COMMAND`."""
 
+import contextlib
+import io
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 from tyro.conf import subcommand
@@ -12,6 +14,7 @@ from jaxbiped.cli._basin import Basin
 from jaxbiped.cli._constraints import Constraints
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
+from jaxbiped.cli._refusal import one_sentence
 from jaxbiped.cli._walk import Walk
 
 _Command = (
@@ -25,8 +28,9 @@ _Command = (
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Runs a command and exits; 2 and one sentence for an argument that is not allowed."""
-    command = tyro.cli(_Command, args=arguments, prog="jaxbiped", description=__doc__)
+    """Runs a command and exits; with 2 and one sentence for an argument that is not allowed."""
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    command = None if given == ["--version"] else _parsed(given)
     if command is None:
         from importlib.metadata import version
 
@@ -38,3 +42,17 @@ def main(arguments: list[str] | None = None) -> None:
     except ArgumentError as error:
         print(f"jaxbiped: {error}", file=sys.stderr)
         sys.exit(2)
+
+
+def _parsed(arguments: list[str]) -> Any:
+    """The command; exits with 2 and one sentence where there is none."""
+    refusal = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(refusal):
+            return tyro.cli(_Command, args=arguments, prog="jaxbiped", description=__doc__)
+    except SystemExit as ended:
+        if ended.code:
+            print(f"jaxbiped: {one_sentence(refusal.getvalue())}", file=sys.stderr)
+        else:
+            print(refusal.getvalue(), end="", file=sys.stderr)
+        raise

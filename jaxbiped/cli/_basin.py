@@ -12,7 +12,8 @@ import numpy as np
 from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
-from jaxbiped._checks import ArgumentError, check_positive
+from jaxbiped._checks import ArgumentError, check_count
+from jaxbiped._progress import stage
 from jaxbiped.cli._basin_options import StartsOptions
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions
@@ -21,7 +22,7 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._cluster import cluster_executor, local_executor
-from jaxbiped.sweep._coordinates import COORDINATES, UNITS
+from jaxbiped.sweep._coordinates import COORDINATES
 from jaxbiped.sweep._fractions import basin_fractions
 from jaxbiped.sweep._given_starts import GivenStarts
 from jaxbiped.sweep._label import label_names
@@ -60,7 +61,7 @@ class SweepOptions:
 
     def executor(self) -> tuple[Executor | None, int]:
         """What runs the chunks, and how many at once; raises `ArgumentError`."""
-        check_positive("workers", self.workers)
+        check_count("workers", self.workers)
         if self.scheduler is not None:
             return cluster_executor(self.scheduler)
         if self.workers > 1:
@@ -100,12 +101,13 @@ class Basin:
             engine=self.sweep.engine,
         )
         effort = checked_effort(scene, **how)
-        check_positive("chunk", self.sweep.chunk)
+        check_count("chunk", self.sweep.chunk)
         self.output.check()
         if self.sweep.store is not None:
             check_store(self.sweep.store)
         executor, workers = self.sweep.executor()
-        known = labelling(scene, parameters=starts.parameters, **how)
+        with stage("finding the gaits that starts are labelled by"):
+            known = labelling(scene, parameters=starts.parameters, **how)
         began = time.perf_counter()
         try:
             found = sweep(
@@ -128,7 +130,9 @@ class Basin:
         report = Report(self.output.json)
         _print(report, numbers)
         if self.output.out is not None:
-            for path in _written(found, known, starts, self.output.out):
+            with stage("drawing the basin"):
+                paths = _written(found, known, starts, self.output.out)
+            for path in paths:
                 report.say(f"wrote {path}")
         numbers["wall_s"] = time.perf_counter() - _clock.IMPORT_BEGAN
         report.finish(numbers)
@@ -208,18 +212,13 @@ def _written(
             found.label.values,
             found[x].values,
             found[y].values,
-            names=(_words(x), _words(y)),
-            units=(UNITS.get(x, ""), UNITS.get(y, "")),
+            names=(x, y),
             period=found.period.values,
             mark=_mark(known, x, y),
         )
         paths.append(out / "basin.png")
         figure.savefig(paths[1])
     return paths
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
 
 
 def _mark(known: Labelling, x: str, y: str) -> tuple[float, float] | None:

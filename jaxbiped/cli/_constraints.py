@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 from tyro.conf import OmitArgPrefixes
 
-from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_writable_file
+from jaxbiped._checks import ArgumentError, check_choice, check_positive
 from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._walk_options import SceneOptions, StartOptions
+from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.scene._constraint_methods import CONSTRAINT_METHODS
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._compare_constraints import (
@@ -38,6 +38,8 @@ class Constraints:
     """Each SOLVER:TOLERANCE, or SOLVER:dt=STEP for steps of one size [s]."""
     duration: float = 0.5
     """Simulated time [s]."""
+    out: Path | None = None
+    """Folder for the picture."""
     json: Path | None = None
     """File for the numbers in SI units; - prints only them."""
 
@@ -52,8 +54,7 @@ class Constraints:
             check_choice("methods", name, CONSTRAINT_METHODS)
         check_positive("duration", self.duration, "s")
         integrators = [Integrator.read(text) for text in self.integrators]
-        if self.json is not None and str(self.json) != "-":
-            check_writable_file("--json", self.json)
+        OutputOptions(out=self.out, json=self.json).check()
         runs = compare_constraints(
             scene,
             self.start.state(scene),
@@ -67,8 +68,19 @@ class Constraints:
         report.say(
             f"{self.duration:g} s from the start; errors against the minimal formulation at 1e-10"
         )
+        if self.out is not None:
+            report.say(f"wrote {write_picture(runs, self.out)}")
         report.finish({"duration_s": self.duration, "runs": run_numbers(runs)})
         return 0
+
+
+def write_picture(runs: list[ConstraintRun], out: Path) -> Path:
+    """Writes the comparison as a picture; returns its path."""
+    from jaxbiped import plot
+
+    path = out / "constraints.png"
+    plot.constraint_runs(runs).savefig(path)
+    return path
 
 
 def run_numbers(runs: list[ConstraintRun]) -> list[dict[str, Any]]:

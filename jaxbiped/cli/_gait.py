@@ -11,11 +11,13 @@ import numpy as np
 from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
-from jaxbiped._checks import check_choice
+from jaxbiped._checks import check_choice, check_count
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.dynamics._rigid_checks import rigid_checks
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
+from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._explain_search import explain_search
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._search import Search
@@ -60,9 +62,11 @@ class FindGait:
         """Runs the command; returns the exit code."""
         imported = time.perf_counter()
         scene = self.scene.scene()
-        state = self.start.state(scene)
+        # A start that is not told is the search's own choice.
+        state = self.start.state(scene) if self.start.given else None
         if self.section is not None:
             check_choice("section", self.section, _SECTIONS)
+        check_count("period", self.period)
         self.output.check()
         section = None if self.section is None else _SECTIONS[self.section]()
         gait = find_gait(
@@ -78,7 +82,7 @@ class FindGait:
             "import": imported - _clock.IMPORT_BEGAN,
             "total": time.perf_counter() - _clock.IMPORT_BEGAN,
         }
-        numbers = gait_numbers(gait) | {"wall_s": wall}
+        numbers = gait_numbers(gait) | {"search": explain_search(scene, gait), "wall_s": wall}
         if found and isinstance(scene, RigidScene):
             numbers["assumptions"] = _assumptions(scene, gait)
         report = Report(self.output.json)
@@ -130,6 +134,17 @@ def gait_numbers(gait: Gait) -> dict[str, Any]:
         "sensitivities": _by_parameter(gait.parameters, gait.sensitivities),
         "sensitivity_errors": _by_parameter(gait.parameters, gait.sensitivity_errors),
         "elasticities": _by_parameter(gait.parameters, gait.elasticities),
+        "found_by": str(gait.found_by),
+        "others": [
+            {
+                "period_s": other.period,
+                "step_length_m": other.step_length,
+                "spectral_radius": other.spectral_radius,
+                "state": other.state._asdict(),
+            }
+            for other in gait.others
+        ],
+        "branch_end": str(BranchEnd(int(gait.origin.branch_end))),
         "walk_ending": str(gait.walk_outcome),
         "solver_steps": int(gait.solver_steps),
         "engine": gait.engine,
@@ -194,7 +209,7 @@ def _failure(numbers: dict[str, Any], gait: Gait) -> str:
         lost = f"the last trial that did not return ended {numbers['walk_ending']!r}"
     best = ", ".join(f"{name} = {_shown(value, '.6g')}" for name, value in numbers["state"].items())
     return (
-        f"no gait found: {numbers['ending']} after {turns} cycle{'s' * (turns != 1)}, "
+        f"{numbers['search']}; {numbers['ending']} after {turns} cycle{'s' * (turns != 1)}, "
         f"{returned}; {lost}; best state {best}"
     )
 
@@ -210,6 +225,7 @@ def _print(report: Report, numbers: dict[str, Any], gait: Gait) -> None:
         f"spectral radius {_shown(numbers['spectral_radius'], '.6f')}: "
         + ("stable" if numbers["stable"] else "NOT STABLE")
     )
+    report.say(numbers["search"])
     if gait.critical is not Bifurcation.NONE:
         report.say(f"AT A BIFURCATION: {gait.critical} (a multiplier lies on the unit circle)")
     report.say()

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxbiped._checks import check_writable_file
+from jaxbiped._progress import stage
 from jaxbiped.cli._report import Report, table
 from jaxbiped.dynamics._bristles import state_type
 from jaxbiped.dynamics._rigid_state import RigidState
@@ -38,19 +39,20 @@ class Models:
         if self.json is not None and str(self.json) != "-":
             check_writable_file("--json", self.json)
         seed = seed_scene()
-        numbers = {
-            "normal": [
-                _law(name, dataclasses.replace(seed, normal=law), law)
-                for name in NORMAL_LAWS
-                for law in [normal_law_like(name, **_SEED_NORMAL)]
-            ],
-            "friction": [
-                _law(name, dataclasses.replace(seed, friction=law), law)
-                for name in FRICTION_LAWS
-                for law in [friction_law_like(name, **_SEED_FRICTION)]
-            ],
-            "rungs": [_rung(name, scene) for name, scene in ladder(seed).items()],
-        }
+        with stage("counting the operations of every law"):
+            numbers = {
+                "normal": [
+                    _law(name, dataclasses.replace(seed, normal=law), law)
+                    for name in NORMAL_LAWS
+                    for law in [normal_law_like(name, **_SEED_NORMAL)]
+                ],
+                "friction": [
+                    _law(name, dataclasses.replace(seed, friction=law), law)
+                    for name in FRICTION_LAWS
+                    for law in [friction_law_like(name, **_SEED_FRICTION)]
+                ],
+                "rungs": [_rung(name, scene) for name, scene in ladder(seed).items()],
+            }
         report = Report(self.json)
         _print(report, numbers)
         report.finish(numbers)

@@ -7,8 +7,10 @@ import numpy as np
 
 from jaxbiped import _clock
 from jaxbiped._checks import ArgumentError
+from jaxbiped._progress import stage
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SolveOptions
+from jaxbiped.cli._warnings import cut_short
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._rigid_walk import RigidWalked, rigid_walk
@@ -16,6 +18,8 @@ from jaxbiped.solve._ending import Ending
 
 _MOST_ROWS = 24
 _MOST_STRIKES = 4096
+_SHOWN = 60.0
+"""The part of a long walk that is drawn [s]."""
 
 
 def run_rigid_walk(
@@ -28,7 +32,7 @@ def run_rigid_walk(
     """
     output.check()
     usual = SolveOptions()
-    for name in ("solver", "atol"):
+    for name in ("solver", "atol", "dt"):
         if getattr(solve, name) != getattr(usual, name):
             raise ArgumentError(
                 f'{name} = {getattr(solve, name)} is not allowed with model = "rigid": its steps '
@@ -40,11 +44,14 @@ def run_rigid_walk(
         rtol=solve.rtol,
         engine=solve.engine,
         most_arrivals=_MOST_STRIKES,
+        max_solver_steps=solve.most_steps(),
     )
-    rigid_walk(scene, state, **options).t.block_until_ready()
+    with stage("compiling the simulation (first time for this kind of scene)"):
+        rigid_walk(scene, state, **options).t.block_until_ready()
     compiled = time.perf_counter()
-    walk = rigid_walk(scene, state, **options)
-    walk.t.block_until_ready()
+    with stage(f"simulating {solve.duration:g} s"):
+        walk = rigid_walk(scene, state, **options)
+        walk.t.block_until_ready()
     finished = time.perf_counter()
     # The first run compiles; what a run takes by itself is the second one's.
     wall = {
@@ -52,11 +59,12 @@ def run_rigid_walk(
         "compile": 2.0 * compiled - prepared - finished,
         "run": finished - compiled,
     }
-    numbers = {
+    numbers: dict[str, Any] = {
         "model": "rigid",
         "ending": str(walk.outcome),
         "slope_rad": float(scene.ground.slope),
         "duration_s": float(walk.t),
+        "footsteps": max(int(walk.footsteps) - 1, 0),
         "steps": _footsteps(scene, walk),
         "solver": {
             "name": "dopri8",
@@ -65,14 +73,19 @@ def run_rigid_walk(
             "attempted": int(walk.attempts),
         },
         "wall_s": wall,
+        "warnings": cut_short(str(walk.outcome), int(walk.attempts)),
     }
+    if numbers["footsteps"] > len(numbers["steps"]):
+        numbers["warnings"].append(f"only the first {len(numbers['steps'])} footsteps are listed")
     report = Report(output.json)
     _print(report, numbers)
+    for sentence in numbers["warnings"]:
+        report.say(f"WARNING: {sentence}")
     if output.out is not None:
         from jaxbiped import plot
 
         path = output.out / "leg_angles.png"
-        plot.rigid_leg_angles(scene, state, duration=float(walk.t)).savefig(path)
+        plot.rigid_leg_angles(scene, state, duration=min(float(walk.t), _SHOWN)).savefig(path)
         report.say(f"wrote {path}")
     report.finish(numbers)
     return 1 if walk.outcome is Ending.SOLVER_FAILED else 0
@@ -107,8 +120,8 @@ def _print(report: Report, numbers: dict[str, Any]) -> None:
     report.say(table(head, rows, most=_MOST_ROWS))
     solver, wall = numbers["solver"], numbers["wall_s"]
     report.say(
-        f"{numbers['ending']} after {numbers['duration_s']:.4g} s and {len(rows)} whole footsteps "
-        f"on rigid feet on a slope of {numbers['slope_rad']:g} rad"
+        f"{numbers['ending']} after {numbers['duration_s']:.4g} s and {numbers['footsteps']} whole "
+        f"footsteps on rigid feet on a slope of {numbers['slope_rad']:g} rad"
     )
     report.say(
         f"{solver['name']} ({solver['engine']}): {solver['attempted']} steps attempted; "

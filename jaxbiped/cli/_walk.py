@@ -6,14 +6,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
+import jax.tree_util as jtu
 import numpy as np
 from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
+from jaxbiped._progress import stage
 from jaxbiped.cli._held import constraint_numbers, constraint_sentence
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._rigid_walk import run_rigid_walk
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, SolveOptions, StartOptions
+from jaxbiped.cli._warnings import ending_name, relative_residual, walk_warnings
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._footsteps import Footsteps, footsteps
@@ -24,9 +27,11 @@ from jaxbiped.simulate._simulate import Simulation
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._trajectory import Trajectory
 
-_SOLVER_STEPS = 65536
-"""Cap on the solver's steps for ten simulated seconds, raised in proportion for more."""
 _MOST_ROWS = 24
+_ROOM = 1 << 17
+"""Steps that XLA finds room for at first; a walk that takes more is run again with more room."""
+_SHOWN = 60.0
+"""The part of a long walk that is animated [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,39 +60,43 @@ class Walk:
             assert isinstance(state, RigidState)
             return run_rigid_walk(scene, state, self.solve, self.output)
         assert isinstance(state, State)
-        request = Simulation.prepare(
+        with stage("preparing the start"):
+            request = self._request(scene, state)
+        self.output.check()
+        began = time.perf_counter()
+        trajectory, seconds = _simulated(request)
+        wall = {
+            "import": imported - _clock.IMPORT_BEGAN,
+            "compile": time.perf_counter() - began - seconds,
+            "run": seconds,
+        }
+        self._report(scene, trajectory, wall)
+        return 1 if trajectory.outcome == Ending.SOLVER_FAILED else 0
+
+    def _request(self, scene: Any, state: State) -> Simulation:
+        return Simulation.prepare(
             scene,
             state,
             duration=self.solve.duration,
             solver=self.solve.solver,
             rtol=self.solve.rtol,
             atol=self.solve.atol,
+            dt=self.solve.dt,
             engine=self.solve.engine,
-            max_solver_steps=int(_SOLVER_STEPS * max(1.0, self.solve.duration / 10.0)),
+            max_solver_steps=self.solve.most_steps(),
         )
-        self.output.check()
-        prepared = time.perf_counter()
-        program = request.compile()
-        compiled = time.perf_counter()
-        trajectory = program()
-        finished = time.perf_counter()
-        wall = {
-            "import": imported - _clock.IMPORT_BEGAN,
-            "compile": compiled - prepared,
-            "run": finished - compiled,
-        }
-        self._report(scene, trajectory, wall)
-        return 1 if trajectory.outcome == Ending.SOLVER_FAILED else 0
 
     def _report(self, scene: Any, trajectory: Trajectory, wall: dict[str, float]) -> None:
-        steps = footsteps(scene, trajectory)
-        ledger = energy_ledger(scene, trajectory)
+        with stage("measuring the footsteps"):
+            steps = footsteps(scene, trajectory)
+            ledger = energy_ledger(scene, trajectory)
         numbers: dict[str, Any] = {
-            "ending": str(trajectory.outcome),
+            "ending": ending_name(scene, trajectory),
             "slope_rad": float(scene.ground.slope),
             "duration_s": float(trajectory.t[-1]),
             "steps": _step_list(steps),
             "energy_residual_J": float(ledger.residual[0]),
+            "energy_residual_relative": relative_residual(ledger),
             "gravity_work_J": float(ledger.gravity_work[0]),
             "solver": {
                 "name": self.solve.solver,
@@ -98,16 +107,45 @@ class Walk:
             },
             "wall_s": wall,
         }
+        rtol = self.solve.rtol if self.solve.dt is None else None
+        numbers["warnings"] = walk_warnings(scene, numbers, rtol=rtol)
         report = Report(self.output.json)
         if isinstance(scene, RedundantScene):
             numbers["constraints"] = constraint_numbers(scene, trajectory)
         _print(report, numbers)
+        for sentence in numbers["warnings"]:
+            report.say(f"WARNING: {sentence}")
         if isinstance(scene, RedundantScene):
             report.say(constraint_sentence(numbers["constraints"]))
         if self.output.out is not None:
-            for path in write_outputs(scene, trajectory, self.output.out):
+            with stage("drawing the figures and the animation"):
+                paths = write_outputs(scene, trajectory, self.output.out)
+            for path in paths:
                 report.say(f"wrote {path}")
         report.finish(numbers)
+
+
+def _simulated(request: Simulation) -> tuple[Trajectory, float]:
+    """The trajectory, and how long the solve took once it was compiled [s]."""
+    most = room = request.max_solver_steps
+    if request.engine == "xla" and request.dt is None:
+        # It makes room beforehand, and time asked for need not be walked.
+        room = min(most, _ROOM)
+    while True:
+        trajectory, seconds = _run(dataclasses.replace(request, max_solver_steps=room))
+        if room == most or trajectory.outcome is not Ending.OUT_OF_STEPS:
+            return trajectory, seconds
+        room = min(most, 4 * room)
+
+
+def _run(request: Simulation) -> tuple[Trajectory, float]:
+    """The trajectory of a request and how long it took once it was compiled [s]."""
+    with stage("compiling the simulation (first time for this kind of scene)"):
+        program = request.compile()
+    compiled = time.perf_counter()
+    with stage(f"simulating {float(request.duration):g} s"):
+        trajectory = program()
+    return trajectory, time.perf_counter() - compiled
 
 
 def write_outputs(scene: Any, trajectory: Trajectory, out: Path) -> list[Path]:
@@ -122,13 +160,19 @@ def write_outputs(scene: Any, trajectory: Trajectory, out: Path) -> list[Path]:
         "penetrations.png": plot.penetrations,
         "contact_forces.png": plot.contact_forces,
     }
-    paths = []
+    # The numbers first: no picture that fails takes them away.
+    trajectory_dataset(scene, trajectory).to_netcdf(out / "trajectory.nc")
     for name, draw in figures.items():
         draw(scene, trajectory).savefig(out / name)
-        paths.append(out / name)
-    plot.save_animation(plot.animate(scene, trajectory), out / "walk.gif")
-    trajectory_dataset(scene, trajectory).to_netcdf(out / "trajectory.nc")
-    return [*paths, out / "walk.gif", out / "trajectory.nc"]
+    plot.save_animation(plot.animate(scene, _beginning(trajectory)), out / "walk.gif")
+    return [out / "trajectory.nc", *(out / name for name in figures), out / "walk.gif"]
+
+
+def _beginning(trajectory: Trajectory) -> Trajectory:
+    """The part of a walk that is animated."""
+    count = int(np.searchsorted(np.asarray(trajectory.t), _SHOWN, side="right"))
+    t, state = jtu.tree_map(lambda leaf: leaf[:count], (trajectory.t, trajectory.state))
+    return dataclasses.replace(trajectory, t=t, state=state)
 
 
 def _step_list(steps: Footsteps) -> list[dict[str, float]]:

@@ -9,11 +9,16 @@ from typing import Any
 from jaxbiped._checks import (
     ArgumentError,
     check_choice,
+    check_count,
+    check_finite,
+    check_positive,
     check_writable_directory,
     check_writable_file,
 )
-from jaxbiped.dynamics._rigid_state import RigidState, rigid_state
-from jaxbiped.dynamics._state import State, checked_state, seed_state
+from jaxbiped._types import as_float
+from jaxbiped.cli._default_start import default_start
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import State
 from jaxbiped.scene._catalogue import (
     FRICTION_LAWS,
     NORMAL_LAWS,
@@ -32,9 +37,10 @@ from jaxbiped.scene._walker import Walker
 _SEED = {
     parameter.name: parameter.default for parameter in signature(seed_scene).parameters.values()
 }
-_START = {name: float(value) for name, value in seed_state()._asdict().items()}
 
-
+MOST_STEPS = 1 << 20
+"""Solver's steps that nobody asked for more than: about 25 minutes of the seed's walk."""
+_STEPS_OF_TEN_SECONDS = 65536
 MODELS = ("compliant", "rigid")
 FORMULATIONS = ("minimal", "redundant")
 _OF_CONTACT = ("n", "K", "c", "mu_static", "mu_kinetic", "v0", "xi")
@@ -99,11 +105,14 @@ class SceneOptions:
         scene = with_parameters(scene, dict(_named_value(text) for text in self.set))
         if self.formulation == "redundant":
             return self._redundant(scene)
+        rolls = isinstance(scene, RigidScene)
+        chosen = 'model = "rigid"' if rolls else 'formulation = "minimal"'
+        mend = "" if rolls else "; --formulation redundant has them"
         for name, usual in (("method", None), ("orientation", "angle")):
             if getattr(self, name) != usual:
                 raise ArgumentError(
-                    f'{name} = {getattr(self, name)} is not allowed with formulation = "minimal": '
-                    "it has no constraints."
+                    f"{name} = {getattr(self, name)} is not allowed with {chosen}: it has no "
+                    f"constraints{mend}."
                 )
         return scene
 
@@ -153,41 +162,53 @@ def _known(name: str, value: str, known: Iterable[str]) -> str:
 
 
 def _named_value(text: str) -> tuple[str, float]:
-    name, _, value = text.partition("=")
+    name, given, value = (part.strip() for part in text.partition("="))
+    if not name or not given:
+        raise ArgumentError(f"set = {text!r} is not allowed: write name=value, such as K=2e6.")
     try:
         return name, float(value)
     except ValueError:
-        raise ArgumentError(f"set = {text!r} is not allowed: write name=value.") from None
+        raise ArgumentError(
+            f"set = {text!r} is not allowed: {name} must be a number, and {value!r} is none."
+        ) from None
 
 
 @dataclasses.dataclass(frozen=True)
 class StartOptions:
-    """Start in the slope's frame; the seed's own unless said otherwise."""
+    """Start in the slope's frame; the seed's own, fitted to the scene, unless said otherwise."""
 
-    hip_x: float = _START["hip_x"]
-    """Hip, along the slope [m]."""
-    hip_z: float = _START["hip_z"]
-    """Hip, above the slope [m]."""
-    theta_1: float = _START["theta_1"]
-    """Angle of leg 1 from the slope's normal, foot ahead positive [rad]."""
-    theta_2: float = _START["theta_2"]
-    """Angle of leg 2 [rad]."""
-    hip_vx: float = _START["hip_vx"]
-    """Hip velocity along the slope [m/s]."""
-    hip_vz: float = _START["hip_vz"]
-    """Hip velocity away from the slope [m/s]."""
-    omega_1: float = _START["omega_1"]
-    """Rate of leg 1 [rad/s]."""
-    omega_2: float = _START["omega_2"]
-    """Rate of leg 2 [rad/s]."""
+    hip_x: float | None = None
+    """Hip, along the slope [m]; the seed's is 0."""
+    hip_z: float | None = None
+    """Hip, above the slope [m]; the seed's is 0.395, fitted to legs and ground."""
+    theta_1: float | None = None
+    """Angle of leg 1 from the slope's normal, foot ahead positive [rad]; the seed's is -0.2479."""
+    theta_2: float | None = None
+    """Angle of leg 2 [rad]; the seed's is 0.1655."""
+    hip_vx: float | None = None
+    """Hip velocity along the slope [m/s]; the seed's is 0.49797, fitted to the legs."""
+    hip_vz: float | None = None
+    """Hip velocity away from the slope [m/s]; the seed's is 0.05853, fitted likewise."""
+    omega_1: float | None = None
+    """Rate of leg 1 [rad/s]; the seed's is -0.0052."""
+    omega_2: float | None = None
+    """Rate of leg 2 [rad/s]; the seed's is -1.2565."""
+
+    @property
+    def given(self) -> dict[str, float]:
+        """The numbers that were said."""
+        return {name: x for name, x in dataclasses.asdict(self).items() if x is not None}
 
     def state(self, scene: Any) -> State | RigidState:
         """The start, of the kind that the scene needs; raises `ArgumentError`.
 
         A rigid walker takes the place and the legs' angles and rates.
         """
-        whole = checked_state(State(**dataclasses.asdict(self)))
-        return rigid_state(whole) if isinstance(scene, RigidScene) else whole
+        for name, value in self.given.items():
+            check_finite(f"state.{name}", value)
+        start = default_start(scene)
+        own = {name: as_float(x) for name, x in self.given.items() if name in start._fields}
+        return start._replace(**own)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -219,5 +240,19 @@ class SolveOptions:
     """Relative tolerance."""
     atol: float | None = None
     """Absolute tolerance (SI units); a hundredth of the relative one unless given."""
+    dt: float | None = None
+    """Steps of this size [s], in place of tolerances; what --solver euler needs."""
+    max_solver_steps: int | None = None
+    """Cap on the solver's steps: unless given 65536 for each ten seconds, at most 1048576."""
     engine: str = "auto"
     """What computes: xla, lanes, or auto for the faster one that can."""
+
+    def most_steps(self) -> int:
+        """The cap on the solver's steps; raises `ArgumentError`."""
+        check_positive("duration", self.duration, "s")
+        if self.max_solver_steps is not None:
+            check_count("max_solver_steps", self.max_solver_steps)
+            return self.max_solver_steps
+        if self.dt is not None:
+            return MOST_STEPS
+        return int(min(MOST_STEPS, _STEPS_OF_TEN_SECONDS * max(1.0, self.duration / 10.0)))

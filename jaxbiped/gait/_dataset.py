@@ -25,6 +25,8 @@ _STATE_UNITS = {
     "hip_vz": "m/s",
     "omega_1": "rad/s",
     "omega_2": "rad/s",
+    "bristle_1": "1",
+    "bristle_2": "1",
 }
 
 
@@ -85,5 +87,6 @@ def _parameters(scene: Any) -> dict[str, float | str]:
     for part_name, part in parts.items():
         found[part_name] = type(part).__name__
         for name, value in vars(part).items():
-            found[f"{part_name}.{name}"] = float(value)
+            if value is not None:  # a parameter that the law does without
+                found[f"{part_name}.{name}"] = float(value)
     return found

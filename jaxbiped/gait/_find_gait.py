@@ -13,7 +13,8 @@ import numpy as np
 import optax
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
+from jaxbiped._checks import check_choice, check_count, check_type, check_unbatched
+from jaxbiped._progress import stage
 from jaxbiped._types import as_float
 from jaxbiped.dynamics._bristles import state_for
 from jaxbiped.dynamics._consistent import consistent_state
@@ -24,10 +25,13 @@ from jaxbiped.dynamics._state import checked_state
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gait import Gait, described
 from jaxbiped.gait._newton import Method
+from jaxbiped.gait._origin import FoundBy, Origin, plain_origin
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
-from jaxbiped.gait._search import Found, search
+from jaxbiped.gait._search import Found, Search, search
+from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.gait._solver import orbit_solver
+from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
 from jaxbiped.gait._system import RedundantWalking, checked_section, system_of
 from jaxbiped.gait._turn import Turning
 from jaxbiped.lanes._call import lowered_ahead
@@ -35,7 +39,6 @@ from jaxbiped.scene._parameters import chosen_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._passage import Precision
 from jaxbiped.solve._projected import projecting
 
 _RESIDUAL_SHARE = 0.3
@@ -71,8 +74,13 @@ def find_gait(
             constraint directions are left out. Second derivatives (the spectral radius's) take the
             minimal equations along the redundant motion: on the constraints these are the method's
             own, but for what a penalty leaves (a share of 1/(A s), see `Penalty`).
-        guess: a start near the gait, on the section or not; unless given, the seed's start, its
-            stance foot set down as deep for the scene's own legs and rolling as fast.
+        guess: a start near the gait, on the section or not; the gait is then the one that Newton's
+            method comes to from there. Unless given, the search goes through stages, each only
+            where those before found no stable gait: Newton's method from the seed's start, fitted
+            to the scene's legs; walks forwards from many starts (by lanes only); continuation of
+            the seed scene's gait to this one; Newton's method from scattered starts. The gait is
+            then the stable one, or where none was seen the one of smallest spectral radius. Under
+            `jit` and `vmap` there are two stages, the first and the continuation.
         period: footsteps in a cycle.
         section: where the cycle begins, `MidStance()` unless given. A rigid walker's cycles begin
             just after its impact, at `HeelStrike()`.
@@ -81,7 +89,8 @@ def find_gait(
         accuracy: "balanced" or "tight".
         method: "newton", or "optax" to minimise the squared residual by gradient.
         optimiser: for "optax"; Adam with a rate of 1e-2 unless given.
-        most_turns: cycles allowed; 40 for "newton", 400 for "optax".
+        most_turns: cycles allowed, and no stages beyond the first; unless given, 40 in each
+            search by "newton", 400 by "optax".
         radius_sensitivities: whether to differentiate the spectral radius, which takes second
             derivatives of the motion.
         solver: a name (see `SOLVERS`) or any diffrax solver without memory; unless given "rodas4",
@@ -89,7 +98,8 @@ def find_gait(
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
 
     Returns:
-        The gait, or the best that was found instead: look at its `ending`.
+        The gait, or the best that was found instead: look at its `ending`. `found_by`, `others` and
+        `explain_search` tell how it was found.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
@@ -97,18 +107,13 @@ def find_gait(
     check_type("scene", scene, Scene, RigidScene, RedundantScene)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_choice("method", method, ("newton", "optax"))
-    check_positive("period", period)
-    if int(period) != period:
-        raise ArgumentError(f"period = {period} is not allowed: it must be a whole number.")
+    check_count("period", period)
+    check_unbatched("scene", scene)
     rigid = isinstance(scene, RigidScene)
     start = _checked_start(scene, seed_start(scene) if guess is None else guess)
-    if jnp.ndim(start.hip_x) != 0:
-        raise ArgumentError(
-            f"guess has leaves of shape {jnp.shape(start.hip_x)}: give one state, and use jax.vmap "
-            "for many."
-        )
+    check_unbatched("guess", start, "one state")
     most = (40 if method == "newton" else 400) if most_turns is None else most_turns
-    check_positive("most_turns", most)
+    check_count("most_turns", most)
     scene = jtu.tree_map(as_float, scene)
     # A redundant scene's leaves begin with those of what it models.
     modelled = scene.scene if isinstance(scene, RedundantScene) else scene
@@ -123,25 +128,80 @@ def find_gait(
         leaves=(scene, start),
         redundant=isinstance(scene, RedundantScene),
     )
-    within = None
-    if isinstance(scene, RedundantScene):
-        method_of_steps, within = projecting(scene, method_of_steps), RedundantWalking()
-    turning = Turning(
-        system=system_of(scene),
-        section=section,
-        solver=method_of_steps,
-        time_limit=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
-        steps=int(period),
-        max_solver_steps=MOST_SOLVER_STEPS[accuracy],
-        engine=chosen,
-        within=within,
+    turning = _turning(
+        scene, section, method_of_steps, chosen, steps=int(period), most=MOST_SOLVER_STEPS[accuracy]
     )
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
         most_turns=int(most),
         residual=_RESIDUAL_SHARE * precision.rtol,
     )
-    return _find(turning, scene, start, precision, how, names, active, radius_sensitivities)
+    searching = (turning, scene, active, start, precision, how)
+    describing = (names, active, radius_sensitivities)
+    by = FoundBy.GUESS if guess is not None else FoundBy.START
+    origin = plain_origin(modelled, start, by)
+    staged = guess is None and most_turns is None and method == "newton"
+    if _is_traced(searching):
+        if staged:
+            found, origin = search_along(*searching, origin)
+        else:
+            found = search(*searching)
+        return described(turning, scene, start, found, *describing, origin)
+    _compile_once(searching, describing, origin)
+    found = _searched(*searching)
+    if staged and not _is_stable(found):
+        found, origin = _search_on(searching, modelled, found, engine)
+    return described(turning, scene, start, found, *describing, origin)
+
+
+def _turning(
+    scene: Any, section: AbstractSection, solver: Any, engine: str, *, steps: int, most: int
+) -> Turning:
+    within = None
+    if isinstance(scene, RedundantScene):
+        solver, within = projecting(scene, solver), RedundantWalking()
+    return Turning(
+        system=system_of(scene),
+        section=section,
+        solver=solver,
+        time_limit=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
+        steps=steps,
+        max_solver_steps=most,
+        engine=engine,
+        within=within,
+    )
+
+
+def _is_stable(found: Found) -> bool:
+    usable = int(found.ending) == int(Search.FOUND) and bool(found.sound)
+    return usable and spectral_radius(found) < 1.0
+
+
+def _search_on(
+    searching: tuple, modelled: Scene | RigidScene, first: Found, engine: str
+) -> tuple[Found, Origin]:
+    """The stages of a search beyond the first."""
+    turning, scene, active, start, precision, how = searching
+    solver, section = orbit_solver(None, rigid=isinstance(modelled, RigidScene)), None
+    if isinstance(scene, RedundantScene):
+        engine = "auto"
+    section = checked_section(modelled, None)
+    scout_engine = orbit_engine(engine, solver=solver, section=section, leaves=(modelled, start))
+    scout = _turning(
+        modelled, section, solver, scout_engine, steps=1, most=MOST_SOLVER_STEPS["balanced"]
+    )
+
+    def search_from(turning: Turning, scene: Any, start: Any) -> Found:
+        return _searched(turning, scene, active, start, precision, how)
+
+    staged = search_in_stages(search_from, turning, scout, scene, modelled, first)
+    if staged.best is not None:
+        found = staged.best.found
+    elif int(first.ending) == int(Search.FOUND):
+        found = first._replace(ending=jnp.asarray(int(Search.NO_WALK)))
+    else:
+        found = first
+    return found, origin_of(staged, modelled, start)
 
 
 def _checked_start(scene: Any, start: Any) -> Any:
@@ -157,27 +217,16 @@ def _adam() -> optax.GradientTransformation:
     return optax.adam(1e-2)
 
 
-def _find(
-    turning: Turning,
-    scene: Any,
-    start: Any,
-    precision: Precision,
-    method: Method,
-    names: tuple[str, ...],
-    active: tuple[int, ...],
-    radius: bool,
-) -> Gait:
-    searching = (turning, scene, active, start, precision, method)
-    describing = (names, active, radius)
-    kind = None if _is_traced(searching) else _kind_of((searching, names, radius))
-    if kind is not None and kind not in _COMPILED:
-        _compile(searching, describing)
+def _compile_once(searching: tuple, describing: tuple, origin: Origin) -> None:
+    """Compiles what is not compiled yet for this kind of search."""
+    kind = _kind_of((searching, describing[0], describing[2]))
+    if kind not in _COMPILED:
+        with stage("compiling the search (first time for this kind of scene)"):
+            _compile(searching, describing, origin)
         _COMPILED.add(kind)
-    found = _searched(*searching)
-    return described(turning, scene, start, found, *describing)
 
 
-def _compile(searching: tuple, describing: tuple) -> None:
+def _compile(searching: tuple, describing: tuple, origin: Origin) -> None:
     """Compiles both programs, and what lanes run for them, at the same time."""
     turning, scene, _, start, *_ = searching
     nothing = _nothing(eqx.filter_eval_shape(_searched, *searching))
@@ -186,7 +235,7 @@ def _compile(searching: tuple, describing: tuple) -> None:
     with ThreadPoolExecutor() as meanwhile:
         with lowered_ahead() as programs:
             # What takes lanes longest begins first.
-            lowered = second.lower(turning, scene, start, nothing, *describing)
+            lowered = second.lower(turning, scene, start, nothing, *describing, origin)
             ready = [meanwhile.submit(lowered.compile)]
             ready.append(meanwhile.submit(first.lower(*searching).compile))
         for program in programs:

@@ -1,5 +1,6 @@
 """Periodic gaits from many starts."""
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -8,16 +9,13 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_positive, check_type
+from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._bristles import state_for
-from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search import Search
-from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
@@ -32,7 +30,8 @@ class Gaits(NamedTuple):
         gaits: k gaits, every array with a first axis of k.
         reached: from how many starts each was, shape (k,).
         which: the gait that each start led to, −1 where none, shape (n,).
-        ending: code of a `Search` of each start, shape (n,).
+        ending: code of a `Search` of each start, shape (n,): "no walk" where it led to an orbit
+            that is none.
     """
 
     gaits: Gait
@@ -63,6 +62,9 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
         )
 
     gaits = _every(jtu.tree_map(as_float, scene), jtu.tree_map(as_float, starts), options)
+    no_walk = (gaits.ending == int(Search.FOUND)) & ~gaits.sound
+    ending = jnp.where(no_walk, int(Search.NO_WALK), gaits.ending)
+    gaits = dataclasses.replace(gaits, ending=ending)
     first, which = _told_apart(gaits)
     reached = np.bincount(which[which >= 0], minlength=len(first))
     order = np.argsort(-reached, kind="stable")
@@ -95,47 +97,3 @@ def _told_apart(gaits: Gait) -> tuple[list[int], np.ndarray]:
             first.append(int(i))
         which[i] = near[0] if near else len(first) - 1
     return first, which
-
-
-def rolling_starts(
-    scene: Scene | RigidScene, count: int, *, spread: float = 0.3, seed: int = 0
-) -> Any:
-    """Starts about the seed's: its angles and leg rates scattered, the stance foot rolling.
-
-    Args:
-        scene: the walker, compliant or rigid.
-        count: n, how many; the first is the seed's own, fitted to the scene.
-        spread: largest relative change of an angle or rate.
-        seed: of the random numbers.
-
-    Returns:
-        A `State` or `RigidState` with leaves of shape (n,): leg 2 stands as deep as in the seed's
-        start, and does not slip.
-
-    Raises:
-        ArgumentError: count below 1, or spread not above 0.
-    """
-    check_type("scene", scene, Scene, RigidScene)
-    check_positive("count", count)
-    check_positive("spread", spread)
-    scene = jtu.tree_map(as_float, scene)
-    middle = seed_start(scene)
-    scatter = jax.random.uniform(jax.random.key(seed), (4, int(count)), minval=-1.0, maxval=1.0)
-    factors = 1.0 + spread * scatter.at[:, 0].set(0.0)
-    theta_1, theta_2 = middle.theta_1 * factors[0], middle.theta_2 * factors[1]
-    omega_1, omega_2 = middle.omega_1 * factors[2], middle.omega_2 * factors[3]
-    if isinstance(scene, RigidScene):
-        return RigidState(jnp.zeros_like(theta_1), theta_1, theta_2, omega_1, omega_2)
-    depth = standing_height(scene, middle.theta_2) - middle.hip_z
-    reach = scene.walker.hip_to_foot
-    plain = State(
-        hip_x=jnp.zeros_like(theta_1),
-        hip_z=standing_height(scene, theta_2, depth),
-        theta_1=theta_1,
-        theta_2=theta_2,
-        hip_vx=-(reach * jnp.cos(theta_2) + scene.walker.r) * omega_2,
-        hip_vz=-reach * jnp.sin(theta_2) * omega_2,
-        omega_1=omega_1,
-        omega_2=omega_2,
-    )
-    return state_for(scene, plain)

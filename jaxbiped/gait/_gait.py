@@ -6,10 +6,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._orbit import Orbit, orbit_of
+from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
 from jaxbiped.gait._search import Found, Search
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.gait._turn import Turn, Turning
@@ -71,6 +73,9 @@ class Gait(eqx.Module):
         turns: cycles that the search took.
         history: residual of each of them, NaN beyond the last.
         solver_steps: solver steps attempted in the last cycle.
+        sound: whether the orbit is a walk: no foot deep underground, and a step downhill (boolean).
+        origin: how the search came to it, which other gaits it saw, and where the seed's gait
+            ended on the way to this scene; see `found_by` and `others`.
         orbit: times [s] and states at the ends of the last cycle's solver steps, NaN beyond.
         parameters: names of the p parameters.
         engine: what computed it, "xla" or "lanes".
@@ -93,6 +98,8 @@ class Gait(eqx.Module):
     turns: Scalar
     history: Scalar
     solver_steps: Scalar
+    sound: Scalar
+    origin: Origin
     orbit: tuple[Scalar, Any]
     parameters: tuple[str, ...] = eqx.field(static=True)
     engine: str = eqx.field(static=True)
@@ -106,6 +113,18 @@ class Gait(eqx.Module):
     def walk_outcome(self) -> Ending:
         """How the last trial that did not return ended; for one gait, not a batch."""
         return Ending(int(self.walk_ending))
+
+    @property
+    def found_by(self) -> FoundBy:
+        """The stage of the search that came to it, by name; for one gait, not a batch."""
+        return FoundBy(int(self.origin.found_by))
+
+    @property
+    def others(self) -> list[OtherGait]:
+        """Other gaits that the search saw, by their spectral radius; for one gait, not a batch."""
+        seen = self.origin.others
+        known = int(np.sum(np.isfinite(np.asarray(seen.period))))
+        return [jtu.tree_map(lambda leaf, k=k: float(leaf[k]), seen) for k in range(known)]
 
     @property
     def critical(self) -> Bifurcation:
@@ -127,6 +146,7 @@ def described(
     names: tuple[str, ...],
     active: tuple[int, ...],
     radius: bool,
+    origin: Origin,
 ) -> Gait:
     """The gait that a search from `start` found, with its stability and its derivatives."""
     orbit = orbit_of(turning, scene, active, start, found, radius=radius)
@@ -173,6 +193,8 @@ def described(
         turns=found.turns,
         history=found.history,
         solver_steps=last.attempted,
+        sound=found.sound,
+        origin=jtu.tree_map(jnp.asarray, origin),
         orbit=_path(last, start),
         parameters=names,
         engine=turning.engine,

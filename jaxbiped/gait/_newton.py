@@ -1,4 +1,9 @@
-"""One step of the search for an orbit: a turn is judged, and the next trial proposed."""
+"""Newton's method with affine-invariant damping: a turn is judged, the next trial proposed.
+
+A step is measured by Newton's own correction ("natural level function"), not by the residual: the
+fast directions of contact make the residual a poor guide. Deuflhard, Newton Methods for Nonlinear
+Problems (2004), algorithm NLEQ-ERR.
+"""
 
 import enum
 from typing import Any, NamedTuple
@@ -14,15 +19,16 @@ from jaxbiped.gait._turn import Turn
 
 _NEAR, _NEARER = 1e-3, 1e-4
 """Residuals at which rough solves give way to coarse ones, and these to fine ones."""
-_FIRST_DAMPING, _LARGEST_DAMPING = 1e-3, 1e8
+_SMALLEST_DAMPING = 1e-3
+"""Share of Newton's step below which no step is a step forward."""
 
 
 class Method(eqx.Module):
     """How to search.
 
     Attributes:
-        optimiser: of the squared residual, by its gradient; None for Newton's method, damped as
-            Levenberg and Marquardt do where it fails.
+        optimiser: of the squared residual, by its gradient; None for Newton's method, damped by
+            its natural level function.
         most_turns: turns allowed.
         residual: largest change of a recurring component over a turn that counts as none.
     """
@@ -50,9 +56,10 @@ class Progress(NamedTuple):
     Attributes:
         stage: code of a `Stage`.
         trial: the m recurring components to turn from next.
-        base: the best so far; `base_residual` the largest change over its turn `base_turn`,
-            `change` its changes and `slope` their derivatives by the components (m, m).
-        damping: Levenberg and Marquardt's.
+        base: the last accepted; `base_residual` the largest change over its turn `base_turn`,
+            `slope` the derivatives of its changes with respect to the components (m, m), `step`
+            Newton's correction of it.
+        damping: share of the step that `trial` took.
         coarse: the last looser turn.
         optimiser: its state.
         code, turns, history: as in `Found`.
@@ -62,8 +69,8 @@ class Progress(NamedTuple):
     trial: Scalar
     base: Scalar
     base_residual: Scalar
-    change: Scalar
     slope: Scalar
+    step: Scalar
     base_turn: Turn
     damping: Scalar
     coarse: Turn
@@ -85,10 +92,10 @@ def begun(first: Scalar, off: Scalar, method: Method, nothing: Turn) -> Progress
         trial=first,
         base=first,
         base_residual=jnp.asarray(jnp.inf),
-        change=jnp.zeros_like(first),
-        slope=jnp.zeros((len(first), len(first))),
+        slope=jnp.eye(len(first)),
+        step=jnp.zeros_like(first),
         base_turn=nothing,
-        damping=jnp.asarray(0.0),
+        damping=jnp.asarray(1.0),
         coarse=nothing,
         optimiser=None if method.optimiser is None else method.optimiser.init(first),
         code=jnp.asarray(0),
@@ -104,45 +111,49 @@ def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
     residual = jnp.where(returned, jnp.max(jnp.abs(change)), jnp.inf)
     history = now.history.at[now.turns].set(residual)
     approaching = now.stage == Stage.APPROACH
-    better = (
-        returned & ~approaching & ((residual < now.base_residual) | (method.optimiser is not None))
-    )
+    if method.optimiser is not None:
+        forward = jnp.asarray(True)
+        simplified = jnp.zeros_like(change)
+    else:
+        simplified = -solved(now.slope, change)
+        forward = jnp.isinf(now.base_residual) | (_size(simplified) < _size(now.step))
+    better = returned & ~approaching & forward
 
     base = jnp.where(better, now.trial, now.base)
     base = jnp.where(approaching & returned, latest.recurring, base)
     m = len(base)
-    base_residual, moved, slope, base_turn = chosen(
+    base_residual, slope, base_turn = chosen(
         better,
-        (residual, change, latest.jacobian[:, :m] - jnp.eye(m), latest),
-        (now.base_residual, now.change, now.slope, now.base_turn),
-    )
-    damping = jnp.where(
-        better,
-        jnp.where(now.damping <= _FIRST_DAMPING, 0.0, 0.1 * now.damping),
-        jnp.maximum(10.0 * now.damping, _FIRST_DAMPING),
+        (residual, latest.jacobian[:, :m] - jnp.eye(m), latest),
+        (now.base_residual, now.slope, now.base_turn),
     )
     rough_done = (now.stage == Stage.ROUGH) & (base_residual <= _NEAR)
     coarse_done = (now.stage == Stage.COARSE) & (base_residual <= _NEARER)
     refined = rough_done | coarse_done
     fine_done = (now.stage == Stage.FINE) & (base_residual <= method.residual)
     nowhere = ~returned & ~jnp.isfinite(base_residual) & (now.stage < Stage.COARSE)
+    if method.optimiser is not None:
+        step, optimiser = _optimised(now, base, change, slope, better, method.optimiser)
+        damping = jnp.asarray(1.0)
+    else:
+        step = jnp.where(better, -solved(slope, change), now.step)
+        damping, optimiser = _damped(now, step, simplified, returned, better), now.optimiser
+    damping = jnp.where(refined | approaching, 1.0, damping)
+    stuck = (damping < _SMALLEST_DAMPING) | (better & ~jnp.all(jnp.isfinite(step)))
     stage = jnp.where(approaching, int(Stage.ROUGH), now.stage)
     stage = jnp.where(rough_done, int(Stage.COARSE), stage)
     stage = jnp.where(coarse_done, int(Stage.FINE), stage)
+    stage = jnp.where(stuck, int(Stage.STUCK), stage)
     stage = jnp.where(fine_done, int(Stage.FOUND), stage)
     stage = jnp.where(nowhere, int(Stage.NO_RETURN), stage)
-    stage = jnp.where(damping > _LARGEST_DAMPING, int(Stage.STUCK), stage)
-    damping = jnp.where(approaching | refined, 0.0, damping)
-    step, optimiser = _step(base, moved, slope, damping, now, method, better)
-    trial = jnp.where(approaching, base, base + step)
     return Progress(
         stage=stage,
-        trial=trial,
+        trial=jnp.where(approaching, base, base + damping * step),
         base=base,
         # The finer solves begin afresh: their residuals are not the looser ones'.
         base_residual=jnp.where(refined, jnp.inf, base_residual),
-        change=moved,
         slope=slope,
+        step=step,
         base_turn=base_turn,
         damping=damping,
         coarse=chosen(coarse_done, base_turn, now.coarse),
@@ -153,26 +164,43 @@ def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
     )
 
 
-def _step(
+def _damped(
+    now: Progress, step: Scalar, simplified: Scalar, returned: Scalar, better: Scalar
+) -> Scalar:
+    """Share of `step` to try next, from what the last trial told of the map's nonlinearity."""
+    tiny = jnp.finfo(step.dtype).tiny
+    # After a step forward: how much Newton's new correction differs from the simplified one.
+    known = _size(now.step) * _size(simplified) * now.damping
+    ahead = known / (_size(simplified - step) * _size(step) + tiny)
+    first = jnp.isinf(now.base_residual)
+    ahead = jnp.where(first, 1.0, jnp.minimum(1.0, ahead))
+    # After none: how far the simplified correction is from what a linear map would give.
+    expected = (1.0 - now.damping) * now.step
+    back = 0.5 * _size(now.step) * now.damping**2 / (_size(simplified - expected) + tiny)
+    back = jnp.where(
+        returned, jnp.clip(back, 0.1 * now.damping, 0.5 * now.damping), 0.5 * now.damping
+    )
+    return jnp.where(better, ahead, back)
+
+
+def _size(step: Scalar) -> Scalar:
+    return jnp.sqrt(jnp.sum(step * step))
+
+
+def _optimised(
+    now: Progress,
     base: Scalar,
     change: Scalar,
     slope: Scalar,
-    damping: Scalar,
-    now: Progress,
-    method: Method,
     better: Scalar,
+    optimiser: optax.GradientTransformation,
 ) -> tuple[Scalar, Any]:
-    """From `base`, whose turn comes `change` away from it; `slope` is that of the change."""
-    if method.optimiser is not None:
-        gradient = slope.T @ change
-        step, optimiser = method.optimiser.update(gradient, now.optimiser, base)
-        assert isinstance(step, jax.Array)
-        # A trial that did not return: go half way back.
-        return jnp.where(better, step, 0.5 * (now.trial - base)), optimiser
-    normal = slope.T @ slope + damping * jnp.eye(len(base))
-    damped = -solved(normal, slope.T @ change)
-    newton = -solved(slope, change)
-    return jnp.where(damping > 0.0, damped, newton), now.optimiser
+    """A step down the gradient of the squared residual."""
+    gradient = slope.T @ jnp.where(better, change, 0.0)
+    step, state = optimiser.update(gradient, now.optimiser, base)
+    assert isinstance(step, jax.Array)
+    # A trial that did not return: go half way back.
+    return jnp.where(better, step, 0.5 * (now.trial - base)), state
 
 
 def chosen(condition: Scalar, new: Any, old: Any) -> Any:

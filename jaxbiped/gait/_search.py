@@ -2,7 +2,7 @@
 
 import enum
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,12 +10,13 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._newton import Method, Progress, Stage, begun, chosen, progressed
+from jaxbiped.gait._soundness import is_sound
 from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with, turn
 from jaxbiped.solve._passage import Precision
 
 LOOSER = 10.0
 """How much looser the search is solved before its last turns, and the witness of their error."""
-_ROUGH = Precision(3e-6, 3e-4)
+ROUGH = Precision(3e-6, 3e-4)
 """How exactly the search is solved until it is near."""
 
 
@@ -25,11 +26,14 @@ class Search(enum.IntEnum):
     - found: the orbit returns to within the residual asked for.
     - no return: the first turn already ended in a misfortune (its `Ending` tells which).
     - not converged: no step reduced the residual any more, or the turns allowed were used up.
+    - no walk: an orbit returns, but with a foot deep underground or a step uphill, and no other
+      was found. A search from a guess does not tell.
     """
 
     FOUND = 0
     NO_RETURN = 1
     NOT_CONVERGED = 2
+    NO_WALK = 3
 
     def __str__(self) -> str:
         return self.name.lower().replace("_", " ")
@@ -47,6 +51,7 @@ class Found(NamedTuple):
             behind the other.
         turns: number of turns taken.
         history: residual of each turn, shape (most_turns,), NaN beyond the last.
+        sound: whether the orbit is a walk (see `is_sound`).
     """
 
     ending: Scalar
@@ -56,6 +61,7 @@ class Found(NamedTuple):
     both: Turn
     turns: Scalar
     history: Scalar
+    sound: Scalar
 
     @property
     def last(self) -> Turn:
@@ -79,14 +85,20 @@ def search(
     guess: PyTree,
     precision: Precision,
     method: Method,
+    wanted: Any = True,
 ) -> Found:
-    """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely."""
+    """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely.
+
+    Not at all where not `wanted`.
+    """
     first = recurring_of(turning.system, guess)
     off = jnp.abs(turning.section.value(args, guess))
     run = _runner(turning, args, active, guess, precision)
     shape: Turn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
     nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
-    end = _advanced(run, begun(first, off, method, nothing), method)
+    begin = begun(first, off, method, nothing)
+    stage = jnp.where(wanted, begin.stage, int(Stage.STUCK))
+    end = _advanced(run, begin._replace(stage=stage), method)
     ending = jnp.where(
         end.stage == Stage.FOUND,
         int(Search.FOUND),
@@ -100,6 +112,7 @@ def search(
         both=jax.tree.map(lambda *pair: jnp.stack(pair), end.base_turn, end.coarse),
         turns=end.turns,
         history=end.history,
+        sound=is_sound(args, state_with(turning.system, guess, end.base), end.base_turn.advance[0]),
     )
 
 
@@ -118,7 +131,7 @@ def _runner(
         wanted = Precision(
             *(
                 jnp.where(stage == Stage.FINE, a, jnp.where(stage == Stage.COARSE, b, c))
-                for a, b, c in zip(precision, coarse, _ROUGH, strict=True)
+                for a, b, c in zip(precision, coarse, ROUGH, strict=True)
             )
         )
         start = state_with(turning.system, guess, trial)

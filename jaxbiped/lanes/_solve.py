@@ -32,6 +32,8 @@ _LOOSER = 10.0
 _FLOOR = 1e-4
 """Size below which a derivative's error is absolute, along a direction of its own size."""
 _MOST_ATTEMPTS = 1_000_000
+_ROOM = 1 << 18
+"""Steps that there is room for at first; who takes more runs again, with room for as many."""
 _WATCH = Watch(field=vector_field, switches=switches)
 """Derivatives are taken up to the time at which the plain solve ended."""
 
@@ -86,8 +88,16 @@ def solved_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[S
     """One simulation, not traced, and the records of its at most so many steps, (n, numbers)."""
     compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
     one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], solve)
-    outputs, recorded = compiled.run(one, room=most, width=1, quick=setting.quick)
-    assert recorded is not None
+
+    def run(room: int) -> tuple[Solved, Recorded]:
+        outputs, recorded = compiled.run(one, room=room, width=1, quick=setting.quick)
+        assert recorded is not None
+        return outputs, recorded
+
+    outputs, recorded = run(min(most, _ROOM))
+    if recorded.counts[0] > _ROOM:
+        # Memory is asked for by what a solve takes, not by what it might.
+        outputs, recorded = run(int(recorded.counts[0]))
     return jtu.tree_map(lambda leaf: leaf[0], outputs), recorded.values[0, : recorded.counts[0]]
 
 

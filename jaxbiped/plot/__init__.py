@@ -2,8 +2,9 @@
 
 The figures of a motion take the scene and a trajectory that was saved step by step; those of a
 periodic gait take the gait; those of a law of contact take the law; those of basins take labels,
-refined boundaries or fractions. Each draws into the axes or the figure it is given (or a new one)
-and returns the figure. None touches pyplot, so all work without a display.
+refined boundaries or fractions; that of constraint methods takes runs. Each draws into the axes or
+the figure it is given (or a new one) and returns the figure. None touches pyplot, so all work
+without a display.
 """
 
 from jaxbiped.plot._animation import animate as animate
@@ -11,6 +12,7 @@ from jaxbiped.plot._animation import animation_html as animation_html
 from jaxbiped.plot._animation import save_animation as save_animation
 from jaxbiped.plot._basin import basin as basin
 from jaxbiped.plot._bristle_law import bristle_law as bristle_law
+from jaxbiped.plot._constraint_runs import constraint_runs as constraint_runs
 from jaxbiped.plot._contact_forces import contact_forces as contact_forces
 from jaxbiped.plot._fractions import basin_fractions as basin_fractions
 from jaxbiped.plot._laws import friction_law as friction_law

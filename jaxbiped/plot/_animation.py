@@ -10,7 +10,7 @@ from matplotlib.patches import Circle
 
 from jaxbiped._checks import check_positive
 from jaxbiped.plot._samples import end_time, state_at
-from jaxbiped.plot._style import GROUND_COLOUR, LEG_COLOURS, new_figure
+from jaxbiped.plot._style import GROUND_COLOUR, LEG_COLOURS, LEG_NAMES, LEG_STYLES, new_figure
 from jaxbiped.plot._upright import Pose, poses, upright
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
@@ -43,7 +43,8 @@ def animate(
     check_positive("frames_per_second", frames_per_second)
     check_positive("slow_down", slow_down)
     interval = 1.0 / (frames_per_second * slow_down)
-    times = np.arange(int(end_time(trajectory) / interval + 1e-9) + 1) * interval
+    last = end_time(trajectory)
+    times = np.minimum(np.arange(int(last / interval + 1e-9) + 1) * interval, last)
     shown = poses(scene, state_at(trajectory, times))
     figure = new_figure(4.8, 3.0)
     figure.set_dpi(100)
@@ -77,15 +78,19 @@ class _Picture:
         self._draw_ground(scene, length)
         self._legs: list[Any] = []
         self._feet: list[Circle] = []
-        for colour in LEG_COLOURS:
-            (line,) = ax.plot([], [], color=colour, linewidth=4.0, solid_capstyle="round")
-            circle = Circle((0.0, 0.0), radius, facecolor="none", edgecolor=colour, linewidth=2.0)
+        for colour, style, name in zip(LEG_COLOURS, LEG_STYLES, LEG_NAMES, strict=True):
+            look: dict[str, Any] = {"linestyle": style}
+            (line,) = ax.plot([], [], color=colour, linewidth=4.0, label=name, **look)
+            circle = Circle(
+                (0.0, 0.0), radius, facecolor="none", edgecolor=colour, linewidth=2.0, **look
+            )
             ax.add_patch(circle)
             self._legs.append(line)
             self._feet.append(circle)
         (self._hip,) = ax.plot([], [], "o", color="black", markersize=7)
         self._clock = ax.text(0.02, 0.95, "", transform=ax.transAxes, va="top")
         ax.set_aspect("equal", adjustable="datalim")
+        ax.legend(loc="upper right", frameon=False, fontsize="small", handlelength=3.5)
         ax.set_axis_off()
         self.draw(0)
 

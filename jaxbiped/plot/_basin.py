@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 from jaxbiped._checks import ArgumentError, check_finite
 from jaxbiped.plot._label_colours import GAIT_SUFFIX, in_order, label_colour
 from jaxbiped.plot._style import axes_or_new, figure_of
+from jaxbiped.plot._symbols import axis_label
 from jaxbiped.sweep._arguments import check_known
 from jaxbiped.sweep._fractions import basin_fractions
 from jaxbiped.sweep._label import Label, label_names
@@ -41,7 +42,8 @@ def basin(
         labels: codes of `Label` or names (`label_names`), shape (ny, nx); row by row along y.
         x, y: coordinates along the two axes, increasing: centres, shape (nx,) and (ny,), or edges
             of the cells, one more.
-        names, units: what the axes are, as ("angle of the stance leg", …) and ("rad", …).
+        names, units: what the axes are, as ("angle of the stance leg", …) and ("rad", …). A
+            coordinate's or a parameter's own name, as "theta_swing", says it all by itself.
         period: footsteps in the cycle of the gait that each start walks to, a shape that
             broadcasts to (ny, nx); only for codes. Unless given, it is not said.
         gait: which gait that is, from 0, to tell apart those of one period; only for codes.
@@ -178,9 +180,7 @@ def finish(
         fontsize="small",
         borderaxespad=0.0,
     )
-    x_label, y_label = (
-        f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=True)
-    )
+    x_label, y_label = (axis_label(*each) for each in zip(names, units, strict=True))
     ax.set_xlabel(x_label)
     ax.set_ylabel(y_label)
     ax.set_title(title, loc="left", fontsize="medium")

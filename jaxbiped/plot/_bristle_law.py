@@ -15,6 +15,7 @@ from jaxbiped.plot._style import (
     figure_of,
     legend_above,
 )
+from jaxbiped.plot._symbols import FORCE_RATIO, law_name
 from jaxbiped.scene._bristle_law import AbstractBristleLaw
 
 _GIVES = 5.0
@@ -52,8 +53,8 @@ def bristle_law(
         look = dict(color=LEG_COLOURS[min(k, 1)], linestyle=LEG_STYLES[min(k, 1)])
         ax.plot(1e3 * places, friction, linewidth=1.4, label=label if k < 2 else None, **look)
         place, bristle = places[-1], bristles[-1]
-    title = f"{type(law).__name__} at {slip_speed:g} m/s"
-    dress(ax, title, "place of the foot, $x$ (mm)", "friction over load, $F_T/F_N$ (–)")
+    title = f"{law_name(law)} at {slip_speed:g} m/s"
+    dress(ax, title, "place of the foot, $x$ (mm)", FORCE_RATIO.on_axis())
     legend_above(ax)
     return figure_of(ax)
 

@@ -7,25 +7,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.dynamics._contacts import Contacts, contacts
+from jaxbiped.dynamics._contacts import Contacts
 from jaxbiped.gait._footsteps import heel_strikes
-from jaxbiped.gait._samples import applied
-from jaxbiped.plot._samples import sampled
+from jaxbiped.plot._force_samples import sampled_forces
 from jaxbiped.plot._style import (
     LEG_COLOURS,
     LEG_NAMES,
+    LEG_STYLES,
     SHADE_COLOUR,
     dress,
     legend_above,
     new_figure,
 )
+from jaxbiped.plot._symbols import NORMAL_FORCE, TANGENTIAL_FORCE, TIME
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
 _BEFORE, _AFTER = 0.5e-3, 4.5e-3
 """What is enlarged around a heel strike [s]."""
-_NORMAL = "normal force, $F_N$ (N)"
-_TANGENTIAL = "tangential force, $F_T$ (N)"
 
 
 def contact_forces(
@@ -39,7 +38,8 @@ def contact_forces(
 
     Left, the whole motion; right, one heel strike in milliseconds, with double support shaded.
     Above, the normal force; below, the tangential one, downhill positive, where there is friction.
-    Drawn at the solver's own steps and between them, so that no peak is missed.
+    Drawn at the solver's own steps and, about every peak, at times far closer together than
+    these (see `sampled_forces`), so that peaks do not depend on where steps happen to end.
 
     Args:
         scene: what was simulated.
@@ -51,8 +51,7 @@ def contact_forces(
     Raises:
         ValueError: the trajectory was not saved step by step, or has fewer heel strikes.
     """
-    samples = sampled(trajectory)
-    found = applied(scene, samples.state, contacts)
+    t, found = sampled_forces(scene, trajectory)
     times, feet = heel_strikes(scene, trajectory)
     if times.size and not -times.size <= strike < times.size:
         raise ArgumentError(
@@ -65,13 +64,13 @@ def contact_forces(
     axes = figure.subplots(
         rows, columns, sharex="col", squeeze=False, width_ratios=[1.35, 1.0][:columns]
     )
-    _draw_column(axes[:, 0], samples.t, found)
+    _draw_column(axes[:, 0], t, found)
     axes[0, 0].margins(x=0.01)
-    dress(axes[0, 0], "Contact forces", "", _NORMAL)
+    dress(axes[0, 0], "Contact forces", "", NORMAL_FORCE.on_axis())
     legend_above(axes[0, 0])
     if rows == 2:
-        dress(axes[1, 0], "", "", _TANGENTIAL)
-    axes[-1, 0].set_xlabel("time, $t$ (s)")
+        dress(axes[1, 0], "", "", TANGENTIAL_FORCE.on_axis())
+    axes[-1, 0].set_xlabel(TIME.on_axis())
     if times.size:
         _draw_strike(axes[:, 1], scene, trajectory, times[strike], feet[strike] - 1)
     whole = figure.figure
@@ -81,16 +80,20 @@ def contact_forces(
 
 def _draw_column(axes: Any, t: np.ndarray, found: Contacts) -> None:
     for k, force in enumerate(found.forces):
-        look: dict[str, Any] = {"color": LEG_COLOURS[k], "linewidth": 1.1, "label": LEG_NAMES[k]}
+        look: dict[str, Any] = {
+            "color": LEG_COLOURS[k],
+            "linestyle": LEG_STYLES[k],
+            "linewidth": 1.1,
+            "label": LEG_NAMES[k],
+        }
         axes[0].plot(t, force.normal, **look)
         if force.tangential is not None:
             axes[1].plot(t, force.tangential, **look)
 
 
 def _draw_strike(axes: Any, scene: Scene, trajectory: Trajectory, time: float, leg: int) -> None:
-    near = sampled(trajectory, start=time - _BEFORE, stop=time + _AFTER)
-    found = applied(scene, near.state, contacts)
-    milliseconds = (near.t - time) * 1e3
+    t, found = sampled_forces(scene, trajectory, start=time - _BEFORE, stop=time + _AFTER)
+    milliseconds = (t - time) * 1e3
     _draw_column(axes, milliseconds, found)
     normal = [np.asarray(force.normal) for force in found.forces]
     both = milliseconds[found.both_carry]
@@ -102,7 +105,7 @@ def _draw_strike(axes: Any, scene: Scene, trajectory: Trajectory, time: float, l
     axes[0].set_title(
         f"Heel strike of {LEG_NAMES[leg]} at {time:.3f} s", loc="left", fontsize="medium"
     )
-    axes[-1].set_xlabel("time after the foot touches (ms)")
+    axes[-1].set_xlabel("time after the foot touches, $t$ (ms)")
     _mark_peak(axes[0], milliseconds, normal[leg])
     if len(axes) == 2:
         _mark_peak(axes[1], milliseconds, np.asarray(found.forces[leg].tangential))

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
 from jaxbiped.plot._label_colours import in_order, label_colour, label_marker
 from jaxbiped.plot._style import axes_or_new, dress, figure_of
+from jaxbiped.plot._symbols import axis_label
 from jaxbiped.sweep._fractions import Fraction, wilson_interval
 
 
@@ -33,7 +34,7 @@ def basin_fractions(
     Args:
         values: the parameter, increasing, shape (n,).
         fractions: what `jaxbiped.basin_fractions` found at each value.
-        name, unit: of the parameter.
+        name, unit: of the parameter; its own name, as "K", says all by itself.
         kind: "lines", or "stacked": areas that add up to one, without bands.
         confidence: of the bands.
         log: whether the parameter's axis is logarithmic.
@@ -102,7 +103,7 @@ def _frame(
     ax: Axes, along: np.ndarray, name: str, unit: str, log: bool, bands: str, kind: str
 ) -> None:
     title = "Fractions of the starts" + (f" ({bands})" if kind == "lines" else "")
-    dress(ax, title, f"{name} ({unit})" if unit else name, "fraction of the starts")
+    dress(ax, title, axis_label(name, unit), "fraction of the starts")
     if log:
         ax.set_xscale("log")
     if along.size > 1:

@@ -20,6 +20,13 @@ from jaxbiped.plot._style import (
     figure_of,
     new_figure,
 )
+from jaxbiped.plot._symbols import (
+    FORCE_RATIO,
+    NORMAL_FORCE,
+    PENETRATION,
+    SLIP_SPEED,
+    law_name,
+)
 from jaxbiped.scene._law import AbstractFrictionLaw, AbstractNormalLaw
 
 _RATE_COLOURS = ("#56B4E9", GROUND_COLOUR, "#E69F00", LEG_COLOURS[1])
@@ -104,7 +111,7 @@ def friction_law(
     _mark_speeds(ax, bend, end)
     ax.set_xlim(-end, end)
     ax.margins(y=0.08)
-    dress(ax, _name(law), "slip speed, $V_T$ (m/s)", "friction over load, $F_T/F_N$ (–)")
+    dress(ax, law_name(law), SLIP_SPEED.on_axis(), FORCE_RATIO.on_axis())
     return figure_of(ax)
 
 
@@ -122,7 +129,7 @@ def _draw_rates(ax: Axes, law: AbstractNormalLaw, depth: float, rates: Sequence[
         colour = GROUND_COLOUR if len(rates) == 1 else _RATE_COLOURS[k % len(_RATE_COLOURS)]
         ax.plot(1e3 * depths, force, color=colour, linewidth=1.4, label=f"{rate:.3g} m/s")
     ax.margins(x=0.0)
-    dress(ax, _name(law), r"penetration, $\delta$ (mm)", "normal force, $F_N$ (N)")
+    dress(ax, law_name(law), PENETRATION.on_axis("mm"), NORMAL_FORCE.on_axis())
     ax.legend(title="rate of penetration", frameon=False, fontsize="small", title_fontsize="small")
 
 
@@ -143,7 +150,7 @@ def _draw_drop(ax: Axes, law: AbstractNormalLaw, mass: float, speed: float) -> N
     ax.margins(x=0.02)
     restitution = max(-rate[-1], 0.0) / speed
     title = f"Drop of {mass:g} kg at {speed:g} m/s: restitution {restitution:.3f}"
-    dress(ax, title, r"penetration, $\delta$ (mm)", "normal force, $F_N$ (N)")
+    dress(ax, title, PENETRATION.on_axis("mm"), NORMAL_FORCE.on_axis())
     ax.legend(frameon=False, fontsize="small")
 
 
@@ -199,7 +206,3 @@ def _own_speed(law: AbstractFrictionLaw, load: float) -> float:
 
 def _per_load(law: AbstractFrictionLaw, load: float, slip: np.ndarray) -> np.ndarray:
     return np.asarray(law.force(jnp.full(slip.shape, float(load)), jnp.asarray(slip))) / load
-
-
-def _name(law: Any) -> str:
-    return type(law).__name__

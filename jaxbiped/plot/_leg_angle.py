@@ -15,6 +15,7 @@ from jaxbiped.plot._style import (
     figure_of,
     legend_above,
 )
+from jaxbiped.plot._symbols import LEG_ANGLE, TIME
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -47,6 +48,6 @@ def draw_leg_angles(t: Any, angles: tuple[Any, Any], title: str, ax: Axes | None
             label=LEG_NAMES[k],
         )
     ax.margins(x=0.01)
-    dress(ax, title, "time, $t$ (s)", r"leg angle, $\theta$ (rad)")
+    dress(ax, title, TIME.on_axis(), LEG_ANGLE.on_axis())
     legend_above(ax)
     return figure_of(ax)

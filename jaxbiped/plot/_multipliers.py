@@ -78,8 +78,8 @@ def _frame(ax: Axes, reach: float) -> None:
     ax.set_aspect("equal")
     ax.set_xlim(-1.15 * reach, 1.15 * reach)
     ax.set_ylim(-1.15 * reach, 1.15 * reach)
-    ax.set_xlabel("real part")
-    ax.set_ylabel("imaginary part")
+    ax.set_xlabel(r"real part, Re $\lambda$ (–)")
+    ax.set_ylabel(r"imaginary part, Im $\lambda$ (–)")
     ax.spines[["top", "right"]].set_visible(False)
 
 

@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped.gait._gait import Gait
+from jaxbiped.plot._arrows import direction_arrows
 from jaxbiped.plot._multipliers import check_drawable
 from jaxbiped.plot._style import (
     LEG_COLOURS,
@@ -15,6 +16,7 @@ from jaxbiped.plot._style import (
     figure_of,
     legend_above,
 )
+from jaxbiped.plot._symbols import LEG_ANGLE, LEG_RATE
 
 
 def gait_orbit(gait: Gait, *, ax: Axes | None = None) -> Figure:
@@ -22,6 +24,7 @@ def gait_orbit(gait: Gait, *, ax: Axes | None = None) -> Figure:
 
     One cycle: the legs are exchanged at each footstep, so the two curves of an odd number of
     footsteps make one closed curve. The dots are the legs on the section, where the cycle begins.
+    Arrows tell the direction.
 
     Args:
         gait: a gait that was found.
@@ -43,12 +46,13 @@ def gait_orbit(gait: Gait, *, ax: Axes | None = None) -> Figure:
             linewidth=1.1,
             label=LEG_NAMES[k],
         )
+        direction_arrows(ax, angle, rate, LEG_COLOURS[k])
         ax.plot(*map(float, begins[k]), "o", color=LEG_COLOURS[k], markersize=6)
     dress(
         ax,
         "Periodic orbit (dots: on the section)",
-        r"leg angle, $\theta$ (rad)",
-        r"leg rate, $\dot\theta$ (rad/s)",
+        LEG_ANGLE.on_axis(),
+        LEG_RATE.on_axis(),
     )
     legend_above(ax)
     return figure_of(ax)

@@ -1,5 +1,7 @@
 """Penetration of the feet over time (paper, figure 7)."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -10,11 +12,13 @@ from jaxbiped.plot._samples import sampled
 from jaxbiped.plot._style import (
     LEG_COLOURS,
     LEG_NAMES,
+    LEG_STYLES,
     axes_or_new,
     dress,
     figure_of,
     legend_above,
 )
+from jaxbiped.plot._symbols import PENETRATION, TIME
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -39,11 +43,12 @@ def penetrations(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None
     deepest = 0.0
     for k, (foot, touching) in enumerate(zip(found.feet, found.touching, strict=True)):
         depth = _depth_mm(np.asarray(foot.penetration), touching)
-        ax.plot(samples.t, depth, color=LEG_COLOURS[k], linewidth=1.3, label=LEG_NAMES[k])
+        look: dict[str, Any] = {"color": LEG_COLOURS[k], "linestyle": LEG_STYLES[k]}
+        ax.plot(samples.t, depth, linewidth=1.3, label=LEG_NAMES[k], **look)
         deepest = max(deepest, float(np.nanmax(depth, initial=0.0)))
     ax.margins(x=0.01)
     ax.set_ylim(0.0, 1.1 * max(deepest, 1e-3))
-    dress(ax, "Penetration of the feet", "time, $t$ (s)", r"penetration, $\delta$ (mm)")
+    dress(ax, "Penetration of the feet", TIME.on_axis(), PENETRATION.on_axis("mm"))
     legend_above(ax)
     return figure_of(ax)
 

@@ -35,7 +35,7 @@ def refined_basin(
 
     Args:
         boundary: of two dimensions; x is the first.
-        names, units: what the axes are, and in which units.
+        names, units: what the axes are, and in which units (see `basin`).
         codes: names of the label codes; those of `Label` unless given.
         cells: whether to outline the boundary cells of every level but the finest, which
             are those that were halved.

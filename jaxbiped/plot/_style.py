@@ -44,6 +44,18 @@ def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
     ax.spines[["top", "right"]].set_visible(False)
 
 
+def legend_below(ax: Axes, *, columns: int) -> None:
+    """A legend under the axes, for more than fits beside the title."""
+    ax.legend(
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.14),
+        ncols=columns,
+        frameon=False,
+        fontsize="small",
+        borderaxespad=0.2,
+    )
+
+
 def legend_above(ax: Axes, **options: Any) -> None:
     """A legend in one row above the axes, right of the title, where it covers no data."""
     handles, _ = ax.get_legend_handles_labels()

@@ -9,6 +9,7 @@ from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped.gait._gait import Gait
 from jaxbiped.plot._multipliers import check_drawable
 from jaxbiped.plot._style import GROUND_COLOUR, LEG_COLOURS, new_figure
+from jaxbiped.plot._symbols import row_label
 
 MEASURES = {
     "period": "period",
@@ -86,7 +87,7 @@ def _panel(ax: Axes, title: str, parameters: tuple[str, ...], values: np.ndarray
     colours = [LEG_COLOURS[0] if value >= 0.0 else LEG_COLOURS[1] for value in drawn]
     ax.barh(places, drawn, color=colours, height=0.7)
     ax.axvline(0.0, color=GROUND_COLOUR, linewidth=0.8)
-    ax.set_yticks(places, [parameters[i] for i in order], fontsize="small")
+    ax.set_yticks(places, [row_label(parameters[i]) for i in order], fontsize="small")
     ax.set_ylim(len(values) - 0.4, -0.6)
     _numbers(ax, places, values)
     ax.set_title(title, loc="left", fontsize="medium")

@@ -3,6 +3,7 @@
 import equinox as eqx
 
 from jaxbiped._checks import (
+    ArgumentError,
     check_at_least,
     check_not_negative,
     check_positive,
@@ -45,8 +46,12 @@ class Walker(eqx.Module):
         check_not_negative("hip_mass", self.hip_mass, "kg")
         check_at_least("l", self.l, "r", self.r)
         if holds_somewhere(self.J == 0.0):
-            check_positive("d", self.d, "m")
-            check_positive("hip_mass", self.hip_mass, "kg")
+            for name in ("d", "hip_mass"):
+                if holds_somewhere(getattr(self, name) == 0.0):
+                    raise ArgumentError(
+                        f"J = 0 is not allowed where {name} = 0: legs that are mass points need d "
+                        "and hip_mass above 0."
+                    )
 
     @property
     def hip_to_foot(self) -> Scalar:

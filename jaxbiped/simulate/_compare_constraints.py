@@ -9,6 +9,7 @@ import numpy as np
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_positive, check_type
+from jaxbiped._progress import stage
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.scene._constraint_methods import CONSTRAINT_METHODS, method_named
@@ -122,7 +123,8 @@ def compare_constraints(
     scenes = {
         name: RedundantScene(scene, method_named(how), orientation) for name, how in chosen.items()
     }
-    truth = final_truth(scene, state, duration)
+    with stage("simulating the minimal formulation to compare with"):
+        truth = final_truth(scene, state, duration)
     every = [(name, integrator) for name in scenes for integrator in integrators]
     return [
         _run(name, scenes[name], state, duration, integrator, truth, int(repeats))

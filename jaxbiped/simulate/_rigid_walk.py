@@ -7,12 +7,20 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
-from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
+from jaxbiped._checks import (
+    ArgumentError,
+    check_choice,
+    check_count,
+    check_positive,
+    check_type,
+    check_unbatched,
+)
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import checked_state
 from jaxbiped.lanes._rigid import rigid_walk_by_lanes
 from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.simulate._start import check_single_scene, in_one_precision, in_own_precision
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, ending_of, whole
@@ -72,7 +80,7 @@ def rigid_walk(
     Args:
         scene: the walker.
         state: start, leg 2 standing.
-        steps: heel strikes after which to end.
+        steps: heel strikes after which to end; with a `duration`, too, whichever comes first.
         duration: simulated time [s].
         accuracy: "fast" (1e-4), "balanced" (1e-6) or "tight" (1e-11): the relative tolerance; the
             absolute one (SI) is a hundredth of it.
@@ -86,16 +94,19 @@ def rigid_walk(
     """
     check_type("scene", scene, RigidScene)
     scene = jtu.tree_map(as_float, scene)
-    state = checked_state(state, RigidState)
+    state = in_one_precision(checked_state(in_own_precision(state), RigidState))
+    check_single_scene(scene)
+    check_unbatched("state", state, "one start")
     if duration is None and steps is None:
         raise ArgumentError("duration = None and steps = None: say how long to walk.")
     if steps is not None:
-        check_positive("steps", steps)
+        check_count("steps", steps)
     if duration is not None:
+        check_unbatched("duration", duration)
         check_positive("duration", duration, "s")
     if most_arrivals:
-        check_positive("most_arrivals", most_arrivals)
-    check_positive("max_solver_steps", max_solver_steps)
+        check_count("most_arrivals", most_arrivals)
+    check_count("max_solver_steps", max_solver_steps)
     check_choice("accuracy", accuracy, RIGID_ACCURACIES)
     tolerance = RIGID_ACCURACIES[accuracy] if rtol is None else rtol
     check_positive("rtol", tolerance)
@@ -112,6 +123,8 @@ def rigid_walk(
         rtol=as_float(tolerance),
         most_attempts=as_float(max_solver_steps),
     )
+    # In the precision of the start, as `simulate` has it.
+    walk = jtu.tree_map(lambda leaf: leaf.astype(state.theta_1.dtype), walk)
     run = _by_lanes if chosen == "lanes" else _by_xla
     return run(walk, int(most_arrivals), duration is None)
 

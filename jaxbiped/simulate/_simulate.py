@@ -11,8 +11,16 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import Array, PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice, check_positive, check_type
+from jaxbiped._checks import (
+    ArgumentError,
+    check_choice,
+    check_count,
+    check_positive,
+    check_type,
+    check_unbatched,
+)
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._bristles import BristleState
 from jaxbiped.dynamics._consistent import Consistent
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
@@ -23,6 +31,7 @@ from jaxbiped.simulate._by_xla import by_xla
 from jaxbiped.simulate._engine import chosen_engine
 from jaxbiped.simulate._saved_times import check_times
 from jaxbiped.simulate._start import check_steps, start_for
+from jaxbiped.simulate._start_height import check_start_height
 from jaxbiped.solve._accuracy import check_precision, tolerances
 from jaxbiped.solve._ending import WATCHES
 from jaxbiped.solve._footstep_limit import PATIENCE
@@ -60,11 +69,12 @@ def simulate(
     Args:
         scene: what to simulate; a `RedundantScene` for coordinates of each leg.
         state: start, a `State`; where friction has bristles also a `BristleState`, for their
-            part (zero unless given). Its dtype is the precision of the solve: 64 bits
-            unless the user says otherwise. A redundant scene also takes a redundant state, which
-            is put on its constraints first (see `consistent_state`).
+            part (zero unless given). Its dtype, that of the most precise leaf, is the precision
+            of the solve: 64 bits unless the user says otherwise. A redundant scene also takes a
+            redundant state, which is put on its constraints first (see `consistent_state`).
         duration: simulated time [s].
-        steps: footsteps (heel strikes) after which to end.
+        steps: footsteps (heel strikes) after which to end; with a `duration`, too, the simulation
+            ends at whichever comes first, and is "walking" either way.
         solver: a name (see `SOLVERS`) or any diffrax solver.
         accuracy: "fast", "balanced" or "tight" (see `ACCURACIES`), or finer where that would not
             resolve the slip speed over which friction builds up.
@@ -163,20 +173,23 @@ class Simulation(eqx.Module):
     ) -> "Simulation":
         """Checks the arguments, which are those of `simulate`."""
         check_type("scene", scene, Scene, RedundantScene)
+        given = state
         state, correction = start_for(scene, state)
         if duration is None and steps is None:
             raise ArgumentError("duration = None and steps = None: say how long to simulate.")
         if steps is not None:
-            check_positive("steps", steps)
+            check_count("steps", steps)
         allowed_time = PATIENCE * steps if steps is not None else 0.0
         time = allowed_time if duration is None else duration
+        for name, value in (("duration", time), ("rtol", rtol), ("atol", atol)):
+            check_unbatched(name, value)
         check_positive("duration", time, "s")
-        check_positive("max_solver_steps", max_solver_steps)
+        check_count("max_solver_steps", max_solver_steps)
         for name in watch:
             check_choice("watch", name, WATCHES)
         if isinstance(save, str):
             check_choice("save", save, ("steps", "end"))
-        check_positive("most_arrivals", most_arrivals)
+        check_count("most_arrivals", most_arrivals)
         section = save if isinstance(save, AbstractSection) else None
         timed = section is None and not isinstance(save, str)
         if timed:
@@ -184,6 +197,8 @@ class Simulation(eqx.Module):
         relative, absolute = tolerances(accuracy, rtol, atol, scene)
         dtype = jnp.result_type(jtu.tree_leaves(state)[0])
         check_precision(scene, dtype)
+        if isinstance(given, State | BristleState):
+            check_start_height(scene, given)
         method = solver_named(solver)
         check_steps(method, dt, most_steps=max_solver_steps, duration=time)
         if isinstance(scene, RedundantScene):

@@ -3,14 +3,21 @@
 from typing import Any
 
 import diffrax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_positive, holds_somewhere
+from jaxbiped._checks import ArgumentError, check_positive, check_unbatched, holds_somewhere
 from jaxbiped.dynamics._bristles import state_for
 from jaxbiped.dynamics._consistent import Consistent, consistent_state
 from jaxbiped.dynamics._independence import check_independent
 from jaxbiped.dynamics._redundant_motion import coordinates_of
+from jaxbiped.scene._catalogue import FRICTION_LAWS, NORMAL_LAWS
+from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._walker import Walker
 
 
 def start_for(scene: Scene | RedundantScene, state: Any) -> tuple[Any, Consistent | None]:
@@ -19,23 +26,64 @@ def start_for(scene: Scene | RedundantScene, state: Any) -> tuple[Any, Consisten
     Raises:
         ArgumentError: a start that is not allowed, or constraints that the method cannot hold.
     """
+    check_single_scene(scene)
     if not isinstance(scene, RedundantScene):
-        return state_for(scene, state), None
+        start = state_for(scene, in_own_precision(state))
+        check_unbatched("state", start, "one start")
+        return in_one_precision(start), None
+    state = in_own_precision(state)
+    check_unbatched("state", state, "one start")
     correction = consistent_state(scene, state)
     q, _ = coordinates_of(scene, correction.state)
     check_independent(scene.linkage, scene.method, q)
     return correction.state, correction
 
 
+def in_own_precision(state: Any) -> Any:
+    """A start with NumPy's floating-point leaves as arrays of JAX, which keep their precision."""
+
+    def kept(leaf: Any) -> Any:
+        own = isinstance(leaf, np.ndarray | np.generic) and np.issubdtype(leaf.dtype, np.floating)
+        return jnp.asarray(leaf) if own else leaf
+
+    return jtu.tree_map(kept, state)
+
+
+def in_one_precision(state: Any) -> Any:
+    """A start with all leaves as precise as the most precise one."""
+    kinds = {leaf.dtype for leaf in jtu.tree_leaves(state)}
+    if len(kinds) == 1:
+        return state
+    finest = max(kinds, key=lambda kind: jnp.finfo(kind).bits)
+    return jtu.tree_map(lambda leaf: leaf.astype(finest), state)
+
+
+def check_single_scene(scene: Scene | RigidScene | RedundantScene) -> None:
+    """Raises `ArgumentError` for a batch of scenes.
+
+    Laws of the user's own may hold arrays.
+    """
+    if isinstance(scene, RedundantScene):
+        scene = scene.scene
+    own = (*NORMAL_LAWS.values(), *FRICTION_LAWS.values(), Walker, Ground)
+    for name, part in vars(scene).items():
+        if type(part) in own:
+            check_unbatched(f"scene.{name}", part, "one scene")
+
+
 def check_steps(solver: Any, dt: float | None, *, most_steps: int, duration: Any) -> None:
     """Raises `ArgumentError` for steps that a solver cannot make or the cap on steps forbids."""
     if dt is None:
         if isinstance(solver, diffrax.Euler):
-            raise ArgumentError("dt = None is not allowed for solver = euler: give its step [s].")
+            raise ArgumentError(
+                "dt = None is not allowed for solver = euler, whose steps have one size: give it "
+                "in seconds, such as dt = 1e-6."
+            )
         return
+    check_unbatched("dt", dt)
     check_positive("dt", dt, "s")
     if holds_somewhere(duration > dt * most_steps):
         raise ArgumentError(
             f"dt = {float(dt):g} is not allowed: {float(duration):g} s of such steps are more than "
-            f"max_solver_steps = {most_steps}."
+            f"max_solver_steps = {most_steps}; simulate less time, or allow more."
         )

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
-from jaxbiped._checks import ArgumentError, check_finite, check_positive, check_type
+from jaxbiped._checks import ArgumentError, check_count, check_finite, check_positive, check_type
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._constraints import Constraints, constraints_of
 from jaxbiped.dynamics._independence import check_independent
@@ -82,6 +82,7 @@ def swing(
             check_finite(f"state.{name}", value)
     state = LinkageState(*(tuple(map(as_float, values)) for values in state))
     check_finite("times", times)
+    check_count("max_solver_steps", max_solver_steps)
     times = as_float(times)
     check_positive("times[-1]", times[-1], "s")
     method = solver_named(solver)

@@ -10,6 +10,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import Array, Float, Int, PyTree
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._state import State
 from jaxbiped.solve._between_steps import between_steps
 from jaxbiped.solve._ending import Ending
@@ -56,17 +57,23 @@ class Trajectory(eqx.Module):
     def at(self, t: Any) -> State:
         """States at times `t` [s] of any shape, to the order of the solver's dense output.
 
+        Under `jit`, `vmap` or derivatives, where it cannot raise, they are NaN outside of the
+        trajectory.
+
         Raises:
-            ValueError: only the final state or given times were saved, or this is a batch.
+            ValueError: a time outside of the trajectory; or only the final state or given times
+                were saved, or this is a batch.
         """
         dense = self.require_dense()
         flat = jnp.ravel(jnp.asarray(t, dtype=self.t.dtype))
         traced = any(isinstance(x, jax.core.Tracer) for x in jtu.tree_leaves((dense, flat)))
+        if not traced:
+            _check_inside(dense, np.asarray(flat))
         if traced or int(dense.ts_size) == 1:
             states = jax.vmap(dense.evaluate)(flat)
         else:
             states = between_steps(dense, np.asarray(flat))
-        return jtu.tree_map(lambda leaf: jnp.reshape(leaf, jnp.shape(t)), states)
+        return jtu.tree_map(lambda leaf: jnp.reshape(leaf, np.shape(t)), states)
 
     def require_dense(self) -> diffrax.DenseInterpolation:
         """The continuous solution of a single trajectory.
@@ -81,3 +88,13 @@ class Trajectory(eqx.Module):
         if jnp.ndim(self.t) != 1:
             raise ValueError("This is a batch of trajectories: look at one of them at a time.")
         return self.dense
+
+
+def _check_inside(dense: diffrax.DenseInterpolation, times: np.ndarray) -> None:
+    first, last = float(dense.t0), float(dense.t1)
+    outside = ~((times >= first) & (times <= last))
+    if outside.any():
+        raise ArgumentError(
+            f"t = {float(times[outside][0])!r} is not allowed: this trajectory lasts from "
+            f"{first!r} to {last!r} s."
+        )

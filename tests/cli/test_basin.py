@@ -9,6 +9,7 @@ import zarr
 from PIL import Image
 
 import jaxbiped as jb
+from jaxbiped import plot
 from jaxbiped.cli import main
 
 HEADER = "hip_x,hip_z,theta_1,theta_2,hip_vx,hip_vz,omega_1,omega_2"
@@ -26,7 +27,13 @@ def basin(tmp_path_factory):
     """The command run once with every output: its folder."""
     folder = tmp_path_factory.mktemp("basin")
     outputs = ("--out", folder / "out", "--json", folder / "b.json", "--store", folder / "store")
-    assert _run(*AXES, *outputs, "--chunk", 18) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        drawn = []
+        draw = plot.basin
+        patch.setattr(plot, "basin", lambda *a, **k: drawn.append(draw(*a, **k)) or drawn[-1])
+        assert _run(*AXES, *outputs, "--chunk", 18) == 0
+    (ax,) = drawn[0].axes
+    assert ax.get_xlabel() == r"swing leg angle, $\theta_1$ (rad)"
     return folder
 
 

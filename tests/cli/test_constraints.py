@@ -15,10 +15,13 @@ def _run(*arguments):
     return stopped.value.code
 
 
-def test_compares_methods_and_integrators(capsys):
+def test_compares_methods_and_integrators(capsys, tmp_path):
     flags = ("--methods", "standard", "described", "--duration", "0.05")
     integrators = ("--integrators", "euler:dt=1e-5", "euler:dt=2e-3")
-    assert _run("constraints", *flags, *integrators, "--json", "-") == 0
+    picture = tmp_path / "made" / "constraints.png"
+    out = ("--json", "-", "--out", str(picture.parent))
+    assert _run("constraints", *flags, *integrators, *out) == 0
+    assert picture.stat().st_size > 10_000
     shown = capsys.readouterr()
     assert "4/4" in shown.err
     runs = json.loads(shown.out)["runs"]
@@ -60,6 +63,7 @@ def test_flags_build_the_scene():
         (("constraints", "--methods", "glue"), "methods = 'glue'"),
         (("constraints", "--duration", "-1"), "duration = -1"),
         (("constraints", "--model", "rigid"), "compliant and minimal are compared"),
+        (("constraints", "--out", "/proc/nowhere"), "--out"),
     ],
 )
 def test_bad_flags_are_one_sentence(arguments, said, capsys):

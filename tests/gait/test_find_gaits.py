@@ -13,25 +13,14 @@ def test_many_starts_find_a_stable_and_an_unstable_gait():
     period = np.asarray(found.gaits.measures.period)
     stable = np.asarray(found.gaits.stable)
     assert period[stable] == pytest.approx([0.4408349], abs=1e-6)
-    assert np.sum(~stable) == 1
+    assert period[~stable] == pytest.approx([0.3910974], abs=1e-6)
+    # One start leads to an orbit whose feet swing 9 mm underground.
+    assert np.sum(np.asarray(found.ending) == int(jb.Search.NO_WALK)) == 1
     assert int(np.sum(found.reached)) == int(np.sum(np.asarray(found.which) >= 0))
     assert np.all((np.asarray(found.ending) == 0) == (np.asarray(found.which) >= 0))
     assert np.all(np.diff(np.asarray(found.reached)) <= 0)
     # The seed's own start is the first, and leads to the stable one.
     assert bool(stable[int(found.which[0])])
-
-
-def test_rolling_starts_do_not_slip_and_begin_with_the_seeds():
-    scene = jb.seed_scene(l=0.5)
-    starts = jb.rolling_starts(scene, 5)
-    both = jb.feet(scene, starts)
-    np.testing.assert_allclose(both.foot_2.slip_speed, 0.0, atol=1e-14)
-    np.testing.assert_allclose(both.foot_2.penetration_rate, 0.0, atol=1e-14)
-    np.testing.assert_allclose(both.foot_2.penetration, both.foot_2.penetration[0], atol=1e-14)
-    seed = jb.seed_state()
-    assert float(starts.theta_1[0]) == float(seed.theta_1)
-    assert np.ptp(np.asarray(starts.theta_1)) > 0.0
-    assert not np.allclose(starts.omega_2, jb.rolling_starts(scene, 5, seed=1).omega_2)
 
 
 @pytest.mark.parametrize("shape", [(), (2, 2), (0,)])
@@ -42,9 +31,5 @@ def test_starts_of_another_shape_are_refused(shape):
 
 
 def test_bad_arguments():
-    with pytest.raises(jb.ArgumentError, match="count"):
-        jb.rolling_starts(jb.seed_scene(), 0)
-    with pytest.raises(jb.ArgumentError, match="spread"):
-        jb.rolling_starts(jb.seed_scene(), 3, spread=0.0)
     with pytest.raises(jb.ArgumentError, match="accuracy"):
         jb.find_gaits(jb.seed_scene(), jb.rolling_starts(jb.seed_scene(), 2), accuracy="fast")

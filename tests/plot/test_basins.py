@@ -49,6 +49,12 @@ def test_cells_have_their_labels_colours_and_places():
     assert ax.get_ylabel() == "stance rate (rad/s)"
 
 
+def test_names_of_coordinates_say_words_symbol_and_unit():
+    (ax,) = basin(CODES, X, Y, names=("theta_swing", "omega_swing")).axes
+    assert ax.get_xlabel() == r"swing leg angle, $\theta_1$ (rad)"
+    assert ax.get_ylabel() == r"swing leg rate, $\omega_1$ (rad/s)"
+
+
 def test_edges_and_names_draw_the_same():
     by_code = basin(CODES, X, Y, period=1, **AXES).axes[0]
     names = jb.label_names(CODES, 1)
@@ -178,6 +184,7 @@ def test_fractions_along_a_parameter_lie_in_wilsons_bands():
 def test_stacked_fractions_add_up_to_one(tmp_path):
     figure = basin_fractions([1.0, 2.0, 3.0], _fractions(), name="slope", kind="stacked")
     (ax,) = figure.axes
+    assert ax.get_xlabel() == r"slope, $\alpha$ (rad)"
     top = ax.collections[-1].get_paths()[0].vertices
     for x in (1.0, 2.0, 3.0):
         assert top[top[:, 0] == x, 1].max() == pytest.approx(1.0)

@@ -29,6 +29,14 @@ def test_whole_walk_shows_the_peaks_of_both_feet(seed_walk):
     assert strike_axes.texts[0].get_text().endswith(" N")
 
 
+def test_legs_differ_without_colour_too(seed_walk):
+    for ax in contact_forces(*seed_walk).axes:
+        first, second = (
+            next(line for line in ax.lines if line.get_label() == f"leg {leg}") for leg in (1, 2)
+        )
+        assert first.get_linestyle() != second.get_linestyle()
+
+
 def test_a_heel_strike_is_enlarged(seed_walk):
     scene, walk = seed_walk
     times, feet = jb.heel_strikes(scene, walk)

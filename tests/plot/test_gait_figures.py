@@ -79,7 +79,12 @@ def test_an_unstable_gait_stays_inside_the_frame_and_names_its_bifurcation():
 
 def test_tornado_has_the_largest_on_top_and_says_every_number():
     (ax,) = elasticities(_gait(), "period").axes
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["l", "c", "K", "hip_mass"]
+    assert [label.get_text() for label in ax.get_yticklabels()] == [
+        "leg length, $l$",
+        "contact damping, $c$",
+        "contact stiffness, $K$",
+        "hip mass, $m_S$",
+    ]
     assert [bar.get_width() for bar in ax.patches] == [0.5, -0.2, 0.0065, 0.0]
     assert [text.get_text() for text in ax.texts] == ["+0.5", "−0.2", "+0.0065", "0"]
     bottom, top = ax.get_ylim()
@@ -92,7 +97,7 @@ def test_tornado_of_all_measures_and_unknown_last():
     titles = [ax.get_title(loc="left") for ax in axes[:5]]
     assert titles == ["period", "step length", "speed", "peak normal force", "spectral radius"]
     names = [label.get_text() for label in axes[3].get_yticklabels()]
-    assert names == ["l", "c", "hip_mass", "K"]
+    assert [name.rpartition(", ")[2] for name in names] == ["$l$", "$c$", "$m_S$", "$K$"]
     assert axes[3].texts[-1].get_text() == "unknown"
 
 
@@ -123,6 +128,16 @@ def test_orbit_marks_the_section():
     assert dots == [(1.0, 0.0), (-1.0, 0.0)]
     assert "(rad)" in ax.get_xlabel()
     assert "(rad/s)" in ax.get_ylabel()
+
+
+def test_orbit_has_arrows_the_way_time_runs():
+    (ax,) = gait_orbit(_gait()).axes
+    heads = [text for text in ax.texts if text.get_text() == ""]
+    assert len(heads) == 8
+    for head in heads:
+        (x, y), (x0, y0) = head.xy, head.get_position()
+        # The orbit made here runs counter-clockwise about zero.
+        assert x0 * y - y0 * x > 0.0
 
 
 @pytest.mark.parametrize("draw", FIGURES)

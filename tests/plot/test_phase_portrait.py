@@ -30,6 +30,44 @@ def test_both_legs(seed_walk):
     assert first.get_color() != second.get_color()
 
 
+def test_the_last_stride_is_strong_over_the_whole_walk(seed_walk):
+    scene, walk = seed_walk
+    (ax,) = phase_portrait(scene, walk).axes
+    whole, last = ax.lines[:2]
+    strikes = jb.heel_strikes(scene, walk)
+    since = strikes.time_s[strikes.foot == 1][-2]
+    assert last.get_label() == f"last stride of leg 1, from {since:.2f} s"
+    assert whole.get_alpha() < 0.5 < (last.get_alpha() or 1.0)
+    assert last.get_linewidth() > whole.get_linewidth()
+    drawn = last.get_xydata()
+    expected = walk.at(since)
+    assert drawn[0] == pytest.approx((float(expected.theta_1), float(expected.omega_1)), abs=2e-2)
+    assert tuple(drawn[-1]) == (float(walk.state.theta_1[-1]), float(walk.state.omega_1[-1]))
+    entries = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert entries == ["leg 1, whole walk", last.get_label(), "start"]
+
+
+def test_arrows_run_the_way_time_does(seed_walk):
+    (ax,) = phase_portrait(*seed_walk).axes
+    heads = [text for text in ax.texts if text.get_text() == ""]
+    assert len(heads) == 4
+    for head in heads:
+        (angle, rate), (before, _) = head.xy, head.get_position()
+        # A positive rate is a growing angle, whatever the walk.
+        assert (angle - before) * rate > 0.0
+
+
+def test_a_short_motion_has_no_stride_and_an_end_has_a_name():
+    scene = jb.seed_scene()
+    (ax,) = phase_portrait(scene, jb.simulate(scene, jb.seed_state(), duration=0.1)).axes
+    (curve,) = _curves(ax.figure)
+    assert (curve.get_label(), curve.get_alpha()) == ("leg 1", None)
+    steep = jb.seed_scene(slope=0.04)
+    walk = jb.simulate(steep, jb.seed_state(), duration=10.0)
+    (ax,) = phase_portrait(steep, walk).axes
+    assert "fell forward" in [text.get_text() for text in ax.get_legend().get_texts()]
+
+
 @pytest.mark.parametrize("legs", [(), (0,), (1, 3)])
 def test_legs_are_numbered_1_and_2(seed_walk, legs):
     with pytest.raises(jb.ArgumentError, match="legs"):

@@ -66,6 +66,20 @@ def test_all_that_is_drawn_is_seen(strobe):
     assert (points < [right, top]).all()
 
 
+def test_it_fills_its_figure_and_says_which_second_it_shows(seed_walk):
+    figure = gait_strobe(*seed_walk, start=0.1)
+    figure.canvas.draw()
+    ax, segments, feet = _drawn(figure)
+    assert "from 0.10 s to 1.90 s" in ax.get_title(loc="left")
+    assert segments.shape[1] == 19
+    left, right = (feet[..., 0].min() - 0.08, feet[..., 0].max() + 0.08)
+    shown = np.ptp(ax.get_xlim())
+    assert (right - left) / shown > 0.9
+    across = ax.get_window_extent().width / figure.bbox.width
+    assert across > 0.85
+    assert ax.collections[0].get_linestyle() != ax.collections[2].get_linestyle()
+
+
 def test_axes_and_spans_given(seed_walk):
     ax = Figure().add_subplot()
     assert gait_strobe(*seed_walk, ax=ax, count=1) is ax.figure

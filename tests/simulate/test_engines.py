@@ -238,3 +238,16 @@ def test_auto_leaves_to_xla_what_lanes_cannot_express():
     assert (walk.engine, walk.outcome) == ("xla", jb.Ending.WALKING)
     with pytest.raises(UnknownPrimitiveError, match="'erf'"):
         _end(jb.seed_state(), "lanes", scene, duration=1e-3)
+
+
+def test_memory_is_asked_for_by_the_steps_taken(monkeypatch):
+    """A cap that no memory could hold; and steps that do not fit into the first room."""
+    scene, start = jb.seed_scene(), jb.seed_state()
+    few = jb.simulate(scene, start, duration=0.1)
+    capped = jb.simulate(scene, start, duration=0.1, max_solver_steps=1 << 50)
+    monkeypatch.setattr("jaxbiped.lanes._solve._ROOM", 16)
+    again = jb.simulate(scene, start, duration=0.1)
+    assert int(few.accepted) > 16
+    for walk in (capped, again):
+        np.testing.assert_array_equal(np.array(walk.t), np.array(few.t))
+        np.testing.assert_array_equal(np.array(walk.at(0.05)), np.array(few.at(0.05)))

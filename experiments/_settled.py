@@ -1,0 +1,97 @@
+"""What walking forwards settles on: the truth that a search for gaits is held to.
+
+Walks begin from rolling starts and from the states on which neighbouring scenes settled; the one
+that comes nearest to repeating itself is walked on for 300 footsteps, more accurately.
+"""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import jaxbiped as jb
+
+STARTS, FOOTSTEPS = 48, 60
+LONG = 300
+CYCLES = (1, 2, 3, 4, 6, 8)
+"""Lengths [footsteps] of cycles that are told apart."""
+_SETTLED = 1e-7
+"""Relative change of the duration of a cycle from one to the next that counts as none."""
+
+
+class Settled(NamedTuple):
+    """What the walks of a scene do in the long run.
+
+    Attributes:
+        cycle: footsteps in the cycle that the longest walk repeats; 0 where it repeats none, −1
+            where no walk goes on.
+        period: duration of that cycle [s], NaN where there is none.
+        state: of the walk's last arrival, None where no walk goes on.
+    """
+
+    cycle: int
+    period: float
+    state: Any
+
+
+def settled(scene: Any, near: list[Any], *, seed: int) -> Settled:
+    """Where walks from rolling starts, and from states `near` by, settle."""
+    starts = jb.rolling_starts(scene, STARTS, spread=0.5, seed=seed)
+    for i, state in enumerate(near[-4:]):
+        starts = jax.tree.map(lambda leaf, own, i=i: leaf.at[1 + i].set(own), starts, state)
+    times, states, counts = _walked(scene, starts, FOOTSTEPS, 1e-5)
+    walking = np.flatnonzero(np.asarray(counts) >= FOOTSTEPS)
+    if not len(walking):
+        return Settled(-1, float("nan"), None)
+    durations = np.diff(np.asarray(times)[walking, -9:], axis=1)
+    open_ = [_openness(each) for each in durations]
+    best = walking[int(np.argmin(open_))]
+    start = jax.tree.map(lambda leaf: leaf[best][None], states)
+    times, states, counts = _walked(scene, start, LONG, 3e-9)
+    if int(counts[0]) < LONG:
+        return Settled(-1, float("nan"), None)
+    state = jax.tree.map(lambda leaf: leaf[0], states)
+    return _cycle(np.asarray(times)[0], state)
+
+
+def _cycle(times: np.ndarray, state: Any) -> Settled:
+    for cycle in CYCLES:
+        last, before = times[-1] - times[-1 - cycle], times[-1 - cycle] - times[-1 - 2 * cycle]
+        if abs(last / before - 1.0) < _SETTLED:
+            return Settled(cycle, float(last), state)
+    return Settled(0, float("nan"), state)
+
+
+def _openness(durations: np.ndarray) -> float:
+    """How far a walk is from repeating itself after one footstep, or after two, or four."""
+    return min(abs(durations[-1] / durations[-1 - k] - 1.0) for k in (1, 2, 4))
+
+
+@eqx.filter_jit
+def _walked(scene: Any, starts: Any, footsteps: int, rtol: float) -> Any:
+    """Times of the arrivals, the last state with leg 2 standing, and how many there were."""
+
+    def compliant(start: Any) -> Any:
+        walk = jb.simulate(
+            scene,
+            start,
+            steps=footsteps + 1,
+            rtol=rtol,
+            save=jb.MidStance(),
+            most_arrivals=footsteps,
+            max_solver_steps=1_000_000,
+            engine="lanes",
+        )
+        last = jax.tree.map(lambda leaf: leaf[-1], walk.state)
+        stands = jnp.abs(last.theta_1) < jnp.abs(last.theta_2)
+        last = jax.tree.map(lambda a, b: jnp.where(stands, a, b), jb.exchange_legs(last), last)
+        return walk.t, last._replace(hip_x=0.0 * last.hip_x), walk.arrivals
+
+    def rigid(start: Any) -> Any:
+        walk = jb.rigid_walk(scene, start, steps=footsteps, rtol=1e-11, most_arrivals=footsteps)
+        last = jax.tree.map(lambda leaf: leaf[-1], walk.strikes[1])
+        return walk.strikes[0], last._replace(hip_x=0.0 * last.hip_x), walk.footsteps
+
+    return jax.vmap(rigid if isinstance(scene, jb.RigidScene) else compliant)(starts)

@@ -1,0 +1,65 @@
+"""Where a command starts that was not told otherwise: the seed's start, fitted to the scene."""
+
+import math
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._feet import standing_height
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import State, seed_state
+from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.scene._law import AbstractNormalLaw
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._seed import seed_scene
+
+_DEEPEST = 0.1
+"""The deepest that a foot begins in a soft ground, in units of l."""
+_STEP = 1.01
+"""Factor of the depth over which a law's exponent is read."""
+_ROUNDS = 8
+
+
+def default_start(scene: Any) -> State | RigidState:
+    """The seed's start, fitted to the scene's legs and as loaded on its ground as on its own.
+
+    For the seed's own scene it is the seed's start to the last bit.
+    """
+    seed, own = seed_state(), seed_scene()
+    if isinstance(scene, RigidScene):
+        return seed_start(scene)
+    if _known(scene.walker, scene.normal, scene.ground.g) == _known(
+        own.walker, own.normal, own.ground.g
+    ):
+        return seed
+    start = seed_start(scene)
+    depth = standing_height(own, seed.theta_2) - seed.hip_z
+    load = (scene.walker.total_mass * scene.ground.g) / (own.walker.total_mass * own.ground.g)
+    fitted = float(_depth(scene.normal, own.normal, depth, load))
+    if not math.isfinite(fitted):
+        return start
+    fitted = min(fitted, _DEEPEST * float(scene.walker.l))
+    return start._replace(hip_z=start.hip_z + (depth - fitted))
+
+
+def _known(*parts: Any) -> Any:
+    """What a start is fitted to, to be compared."""
+    leaves, structure = jtu.tree_flatten(parts)
+    return structure, [float(leaf) for leaf in leaves]
+
+
+@eqx.filter_jit
+def _depth(law: AbstractNormalLaw, own: AbstractNormalLaw, depth: Scalar, load: Scalar) -> Scalar:
+    """Where a law's elastic force is `load` times another one's at `depth` [m].
+
+    Elastic forces grow like powers of the depth, or nearly so.
+    """
+    target, found = load * own.elastic_force(depth), depth
+    for _ in range(_ROUNDS):
+        force = law.elastic_force(found)
+        exponent = jnp.log(law.elastic_force(_STEP * found) / force) / jnp.log(_STEP)
+        found = found * (target / force) ** (1.0 / exponent)
+    return found

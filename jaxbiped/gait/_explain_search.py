@@ -1,0 +1,85 @@
+"""What a search for a gait says of itself, in a sentence."""
+
+from typing import Any
+
+from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._search import Search
+from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.solve._ending import Ending
+
+_MOST_NAMED = 4
+"""Parameters that are named; of more, how many there are."""
+
+
+def explain_search(scene: Any, gait: Gait) -> str:
+    """How a gait was found, which others were seen, or where the seed's gait ended on the way.
+
+    Args:
+        scene: the scene that was searched, whole numbers and all; not a batch.
+        gait: what `find_gait` returned for it.
+    """
+    if gait.outcome is not Search.FOUND:
+        return f"no gait found: {_why(gait)}{_branch(scene, gait)}"
+    text = f"found by {gait.found_by}"
+    if gait.others:
+        seen = ", ".join(
+            f"{each.period:.6g} s (spectral radius {each.spectral_radius:.4g})"
+            for each in gait.others
+        )
+        text += f"; other gaits seen: {seen}"
+    if not bool(gait.stable) and int(gait.origin.branch_end) != int(BranchEnd.NOT_FOLLOWED):
+        text += f"; no stable one was seen{_branch(scene, gait)}"
+    return text
+
+
+def _why(gait: Gait) -> str:
+    if gait.outcome is Search.NO_RETURN:
+        return f"the walk from the start ends ({gait.walk_outcome})"
+    if gait.outcome is Search.NO_WALK:
+        return "an orbit that returns has a foot deep underground, or steps uphill"
+    return "the search from the start does not converge"
+
+
+def _branch(scene: Any, gait: Gait) -> str:
+    """Where the branch of the seed's gait ended, after a semicolon; nothing where it came here."""
+    end = BranchEnd(int(gait.origin.branch_end))
+    modelled = scene.scene if isinstance(scene, RedundantScene) else scene
+    if end in (BranchEnd.NOT_FOLLOWED, BranchEnd.REACHED):
+        return ""
+    if end is BranchEnd.NO_BEGINNING:
+        return "; the seed's walker has no gait under these laws, from which one could be followed"
+    place = _place(modelled, gait.origin.nearest)
+    if end is BranchEnd.FOLD:
+        return f"; the branch of the seed's gait turns back at a fold at {place}, which has one"
+    if end is BranchEnd.WALK_ENDS:
+        walk = Ending(int(gait.origin.branch_walk_ending))
+        return (
+            f"; the branch of the seed's gait ends at {place}, which has one: beyond, the walk "
+            f"{_HOW.get(walk, f'ends ({walk})')}"
+        )
+    if end is BranchEnd.BREAKS_OFF:
+        return (
+            f"; the branch of the seed's gait breaks off at {place}, which has one: beyond, the "
+            "return map is not smooth"
+        )
+    return f"; the branch of the seed's gait was followed as far as {place}, which has one"
+
+
+_HOW = {
+    Ending.OUT_OF_STEPS: "makes no more footsteps",
+    Ending.FELL_FORWARD: "falls forward",
+    Ending.FELL_BACK: "falls back",
+    Ending.STOPPED: "stops",
+    Ending.STUMBLED: "stumbles",
+}
+
+
+def _place(scene: Any, nearest: Any) -> str:
+    """The parameters of `nearest` that are not those of `scene`."""
+    asked, there = parameter_values(scene), parameter_values(nearest)
+    moved = [name for name in asked if float(asked[name]) != float(there[name])]
+    named = ", ".join(f"{name} = {float(there[name]):.6g}" for name in moved[:_MOST_NAMED])
+    more = len(moved) - _MOST_NAMED
+    return named + (f" and {more} more" if more > 0 else "")

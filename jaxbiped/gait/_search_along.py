@@ -1,0 +1,159 @@
+"""The search without a guess as one program, for `jit` and `vmap`: start, then continuation.
+
+The fitted start is tried first. Where no stable gait comes of it, the seed scene's gait is followed
+to the scene along the line between them, each search beginning where those before point to.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxbiped._types import Scalar
+from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._homotopy import Homotopy, homotopy_to
+from jaxbiped.gait._newton import Method, chosen
+from jaxbiped.gait._origin import FoundBy, Origin
+from jaxbiped.gait._search import Found, Search, search
+from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.gait._small_matrices import eigen
+from jaxbiped.gait._turn import Turning, recurring_of, state_with
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.solve._passage import Precision
+
+_FIRST, _LARGEST, _SMALLEST = 0.25, 0.5, 1e-3
+"""Steps along the line: the first, at most, and at which it is given up."""
+_MOST_SEARCHES = 60
+
+
+class _Way(NamedTuple):
+    """How far along the line a search is.
+
+    Attributes:
+        s: of the next search; negative for the search from the fitted start, at the end of the
+            line.
+        step: from the last gait that was found on the line.
+        known, before: points of the last gait found on the line and of the one before it, with
+            their places `at`, shape (2,).
+        best: the gait to be returned, `radius` its spectral radius, infinite where there is none.
+        origin: what will be told.
+        searches: how many there were.
+        over: whether there is nothing left to do.
+    """
+
+    s: Scalar
+    step: Scalar
+    known: Scalar
+    before: Scalar
+    at: Scalar
+    best: Found
+    radius: Scalar
+    origin: Origin
+    searches: Scalar
+    over: Scalar
+
+
+def search_along(
+    turning: Turning,
+    scene: Any,
+    active: tuple[int, ...],
+    start: Any,
+    precision: Precision,
+    method: Method,
+    origin: Origin,
+) -> tuple[Found, Origin]:
+    """Searches from `start`, and along the line from the seed's scene where need be."""
+    line = homotopy_to(scene)
+    fitted = recurring_of(turning.system, start)
+    of_seed = line.first.scene if isinstance(line.first, RedundantScene) else line.first
+    first = recurring_of(turning.system, seed_start(of_seed))
+
+    def run(way: _Way) -> Found:
+        from_start, from_seed = way.s < 0.0, way.s == 0.0
+        share = (way.s - way.at[1]) / jnp.where(way.at[1] > way.at[0], way.at[1] - way.at[0], 1.0)
+        point = way.known + share * (way.known - way.before)
+        point = jnp.where(from_start, fitted, jnp.where(from_seed, first, point))
+        there = line.at(jnp.where(from_start, 1.0, way.s))
+        guess = state_with(turning.system, start, point)
+        return search(turning, there, active, guess, precision, method, ~way.over)
+
+    shape = jax.eval_shape(
+        lambda: search(turning, scene, active, start, precision, method, jnp.asarray(True))
+    )
+    nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
+    begin = _Way(
+        s=jnp.asarray(-1.0),
+        step=jnp.asarray(_FIRST),
+        known=fitted,
+        before=fitted,
+        at=jnp.zeros(2),
+        best=nothing,
+        radius=jnp.asarray(jnp.inf),
+        origin=jax.tree.map(jnp.asarray, origin),
+        searches=jnp.asarray(0),
+        over=jnp.asarray(False),
+    )
+    end = jax.lax.while_loop(
+        lambda way: ~way.over,
+        lambda way: chosen(way.over, way, _after(way, run(way), line)),
+        begin,
+    )
+    no_walk = (end.best.ending == int(Search.FOUND)) & ~end.best.sound
+    ending = jnp.where(no_walk, int(Search.NO_WALK), end.best.ending)
+    return end.best._replace(ending=ending), end.origin
+
+
+def _after(way: _Way, latest: Found, line: Homotopy) -> _Way:
+    """One search further."""
+    from_start, from_seed = way.s < 0.0, way.s == 0.0
+    found = latest.ending == int(Search.FOUND)
+    radius = jnp.where(found & latest.sound, _radius(latest), jnp.inf)
+    at_end = from_start | (way.s == 1.0)
+    # What the fitted start gave is kept where nothing better comes, found or not.
+    better = from_start | (at_end & (radius < way.radius))
+    on_line = found & ~from_start
+    at = jnp.where(on_line, jnp.stack([jnp.where(from_seed, 0.0, way.at[1]), way.s]), way.at)
+    # The first gait on the line has none before it.
+    before = jnp.where(on_line, jnp.where(from_seed, latest.recurring, way.known), way.before)
+    known = jnp.where(on_line, latest.recurring, way.known)
+    grown = jnp.minimum(jnp.where(from_seed, way.step, 1.5 * way.step), _LARGEST)
+    step = jnp.where(from_start, way.step, jnp.where(found, grown, 0.4 * way.step))
+    lost = ~found & ~from_start
+    given_up = lost & (from_seed | (step < _SMALLEST)) | (way.searches >= _MOST_SEARCHES)
+    over = (from_start & found & (radius < 1.0)) | (found & (way.s == 1.0)) | given_up
+    end = jnp.where(from_seed, int(BranchEnd.NO_BEGINNING), int(BranchEnd.BREAKS_OFF))
+    end = jnp.where(lost & (latest.code != 0), int(BranchEnd.WALK_ENDS), end)
+    end = jnp.where(found, int(BranchEnd.UNFINISHED), end)
+    end = jnp.where(found & (way.s == 1.0), int(BranchEnd.REACHED), end)
+    followed = over & ~from_start
+    origin = way.origin._replace(
+        found_by=jnp.where(better & ~from_start, int(FoundBy.CONTINUATION), way.origin.found_by),
+        branch_end=jnp.where(followed, end, way.origin.branch_end),
+        branch_walk_ending=jnp.where(followed & lost, latest.code, way.origin.branch_walk_ending),
+        nearest=_nearest(way.origin.nearest, line, at[1], followed & ~from_seed),
+    )
+    return _Way(
+        s=jnp.where(from_start, 0.0, jnp.minimum(at[1] + step, 1.0)),
+        step=step,
+        known=known,
+        before=before,
+        at=at,
+        best=chosen(better, latest, way.best),
+        radius=jnp.where(better, radius, way.radius),
+        origin=origin,
+        searches=way.searches + 1,
+        over=over,
+    )
+
+
+def _nearest(kept: Any, line: Homotopy, s: Scalar, wanted: Scalar) -> Any:
+    scene = line.at(s)
+    return chosen(wanted, scene.scene if isinstance(scene, RedundantScene) else scene, kept)
+
+
+def _radius(found: Found) -> Scalar:
+    """Largest absolute value of a Floquet multiplier: on the section the trivial one is zero."""
+    jacobian = found.last.jacobian[:, : found.recurring.shape[0]]
+    finite = jnp.all(jnp.isfinite(jacobian))
+    values, _ = eigen(jnp.where(finite, jacobian, 0.0))
+    return jnp.where(finite, jnp.max(jnp.abs(values)), jnp.inf)

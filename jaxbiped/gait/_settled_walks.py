@@ -1,0 +1,99 @@
+"""Walking forwards from many starts at once: where those that do not fall settle."""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._section import MidStance
+from jaxbiped.dynamics._state import exchange_legs
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.simulate._rigid_walk import rigid_walk
+from jaxbiped.simulate._simulate import simulate
+
+_FOOTSTEPS = 40
+_ALIKE = 1e-2
+"""Scaled distance of two states that count as one."""
+_DEPTH = 4
+"""Longest cycle [footsteps] that is looked for in a walk's last arrivals."""
+
+
+def settled_states(scene: Scene | RigidScene, starts: Any, *, most: int = 4) -> list[np.ndarray]:
+    """Where walks from the starts are after many footsteps, the most settled first.
+
+    Args:
+        scene: the walker.
+        starts: states, leaves of shape (n,).
+        most: how many to give.
+
+    Returns:
+        States on the section without hip_x, each of shape (m,), apart from each other.
+    """
+    rigid = isinstance(scene, RigidScene)
+    walked: Any = _walked_rigidly if rigid else _walked
+    counts, last = walked(scene, starts)
+    points = np.stack([np.asarray(leaf) for leaf in last[1:]], axis=-1)
+    walking = np.flatnonzero(np.asarray(counts) >= _FOOTSTEPS)
+    sizes = component_sizes(scene, last)
+    latest = points[walking, -1] / sizes
+    before = points[walking, -1 - _DEPTH : -1] / sizes
+    moved = np.min(np.linalg.norm(latest[:, None] - before, axis=-1), axis=-1, initial=np.inf)
+    chosen: list[int] = []
+    for i in np.argsort(moved):
+        if all(np.linalg.norm(latest[i] - latest[j]) > _ALIKE for j in chosen):
+            chosen.append(int(i))
+        if len(chosen) == most:
+            break
+    return [latest[i] * sizes for i in chosen]
+
+
+def component_sizes(scene: Scene | RigidScene, state: Any) -> np.ndarray:
+    """Size of each component of a state without hip_x, shape (m,), SI units.
+
+    Angles 1, lengths l, velocities √(g l), rates √(g/l).
+    """
+    length, gravity = float(scene.walker.l), float(scene.ground.g)
+    by_prefix = {
+        "theta": 1.0,
+        "omega": np.sqrt(gravity / length),
+        "hip_v": np.sqrt(gravity * length),
+    }
+    return np.array([by_prefix.get(name[:5], length) for name in state._fields[1:]])
+
+
+@eqx.filter_jit
+def _walked(scene: Scene, starts: Any) -> tuple[Any, Any]:
+    """Arrivals at mid-stance of each walk, and the states at the last ones, leg 2 standing."""
+
+    def one(start: Any) -> tuple[Any, Any]:
+        walk = simulate(
+            scene,
+            start,
+            steps=_FOOTSTEPS + 1,
+            accuracy="fast",
+            save=MidStance(),
+            most_arrivals=_FOOTSTEPS,
+            engine="lanes",
+        )
+        last = jtu.tree_map(lambda leaf: leaf[-1 - _DEPTH :], walk.state)
+        stands = jnp.abs(last.theta_1) < jnp.abs(last.theta_2)
+        last = jtu.tree_map(lambda a, b: jnp.where(stands, a, b), exchange_legs(last), last)
+        return walk.arrivals, last
+
+    return jax.vmap(one)(starts)
+
+
+@eqx.filter_jit
+def _walked_rigidly(scene: RigidScene, starts: Any) -> tuple[Scalar, Any]:
+    """Heel strikes of each walk, and the states just after the last ones."""
+
+    def one(start: Any) -> tuple[Scalar, Any]:
+        walk = rigid_walk(scene, start, steps=_FOOTSTEPS, most_arrivals=_FOOTSTEPS)
+        return walk.footsteps, jtu.tree_map(lambda leaf: leaf[-1 - _DEPTH :], walk.strikes[1])
+
+    return jax.vmap(one)(starts)

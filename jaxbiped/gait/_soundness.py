@@ -1,0 +1,37 @@
+"""Soundness of a periodic orbit: whether what Newton's method came to is a walk at all.
+
+The return map has fixed points that no walk reaches: under the clearance rule a foot may swing
+deep underground and be caught there. Stability does not tell them from gaits, so depth does.
+"""
+
+from typing import Any
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+
+_DEEPEST = 3.0
+"""Elastic force of a standing foot, in units of the walker's weight: about 1 where it stands."""
+
+
+def is_sound(scene: Any, state: Any, step_length: Scalar) -> Scalar:
+    """Whether an orbit through a state on its section steps downhill and on the ground (boolean).
+
+    Args:
+        scene: the walker.
+        state: on the section, where a foot stands or comes down.
+        step_length: advance along the slope in a cycle [m].
+    """
+    forward = step_length > 0.0
+    if isinstance(scene, RigidScene):
+        return forward
+    modelled = scene.scene if isinstance(scene, RedundantScene) else scene
+    weight = modelled.walker.total_mass * modelled.ground.g
+
+    def deep(foot: Foot) -> Scalar:
+        return touches(foot) & (modelled.normal.elastic_force(foot.penetration) > _DEEPEST * weight)
+
+    both = feet(modelled, minimal_state(scene, state))
+    return forward & ~deep(both.foot_1) & ~deep(both.foot_2)

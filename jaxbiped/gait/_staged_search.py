@@ -1,0 +1,234 @@
+"""The search without a guess, in stages, each only where those before found no stable gait."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._progress import stage
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.gait._continuation import Branch, BranchEnd, Change, follow_branch
+from jaxbiped.gait._homotopy import Homotopy, homotopy_to
+from jaxbiped.gait._origin import MOST_OTHERS, FoundBy, Origin, OtherGait, code_array, plain_origin
+from jaxbiped.gait._rolling_starts import rolling_starts
+from jaxbiped.gait._search import ROUGH, Found, Search
+from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.gait._settled_walks import component_sizes, settled_states
+from jaxbiped.gait._turn import Turning, seeded, state_with, turn
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+
+_STARTS = {Scene: (16, 64), RigidScene: (1024,)}
+"""Starts from which walks are followed, the more only where the fewer found no stable gait."""
+_SPREADS = (0.3, 0.8)
+"""Largest relative scatter of the starts' angles and rates, of one half and of the other."""
+_PUSHES = (-0.05, -0.01, 0.01, 0.05)
+"""Sizes (scaled) of the pushes off an unstable gait from which walks begin as well."""
+_SCATTERED = 12
+"""Starts of the last stage."""
+_SAME = 1e-5
+"""Relative difference of period and length up to which two finds are of one gait."""
+
+
+Searching = Callable[[Turning, Any, Any], Found]
+"""Newton's method on the return map of a scene, from a start."""
+
+
+class Seen(NamedTuple):
+    """A gait that a search came to.
+
+    Attributes:
+        found: the fixed point.
+        by: the stage that came to it.
+        radius: its spectral radius.
+    """
+
+    found: Found
+    by: FoundBy
+    radius: float
+
+
+class Staged(NamedTuple):
+    """What a search in stages came to.
+
+    Attributes:
+        best: the stable gait, else the one of smallest spectral radius; None where none was found.
+        others: the others that were seen, by their radius.
+        branch: the branch from the seed's gait, None where it was not followed.
+        line: the scenes along which.
+    """
+
+    best: Seen | None
+    others: tuple[Seen, ...]
+    branch: Branch | None
+    line: Homotopy | None
+
+
+def search_in_stages(
+    search: Searching,
+    turning: Turning,
+    scout: Turning,
+    scene: Any,
+    modelled: Scene | RigidScene,
+    first: Found,
+) -> Staged:
+    """Searches on after Newton's method from the fitted start came to `first`.
+
+    Args:
+        search: Newton's method.
+        turning: whose cycles are sought.
+        scout: how to follow the branch: cycles of one footstep, in minimal coordinates.
+        scene: the walker; `modelled` in minimal coordinates.
+        first: what the first stage came to.
+    """
+    seen: list[Seen] = []
+    branch = line = None
+    start = seed_start(modelled)
+
+    def has_stable() -> bool:
+        return any(each.radius < 1.0 for each in seen)
+
+    def add(found: Found, by: FoundBy) -> None:
+        # What a walk itself settles on is one, however deep.
+        sound = by is FoundBy.WALKING or bool(found.sound)
+        known = any(_same(found, old) for old in seen)
+        if int(found.ending) == int(Search.FOUND) and sound and not known:
+            seen.append(Seen(found, by, spectral_radius(found)))
+
+    def try_all(points: Sequence[np.ndarray] | np.ndarray, by: FoundBy) -> None:
+        for point in points:
+            add(search(turning, scene, _state(start, point)), by)
+            if has_stable():
+                return
+
+    def walk() -> None:
+        for count in _STARTS[type(modelled)] if scout.engine == "lanes" else ():
+            if not has_stable():
+                with stage(f"walking {count} starts"):
+                    points = settled_states(modelled, _starts(modelled, seen, count))
+                try_all(points, FoundBy.WALKING)
+
+    add(first, FoundBy.START)
+    if not has_stable():
+        walk()
+    if not has_stable():
+        with stage("following the seed's gait to this scene"):
+            line = homotopy_to(modelled)
+            branch = _followed(search, scout, line, start)
+            if branch.end is BranchEnd.REACHED:
+                known = len(seen)
+                try_all([branch.points[-1]], FoundBy.CONTINUATION)
+                if len(seen) > known and not has_stable():
+                    walk()
+    if not has_stable():
+        with stage(f"searching from {_SCATTERED} scattered starts"):
+            scattered = _columns(rolling_starts(modelled, _SCATTERED, spread=0.5, seed=2))
+            try_all(scattered[1:], FoundBy.SCATTERED_STARTS)
+    ordered = sorted(seen, key=lambda each: each.radius)
+    return Staged(ordered[0] if ordered else None, tuple(ordered[1:]), branch, line)
+
+
+def origin_of(staged: Staged, scene: Scene | RigidScene, start: Any) -> Origin:
+    """What a search in stages tells of itself; `scene` in minimal coordinates."""
+    by = FoundBy.START if staged.best is None else staged.best.by
+    plain = plain_origin(scene, start, by)
+    columns: Any = np.full((MOST_OTHERS, 3 + len(start)), np.nan)
+    for row, each in zip(columns, staged.others, strict=False):
+        last = each.found.last
+        row[:3] = float(last.period), float(last.advance[0]), each.radius
+        row[3:] = 0.0, *np.asarray(each.found.recurring).tolist()
+    period, length, radius, *state = columns.T
+    others = OtherGait(period, length, radius, type(start)(*state))
+    if staged.branch is None or staged.line is None:
+        return plain._replace(others=others)
+    branch = staged.branch
+    nearest = plain.nearest
+    if branch.end is not BranchEnd.NO_BEGINNING:
+        nearest = staged.line.at(np.float64(branch.s[branch.farthest]))
+    return plain._replace(
+        others=others,
+        branch_end=code_array(branch.end),
+        branch_walk_ending=code_array(branch.code),
+        nearest=nearest,
+    )
+
+
+def spectral_radius(found: Found) -> float:
+    """Largest absolute value of a Floquet multiplier: on the section the trivial one is zero."""
+    jacobian = np.asarray(found.last.jacobian)[:, : found.recurring.shape[0]]
+    if not np.all(np.isfinite(jacobian)):
+        return float("inf")
+    return float(np.max(np.abs(np.linalg.eigvals(jacobian))))
+
+
+def _same(a: Found, b: Seen) -> bool:
+    def measures(found: Found) -> np.ndarray:
+        turn = found.last
+        return np.append(np.asarray(turn.advance), np.asarray(turn.period))
+
+    return bool(np.allclose(measures(a), measures(b.found), rtol=_SAME, atol=0.0))
+
+
+def _state(like: Any, point: np.ndarray) -> Any:
+    """The state with these components besides hip_x, of numbers that take no time to make."""
+    return jtu.tree_map(as_float, type(like)(0.0, *point.tolist()))
+
+
+def _columns(starts: Any) -> np.ndarray:
+    """States without hip_x as rows, shape (n, m)."""
+    return np.stack([np.asarray(leaf) for leaf in starts[1:]], axis=1)
+
+
+def _starts(scene: Scene | RigidScene, seen: list[Seen], count: int) -> Any:
+    """Starts of walks: rolling ones, and states just off the gaits that were seen."""
+    halves = [
+        rolling_starts(scene, count // 2, spread=spread, seed=k)
+        for k, spread in enumerate(_SPREADS)
+    ]
+    rows = np.concatenate([_columns(half) for half in halves])
+    sizes = component_sizes(scene, halves[0])
+    pushed = [row for each in seen for row in _pushed(each.found, sizes)][: count // 2]
+    if pushed:
+        rows[1 : 1 + len(pushed)] = pushed
+    return type(halves[0])(jnp.zeros(count), *map(jnp.asarray, rows.T))
+
+
+def _pushed(found: Found, sizes: np.ndarray) -> list[np.ndarray]:
+    """States just off an unstable gait, along its leading direction."""
+    m = len(sizes)
+    point = np.asarray(found.recurring)
+    values, vectors = np.linalg.eig(np.asarray(found.last.jacobian)[:, :m])
+    vector = vectors[:, np.argmax(np.abs(values))].real
+    unit = vector / np.linalg.norm(vector / sizes)
+    return [point + push * unit for push in _PUSHES]
+
+
+def _followed(search: Searching, scout: Turning, line: Homotopy, like: Any) -> Branch:
+    """The branch of gaits from the seed's scene."""
+    first = search(scout, line.first, seed_start(line.first))
+    point = np.asarray(first.recurring)
+    if int(first.ending) != int(Search.FOUND):
+        return Branch(point[None], np.zeros(1), BranchEnd.NO_BEGINNING, int(first.code))
+
+    def change(point: np.ndarray, s: float) -> Change:
+        given: Any = point, np.float64(s)
+        value, by_point, by_s, code = map(np.asarray, _change(scout, line, like, *given))
+        return Change(value, by_point, by_s, int(code))
+
+    return follow_branch(change, point, scales=component_sizes(line.first, like))
+
+
+@eqx.filter_jit
+def _change(
+    scout: Turning, line: Homotopy, like: Any, point: Scalar, s: Scalar
+) -> tuple[Scalar, Scalar, Scalar, Scalar]:
+    """What a turn changes in a point, and how that depends on the point and on s."""
+    m, scene = point.shape[0], line.at(s)
+    seeds, sizes = seeded(scene, tuple(range(len(jtu.tree_leaves(scene)))), m)
+    start = state_with(scout.system, like, point)
+    once = turn(scout, seeds, start, ROUGH, jnp.asarray(False), steered=jnp.asarray(True))
+    by_s = once.jacobian[:, m:] @ (line.slopes(s) / sizes)
+    return once.recurring - point, once.jacobian[:, :m] - jnp.eye(m), by_s, once.code

@@ -1,0 +1,64 @@
+"""Whether a start stands on the ground, or so deep in it that no contact law means it."""
+
+import math
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped._types import Scalar
+from jaxbiped.scene._clearance import AbstractClearance
+from jaxbiped.scene._law import AbstractNormalLaw
+
+_DEEPEST = 0.25
+"""Penetration of a foot that touches, in units of l, from which it starts below the ground."""
+
+
+def check_start_height(scene: Any, state: Any) -> None:
+    """Refuses a start below the ground, where all values are known.
+
+    The deepest that is allowed is l/4, and so deep that the contact stores what would lift the
+    walker by its leg's length, m g l: contact that stiff must be started from near its surface.
+
+    Raises:
+        ArgumentError: a deeper start.
+    """
+    leaves = jtu.tree_leaves((scene, state))
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+        return
+    # Plain numbers: operations of JAX by themselves would be compiled one by one.
+    walker, g = jtu.tree_map(float, scene.walker), float(scene.ground.g)
+    lift, hip_z = walker.total_mass * g * walker.l, float(state.hip_z)
+    if hip_z <= 0.0:
+        raise ArgumentError(
+            f"state.hip_z = {hip_z:g} is not allowed: the walker starts below the ground, its hip "
+            "under the surface; start higher."
+        )
+    angles, rates = (state.theta_1, state.theta_2), (state.omega_1, state.omega_2)
+    depths = [walker.r - hip_z + walker.hip_to_foot * math.cos(float(angle)) for angle in angles]
+    if max(depths) <= 0.0:
+        return
+    energies = _stored(scene.clearance, scene.normal, depths, rates)
+    stored, depth, leg = max(zip(map(float, energies), depths, (1, 2), strict=True))
+    if stored > 0.0 and (depth > _DEEPEST * walker.l or stored > lift > 0.0):
+        raise ArgumentError(
+            f"state.hip_z = {hip_z:g} is not allowed: foot {leg} starts {depth:.3g} m below the "
+            f"ground, where its contact stores {stored:.3g} J (m g l is {lift:.3g} J); it just "
+            f"touches at hip_z = {hip_z + depth:.9g}."
+        )
+
+
+@jax.jit
+def _stored(
+    clearance: AbstractClearance, law: AbstractNormalLaw, depths: Any, rates: Any
+) -> list[Scalar]:
+    """The energy in the contact of each foot, 0 where it does not touch [J]."""
+
+    def stored(leg: int, depth: Scalar, rate: Scalar) -> Scalar:
+        admitted = clearance.admits(leg, rate)
+        touches = (depth > 0.0) & (True if admitted is None else admitted)
+        return jnp.where(touches, law.elastic_energy(depth), 0.0)
+
+    return [stored(1, depths[0], rates[0]), stored(2, depths[1], rates[1])]

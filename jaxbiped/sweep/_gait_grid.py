@@ -1,0 +1,184 @@
+"""Gaits on a grid of parameters as a dataset, in memory or in a Zarr store."""
+
+import json
+import shutil
+import time
+from collections.abc import Mapping
+from enum import IntEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._origin import FoundBy
+from jaxbiped.gait._search import Search
+from jaxbiped.sweep._same_store import ALSO, SETTINGS, check_same, check_writers
+from jaxbiped.sweep._store import opened, unwritable
+
+if TYPE_CHECKING:
+    import xarray
+
+_DONE = "done"
+_CODES: dict[str, type[IntEnum]] = {
+    "ending": Search,
+    "found_by": FoundBy,
+    "branch_end": BranchEnd,
+}
+_MEASURES = {
+    "period": "s",
+    "step_length": "m",
+    "speed": "m/s",
+    "peak_normal": "N",
+    "spectral_radius": "",
+}
+_UNITS = {"hip_z": "m", "theta": "rad", "hip_v": "m/s", "omega": "rad/s"}
+_PAUSE = 2.0
+"""Seconds between two writes of a store."""
+
+
+class GaitGrid:
+    """Results of a sweep of gaits, written point by point."""
+
+    def __init__(self, dataset: "xarray.Dataset", state: type, path: Path | None) -> None:
+        self._dataset, self._state, self._path = dataset, state, path
+        self._written = time.monotonic()
+
+    def is_done(self, place: tuple[int, ...], *, found: bool) -> bool:
+        """Whether a point is known; where `found`, whether a gait was found there."""
+        done = bool(self._dataset[_DONE].data[place])
+        return done and (not found or self._dataset["ending"].data[place] == int(Search.FOUND))
+
+    def state(self, place: tuple[int, ...]) -> Any:
+        """The gait's state on the section, None where there is none."""
+        if self._dataset["ending"].data[place] != int(Search.FOUND):
+            return None
+        names = self._state._fields[1:]  # type: ignore[attr-defined]
+        return self._state(0.0, *(float(self._dataset[f"state_{n}"].data[place]) for n in names))
+
+    def write(self, place: tuple[int, ...], gait: Gait) -> None:
+        """Keeps a gait, and what is new in the store every few seconds."""
+        for name, (_, value, _) in _variables(gait).items():
+            self._dataset[name].data[place] = value
+        self._dataset[_DONE].data[place] = True
+        if self._path is not None and time.monotonic() - self._written > _PAUSE:
+            self._flush()
+
+    def dataset(self) -> "xarray.Dataset":
+        """The results; of a store, opened lazily."""
+        if self._path is None:
+            return self._dataset.drop_vars(_DONE)
+        self._flush()
+        return opened(self._path).drop_vars(_DONE)
+
+    def _flush(self) -> None:
+        import zarr
+
+        assert self._path is not None
+        try:
+            group: Any = zarr.open_group(str(self._path), mode="r+", use_consolidated=False)
+            # What says that points are known is written after what is known of them.
+            names = [str(name) for name in self._dataset.data_vars if name != _DONE]
+            for name in (*names, _DONE):
+                group[name][...] = self._dataset[name].data
+        except OSError as error:
+            raise unwritable(self._path, error) from None
+        self._written = time.monotonic()
+
+
+def open_gait_grid(
+    first: Gait,
+    values: Mapping[str, np.ndarray],
+    settings: dict[str, Any],
+    writer: Mapping[str, str],
+    path: Path | None,
+    *,
+    any_version: bool,
+) -> GaitGrid:
+    """A grid without results, or what a store holds of it.
+
+    Args:
+        first: any gait of the sweep, for the shapes.
+        values: of the swept parameters.
+        settings: all that the results depend on; those of a store that is there must be equal.
+        writer: what writes.
+        path: of the store; None for one in memory.
+        any_version: whether a store may have been written by another version.
+    """
+    state = type(first.measures.state)
+    dataset = _empty(first, values).assign_attrs({**writer, SETTINGS: json.dumps(settings)})
+    if path is None:
+        return GaitGrid(dataset, state, None)
+    path = path.absolute()
+    try:
+        if path.exists() and any(path.iterdir()):
+            check_same(path, settings)
+            new = check_writers(path, writer, any_version)
+            dataset = opened(path).load()
+            if new:
+                others = [*json.loads(dataset.attrs.get(ALSO, "[]")), dict(writer)]
+                _note(path, {ALSO: json.dumps(others)})
+        else:
+            half = path.with_name(f".{path.name}.unfinished")
+            shutil.rmtree(half, ignore_errors=True)
+            dataset.to_zarr(half, consolidated=False, zarr_format=3)
+            if path.exists():
+                path.rmdir()
+            half.rename(path)
+    except OSError as error:
+        raise unwritable(path, error) from None
+    return GaitGrid(dataset, state, path)
+
+
+def _note(path: Path, attributes: dict[str, Any]) -> None:
+    import zarr
+
+    zarr.open_group(str(path), mode="r+", use_consolidated=False).attrs.update(attributes)
+
+
+def _empty(gait: Gait, values: Mapping[str, np.ndarray]) -> "xarray.Dataset":
+    import xarray
+
+    dims, shape = tuple(values), tuple(map(len, values.values()))
+    variables: dict[str, Any] = {_DONE: (dims, np.zeros(shape, bool))}
+    for name, (own, value, attributes) in _variables(gait).items():
+        whole = value.dtype.kind in "ib"
+        empty = np.full((*shape, *value.shape), -1 if whole else np.nan, value.dtype)
+        variables[name] = ((*dims, *own), empty, attributes)
+    coordinates: dict[str, Any] = {**values, "parameter": list(gait.parameters)}
+    return xarray.Dataset(variables, coordinates)
+
+
+def _variables(gait: Gait) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
+    """Of each variable its own dimensions, its value at a point, and its attributes."""
+    found = gait.outcome is Search.FOUND
+    rows: dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]] = {}
+
+    def add(name: str, value: Any, unit: str, *own: str) -> None:
+        number = np.asarray(value, dtype=np.float64)
+        rows[name] = (own, number if found else np.full_like(number, np.nan), {"units": unit})
+
+    codes = {
+        "ending": gait.ending,
+        "found_by": gait.origin.found_by,
+        "branch_end": gait.origin.branch_end,
+    }
+    for name, code in codes.items():
+        meanings = " ".join(str(each).replace(" ", "_") for each in _CODES[name])
+        flags = {"flag_values": [int(k) for k in _CODES[name]], "flag_meanings": meanings}
+        rows[name] = ((), np.asarray(code, dtype=np.int8), flags)
+    for name, unit in _MEASURES.items():
+        add(name, getattr(gait.measures, name), unit)
+        per = f"{unit} per unit of the parameter".strip()
+        add(f"sensitivity_{name}", getattr(gait.sensitivities, name), per, "parameter")
+        error = getattr(gait.sensitivity_errors, name)
+        add(f"sensitivity_error_{name}", error, per, "parameter")
+        add(f"elasticity_{name}", getattr(gait.elasticities, name), "", "parameter")
+    for name in gait.measures.state._fields[1:]:
+        add(f"state_{name}", getattr(gait.measures.state, name), _UNITS.get(name[:5], ""))
+    add("multiplier_real", np.real(gait.multipliers), "", "multiplier")
+    add("multiplier_imag", np.imag(gait.multipliers), "", "multiplier")
+    add("unit_multiplier_error", gait.unit_multiplier_error, "")
+    add("residual", gait.residual, "SI")
+    return rows

@@ -1,0 +1,169 @@
+"""Sweeps of gaits over parameters: each point is searched from its neighbours on the grid."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import jax.tree_util as jtu
+import numpy as np
+from tqdm import tqdm
+
+from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type
+from jaxbiped._types import as_float
+from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._search import Search
+from jaxbiped.scene._parameters import parameter_names, parameter_values, with_parameters
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.sweep._gait_grid import open_gait_grid
+from jaxbiped.sweep._identity import identity
+from jaxbiped.sweep._provenance import provenance
+from jaxbiped.sweep._store import check_store
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def gait_sweep(
+    scene: Scene | RigidScene | RedundantScene,
+    over: Mapping[str, Sequence[float] | np.ndarray],
+    *,
+    parameters: tuple[str, ...] | None = None,
+    period: int = 1,
+    accuracy: str = "balanced",
+    radius_sensitivities: bool = True,
+    engine: str = "auto",
+    store: str | Path | None = None,
+    progress: bool = False,
+    any_version: bool = False,
+) -> "xarray.Dataset":
+    """Finds the periodic gait at every point of a grid over scene parameters.
+
+    The search begins at the point nearest to the scene's own parameters, without a guess, and goes
+    on from neighbour to neighbour, so that one branch is followed. Where a neighbour's gait leads
+    to none, or to an unstable one, the point is searched without a guess as well; what failed is
+    tried once more from neighbours that were found later.
+
+    Args:
+        scene: the walker; parameters that are not swept keep its values.
+        over: values of each swept parameter by name (see `parameter_names`), shape (k,) each.
+        parameters, period, accuracy, radius_sensitivities, engine: as for `find_gait`.
+        store: directory of a Zarr store; in memory unless given. A run that was killed continues
+            where it was.
+        progress: whether to show a bar on stderr.
+        any_version: whether to continue a store that another version of jaxbiped wrote.
+
+    Returns:
+        A dataset along the swept parameters, SI units: the measures, `state_…`, multipliers,
+        `sensitivity_…` and their errors along `parameter`, `ending`, `found_by` and `branch_end`
+        (codes, whose names are in the attributes); NaN where there is no gait.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled; a store of
+            other settings, or one that cannot be written.
+    """
+    check_type("scene", scene, Scene, RigidScene, RedundantScene)
+    values = _checked_values(scene, over)
+    if store is not None:
+        check_store(Path(store))
+    options = dict(
+        parameters=parameters,
+        period=period,
+        accuracy=accuracy,
+        radius_sensitivities=radius_sensitivities,
+    )
+    modelled = scene.scene if isinstance(scene, RedundantScene) else scene
+    settings = {
+        "scene": {k: float(v) for k, v in parameter_values(modelled).items()},
+        "models": identity(scene),
+        "over": {name: column.tolist() for name, column in values.items()},
+        "options": {**options, "parameters": None if parameters is None else list(parameters)},
+    }
+    shape = tuple(map(len, values.values()))
+    known: dict[tuple[int, ...], Any] = {}
+    order = list(_outwards(shape, _nearest(modelled, values)))
+
+    def search(place: tuple[int, ...], *, again: bool) -> Gait | None:
+        """The gait there; none again where no neighbour has one."""
+        point = {name: values[name][i] for name, i in zip(values, place, strict=True)}
+        near = [known[at] for at in _neighbours(place, shape) if known.get(at) is not None]
+        if again and not near:
+            return None
+        own = jtu.tree_map(as_float, with_parameters(scene, point))
+        return _found(own, near, options | {"engine": engine}, alone=not again)
+
+    first = search(order[0], again=False)
+    assert first is not None
+    path = None if store is None else Path(store)
+    grid = open_gait_grid(first, values, settings, provenance(scene), path, any_version=any_version)
+    with tqdm(total=math.prod(shape), unit="gaits", disable=not progress) as bar:
+        for again in (False, True):
+            for place in order:
+                if not grid.is_done(place, found=again):
+                    gait = search(place, again=again) if place != order[0] or again else first
+                    if gait is not None:
+                        grid.write(place, gait)
+                known[place] = grid.state(place)
+                bar.update(not again)
+    return grid.dataset()
+
+
+def _found(scene: Any, near: list[Any], options: dict[str, Any], *, alone: bool) -> Gait:
+    """The gait that a neighbour's leads to; the search's own where that is none or not stable."""
+    best: Gait | None = None
+    for state in near[:2]:
+        gait = find_gait(scene, jtu.tree_map(as_float, state), **options)
+        if bool(gait.stable):
+            return gait
+        if best is None or gait.outcome is Search.FOUND:
+            best = gait
+    if alone or best is None:
+        gait = find_gait(scene, **options)
+        if best is None or bool(gait.stable) or best.outcome is not Search.FOUND:
+            best = gait
+    return best
+
+
+def _checked_values(scene: Any, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    if not over:
+        raise ArgumentError("over = {} is not allowed: name at least one parameter.")
+    values = {}
+    for name, column in dict(over).items():
+        check_choice("over", name, parameter_names(scene))
+        check_finite(name, column)
+        if np.ndim(column) != 1 or not np.size(column):
+            raise ArgumentError(
+                f"{name} has values of shape {np.shape(column)}: it must be (k,), k at least 1."
+            )
+        values[name] = np.asarray(column, dtype=np.float64)
+        with_parameters(scene, {name: values[name]})
+    return values
+
+
+def _nearest(scene: Any, values: dict[str, np.ndarray]) -> tuple[int, ...]:
+    """The point of the grid nearest to the scene's own parameters."""
+    own = parameter_values(scene)
+    return tuple(int(np.argmin(np.abs(v - float(own[name])))) for name, v in values.items())
+
+
+def _neighbours(place: tuple[int, ...], shape: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+    for axis, size in enumerate(shape):
+        for step in (-1, 1):
+            moved = place[axis] + step
+            if 0 <= moved < size:
+                yield (*place[:axis], moved, *place[axis + 1 :])
+
+
+def _outwards(shape: tuple[int, ...], first: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+    """All points of the grid, each but the first a neighbour of one before it."""
+    seen, waiting = {first}, [first]
+    while waiting:
+        place = waiting.pop(0)
+        yield place
+        for near in _neighbours(place, shape):
+            if near not in seen:
+                seen.add(near)
+                waiting.append(near)

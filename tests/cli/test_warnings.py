@@ -1,0 +1,63 @@
+"""What `jaxbiped walk` warns of."""
+
+import json
+
+import pytest
+
+from jaxbiped.cli import main
+
+
+def _walked(capsys, *arguments):
+    """The numbers that the command writes."""
+    with pytest.raises(SystemExit) as stopped:
+        main(["walk", *arguments, "--json", "-"])
+    assert stopped.value.code == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_an_ordinary_walk_has_no_warnings(capsys):
+    numbers = _walked(capsys, "--duration", "1")
+    assert numbers["warnings"] == []
+    assert numbers["energy_residual_relative"] < 1e-4
+
+
+def test_free_flight_is_airborne(capsys):
+    numbers = _walked(capsys, "--hip-z", "100", "--duration", "1")
+    assert numbers["ending"] == "airborne"
+    (warning,) = numbers["warnings"]
+    assert "--hip-z" in warning
+
+
+def test_a_flight_that_came_down_is_none(capsys):
+    assert _walked(capsys, "--hip-z", "0.42", "--duration", "0.2")["ending"] != "airborne"
+
+
+@pytest.mark.parametrize(
+    "arguments", [("--rtol", "10"), ("--hip-z", "5", "--omega-1", "1e4")], ids=["rtol", "spinning"]
+)
+def test_energy_left_open_is_a_warning_and_a_number(arguments, capsys):
+    numbers = _walked(capsys, *arguments)
+    (warning,) = numbers["warnings"]
+    assert numbers["energy_residual_relative"] > 1e-3
+    assert f"{numbers['energy_residual_relative']:.2g}" in warning
+    assert "--rtol" in warning
+
+
+def test_friction_that_grows_with_slip(capsys):
+    (warning,) = _walked(capsys, "--mu-kinetic", "0.6", "--duration", "0.1")["warnings"]
+    assert "mu_kinetic = 0.6" in warning
+    assert "mu_static = 0.5" in warning
+
+
+def test_a_cap_on_steps_bounds_a_walk_of_any_duration(capsys):
+    """A duration of 1e9 s takes no more memory than the steps that are walked."""
+    numbers = _walked(capsys, "--duration", "1e9", "--max-solver-steps", "1500")
+    assert numbers["ending"] == "out of steps"
+    (warning,) = numbers["warnings"]
+    assert "1500" in warning
+    assert "--max-solver-steps" in warning
+
+
+def test_a_walk_that_ends_ends_whatever_its_duration(capsys):
+    numbers = _walked(capsys, "--duration", "1e9", "--slope", "0.06")
+    assert numbers["ending"] == "fell forward"

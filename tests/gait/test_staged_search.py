@@ -1,0 +1,124 @@
+"""The search without a guess: what it finds, by which stage, and what it says of failure."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from tests.rigid_walkers import rigid_seed, simplest_walker
+
+PLAIN = dict(parameters=(), radius_sensitivities=False)
+# Periods of the stable gaits, by an independent integrator.
+TRUTH = {0.01: 0.43236, 0.012: 0.43554, 0.03: 0.44644, 0.04: 0.45210, 0.06: 0.46361, 0.08: 0.47508}
+
+
+@pytest.mark.parametrize("slope", TRUTH)
+def test_the_stable_gait_is_found_on_every_slope(slope):
+    gait = jb.find_gait(jb.seed_scene(slope=slope), **PLAIN)
+    assert gait.outcome is jb.Search.FOUND
+    assert bool(gait.stable)
+    assert float(gait.measures.period) == pytest.approx(TRUTH[slope], abs=1e-5)
+
+
+def test_the_unstable_gait_that_was_seen_is_told():
+    scene = jb.seed_scene(slope=0.03)
+    gait = jb.find_gait(scene, **PLAIN)
+    assert gait.found_by is jb.FoundBy.WALKING
+    (other,) = gait.others
+    assert other.period == pytest.approx(0.38827, abs=1e-5)
+    assert other.spectral_radius == pytest.approx(2.39, abs=0.01)
+    # The state that is told is the other gait's.
+    state = jax.tree.map(jnp.asarray, other.state)
+    assert float(jb.find_gait(scene, state, **PLAIN).measures.period) == pytest.approx(
+        0.38827, abs=1e-5
+    )
+    assert "0.388268 s (spectral radius 2.39)" in jb.explain_search(scene, gait)
+
+
+def test_with_a_guess_the_gait_near_it_is_returned():
+    scene = jb.seed_scene(slope=0.03)
+    other = jax.tree.map(jnp.asarray, jb.find_gait(scene, **PLAIN).others[0].state)
+    gait = jb.find_gait(scene, other, **PLAIN)
+    assert gait.found_by is jb.FoundBy.GUESS
+    assert not bool(gait.stable)
+    assert gait.others == []
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        (jb.seed_scene(slope=0.005), ("fold", "slope = 0.0095")),
+        (jb.seed_scene(slope=0.3), ("ends at slope = 0.26", "stops")),
+        (
+            eqx.tree_at(lambda s: s.friction, jb.seed_scene(), jb.Frictionless()),
+            ("seed's walker has no gait under these laws",),
+        ),
+    ],
+    ids=["flat", "steep", "frictionless"],
+)
+def test_where_there_is_no_gait_the_end_of_the_branch_is_told(scene, words):
+    gait = jb.find_gait(scene, **PLAIN)
+    assert gait.outcome is not jb.Search.FOUND
+    said = jb.explain_search(scene, gait)
+    assert said.startswith("no gait found: ")
+    for word in words:
+        assert word in said
+
+
+def test_the_nearest_scene_on_the_branch_has_a_gait():
+    gait = jb.find_gait(jb.seed_scene(slope=0.005), **PLAIN)
+    assert jb.BranchEnd(int(gait.origin.branch_end)) is jb.BranchEnd.FOLD
+    near = jb.find_gait(
+        jb.seed_scene(slope=float(gait.origin.nearest.ground.slope) + 1e-4), **PLAIN
+    )
+    assert near.outcome is jb.Search.FOUND
+
+
+def test_under_vmap_a_branch_is_followed_and_each_lane_says_how():
+    slopes = jnp.array([0.02, 0.03, 0.04, 0.3])
+
+    def one(slope):
+        scene = eqx.tree_at(lambda s: s.ground.slope, jb.seed_scene(), slope)
+        return jb.find_gait(scene, **PLAIN)
+
+    gaits = jax.jit(jax.vmap(one))(slopes)
+    np.testing.assert_allclose(
+        gaits.measures.period[:3], [0.4408348, 0.4464368, 0.4521010], atol=1e-6
+    )
+    by = [jb.FoundBy(int(code)) for code in gaits.origin.found_by[:3]]
+    assert by == [jb.FoundBy.START, jb.FoundBy.CONTINUATION, jb.FoundBy.CONTINUATION]
+    assert int(gaits.ending[3]) != int(jb.Search.FOUND)
+    ends = [jb.BranchEnd(int(code)) for code in gaits.origin.branch_end]
+    reached = jb.BranchEnd.REACHED
+    assert ends == [jb.BranchEnd.NOT_FOLLOWED, reached, reached, jb.BranchEnd.BREAKS_OFF]
+    assert 0.2 < float(gaits.origin.nearest.ground.slope[3]) < 0.3
+
+
+@pytest.mark.parametrize("slope", [0.005, 0.05, 0.1])
+def test_rigid_gaits_are_found(slope):
+    gait = jb.find_gait(rigid_seed(slope), **PLAIN)
+    assert gait.outcome is jb.Search.FOUND
+    walk = jb.rigid_walk(
+        rigid_seed(slope), gait.measures.state, steps=100, accuracy="tight", most_arrivals=100
+    )
+    assert walk.outcome is jb.Ending.WALKING
+    if bool(gait.stable):
+        last = float(walk.strikes[0][-1] - walk.strikes[0][-2])
+        assert float(gait.measures.period) == pytest.approx(last, abs=1e-6)
+
+
+def test_the_simplest_walker_is_found_with_its_cycles():
+    """Stable cycles of one footstep at 0.009 and of two at 0.016 (Garcia et al. 1998)."""
+    one = jb.find_gait(simplest_walker(0.009), **PLAIN)
+    assert bool(one.stable)
+    assert not bool(jb.find_gait(simplest_walker(0.016), **PLAIN).stable)
+    two = jb.find_gait(simplest_walker(0.016), period=2, **PLAIN)
+    assert bool(two.stable)
+
+
+def test_a_search_that_may_take_few_cycles_stays_at_its_start():
+    gait = jb.find_gait(jb.seed_scene(slope=0.03), most_turns=3, **PLAIN)
+    assert gait.outcome is jb.Search.NOT_CONVERGED
+    assert gait.found_by is jb.FoundBy.START
