@@ -1,4 +1,7 @@
-"""The adaptive solve of a scene as a program for lanes: the same steps as through diffrax."""
+"""The adaptive solve of a scene as a program for lanes: the same method as through diffrax.
+
+Rounding differs, and it decides on step sizes after a few steps: the steps are not the same.
+"""
 
 import contextlib
 from typing import Any, NamedTuple

@@ -98,7 +98,7 @@ def simulate(
             needs `diffrax.ForwardMode()`. Where a method projects after each step, only adjoints
             that see the steps are allowed.
         engine: "xla", "lanes" or "auto" (see `ENGINES`). The results of the two agree to within
-            the tolerance, not bit by bit.
+            the tolerance, not bit by bit, nor are their steps the same: rounding decides on them.
 
     Returns:
         The motion, and how it ended.
