@@ -17,6 +17,7 @@ from jaxbiped.lanes._crossed import Crossed
 from jaxbiped.lanes._crossing import cross
 from jaxbiped.solve._columns import Seeded, Tangents
 from jaxbiped.solve._passage import Precision
+from jaxbiped.solve._units import units_of
 
 
 @eqx.filter_custom_jvp
@@ -128,7 +129,8 @@ def _crossed(
     m, p = len(places), len(active)
     columns = np.zeros((len(jtu.tree_leaves(state)), m + p))
     columns[list(places), range(m)] = 1.0
-    floors = jnp.asarray([STATE_FLOOR] * m + [PARAMETER_FLOOR] * p)
+    inverse = jtu.tree_leaves(units_of(args, state).inverse)
+    floors = jnp.asarray([*(STATE_FLOOR * inverse[i] for i in places), *[PARAMETER_FLOOR] * p])
     found, _ = cross(
         turning.watch(args, state, peak=False),
         turning.solver,

@@ -13,6 +13,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait._turn import PARAMETER_FLOOR, STATE_FLOOR, Turning
 from jaxbiped.solve._columns import Seeded, Tangents
 from jaxbiped.solve._passage import Precision, passage
+from jaxbiped.solve._units import units_of
 
 NO_REVERSE = (
     "gradient = Forward() carries tangents along the motion and has no reverse mode: pass "
@@ -45,7 +46,8 @@ def _by_xla_forward_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
     column = jnp.stack(_dense(state_dot, state))[:, None]
     seeds = _dense(args_dot, args)
     relative = [d / jnp.where(v == 0.0, 1.0, v) for d, v in zip(seeds, args_leaves, strict=True)]
-    floor = STATE_FLOOR * jnp.max(jnp.abs(column))
+    inverse = jnp.stack(jtu.tree_leaves(units_of(args, state).inverse))
+    floor = STATE_FLOOR * jnp.max(jnp.abs(column[:, 0] * inverse))
     if relative:
         floor = floor + PARAMETER_FLOOR * jnp.max(jnp.abs(jnp.stack(relative)))
     seeded = Seeded(
@@ -81,9 +83,10 @@ def _by_xla_forward_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
 def reverse_by_xla(
     turning: Turning, precision: Precision, args: PyTree, state: PyTree
 ) -> tuple[PyTree, Scalar, Scalar]:
-    count = len(jtu.tree_leaves(state))
+    inverse = jnp.stack(jtu.tree_leaves(units_of(args, state).inverse))
+    count = len(inverse)
     steering = Tangents(state, jnp.eye(count))
-    seeded = Seeded(args, jnp.zeros((0, count)), jnp.full(count, STATE_FLOOR), ())
+    seeded = Seeded(args, jnp.zeros((0, count)), STATE_FLOOR * inverse, ())
     found = passage(
         turning.watch(args, state, peak=False),
         turning.solver,

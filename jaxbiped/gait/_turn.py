@@ -16,9 +16,10 @@ from jaxbiped.lanes._passage import passage_by_lanes
 from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns
 from jaxbiped.solve._landing import Watch
 from jaxbiped.solve._passage import Nodes, Passage, Precision, passage
+from jaxbiped.solve._units import recurring_inverse_units
 
 STATE_FLOOR = 0.1
-"""Size below which errors of derivatives by the state are absolute."""
+"""Size below which errors of derivatives by the state are absolute, in the scene's units."""
 PARAMETER_FLOOR = 1e-4
 """The same by the logarithm of a parameter: small sensitivities are wanted to digits as well."""
 
@@ -134,14 +135,14 @@ def state_with(system: AbstractSystem, like: PyTree, recurring: Scalar) -> PyTre
 def seeded(args: PyTree, active: tuple[int, ...], m: int) -> tuple[Seeded, Scalar]:
     """Seeds for m directions of state and then one for each active parameter.
 
-    A parameter moves by its own size (its logarithm by one), or by one where it is zero. Also
-    these sizes, shape (p,).
+    A parameter moves by its size (its logarithm by one), by one where that is 0. Also sizes, (p,).
     """
     leaves = jtu.tree_leaves(args)
     values = [jax.lax.stop_gradient(leaves[i]) for i in active]
     sizes = jnp.stack([jnp.where(v == 0.0, 1.0, v) for v in values]) if values else jnp.zeros(0)
     seeds = jnp.concatenate([jnp.zeros((len(active), m)), jnp.diag(sizes)], axis=1)
-    floors = jnp.asarray([STATE_FLOOR] * m + [PARAMETER_FLOOR] * len(active))
+    by_state = STATE_FLOOR * recurring_inverse_units(args, m)
+    floors = jnp.concatenate([by_state, jnp.full(len(active), PARAMETER_FLOOR)])
     return Seeded(args, seeds, floors, active), sizes
 
 

@@ -1,4 +1,7 @@
-"""The adaptive solve of a scene as a program for lanes: the same steps as through diffrax."""
+"""The adaptive solve of a scene as a program for lanes: the same method as through diffrax.
+
+Rounding differs, and it decides on step sizes after a few steps: the steps are not the same.
+"""
 
 import contextlib
 from typing import Any, NamedTuple
@@ -23,6 +26,7 @@ from jaxbiped.solve._fence import fences_down
 from jaxbiped.solve._footstep_limit import FootstepLimit
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock, step_of
 from jaxbiped.solve._step_control import first_step, step_control
+from jaxbiped.solve._units import Units
 
 _TERM: Any = diffrax.ODETerm(vector_field)
 
@@ -33,7 +37,8 @@ class Solve(NamedTuple):
     Attributes:
         scene, state: what to simulate and from where.
         duration: simulated time [s]; from `almost` on, a step that would end there ends it.
-        rtol, atol: tolerances.
+        rtol, atol: tolerances, the absolute one in `units`.
+        units: of the state's leaves and of time.
         footsteps: after which to end, 0 for no limit.
         patience: time [s] that counts as waiting for footsteps in vain.
         most_attempts: cap on the solver's steps.
@@ -45,6 +50,7 @@ class Solve(NamedTuple):
     almost: Any
     rtol: Any
     atol: Any
+    units: Units
     footsteps: Any
     patience: Any
     most_attempts: Any
@@ -120,7 +126,7 @@ class AdaptiveSolve:
             zero,
             solve.duration,
             solve.state,
-            first_step(solve.duration),
+            first_step(solve.duration, solve.units.time),
             solve.scene,
             None,
             self._error_order(),
@@ -214,7 +220,7 @@ class AdaptiveSolve:
         return chosen(jnp.minimum, low), chosen(jnp.maximum, high)
 
     def _controller(self, solve: Solve) -> Any:
-        control: Any = step_control(solve.rtol, solve.atol, rms_norm)
+        control: Any = step_control(solve.rtol, solve.atol, rms_norm, solve.units)
         if not self.counting:
             return control
         limit: Any = solve.footsteps
@@ -233,4 +239,6 @@ def shapes_of(scene: Scene) -> Solve:
     number: Any = jax.ShapeDtypeStruct((), jnp.float64)
     scene = jtu.tree_map(lambda _: number, scene)
     kind = state_type(scene)
-    return Solve(scene, kind(*[number] * len(kind._fields)), *[number] * 7)
+    state = kind(*[number] * len(kind._fields))
+    numbers = dict.fromkeys(Solve._fields[2:], number) | {"units": Units(state, number)}
+    return Solve(scene, state, **numbers)

@@ -76,7 +76,7 @@ class AdaptiveColumns:
             zero,
             given.time_limit,
             given.state,
-            first_step(given.time_limit),
+            first_step(given.time_limit, given.units.time),
             given.args,
             None,
             self.solver.error_order(self.term),
@@ -193,11 +193,13 @@ class AdaptiveColumns:
     ) -> tuple[list[Any], Scalar]:
         """The columns after the step, and the largest norm of their errors."""
 
+        inverse = jnp.stack(jtu.tree_leaves(given.units.inverse))
+
         def moved(column: Any, floor: Scalar, forcing: Any | None) -> tuple[Any, Scalar]:
             end, error = column_step(step, column, forcing)
-            sizes = jnp.maximum(jnp.abs(column), jnp.abs(end))
+            sizes = jnp.maximum(jnp.abs(column), jnp.abs(end)) * inverse
             least = SHARE * jnp.max(sizes) + floor
-            scaled = error / (given.tangent_rtol * (sizes + least))
+            scaled = error * inverse / (given.tangent_rtol * (sizes + least))
             square = jnp.sum(scaled * scaled) / len(scaled)
             return end, jnp.where(jnp.isnan(square), jnp.inf, square)
 
@@ -237,7 +239,8 @@ class AdaptiveColumns:
         def norm(error: PyTree) -> Scalar:
             return jnp.maximum(rms_norm(error), columns_norm)
 
-        return Landing.around(step_control(given.rtol, 1e-2 * given.rtol, norm), self.watch)
+        control = step_control(given.rtol, 1e-2 * given.rtol, norm, given.units)
+        return Landing.around(control, self.watch)
 
 
 def _chosen(keep: Scalar, new: Any, old: Any) -> Any:

@@ -4,6 +4,8 @@ from typing import Any, NamedTuple
 
 from jaxtyping import PyTree
 
+from jaxbiped.solve._units import Units
+
 
 class Crossing(NamedTuple):
     """One solve's inputs. Of n directions, m are of the state and p of parameters.
@@ -16,6 +18,7 @@ class Crossing(NamedTuple):
         steered: whether these are carried at all (0 or 1).
         state_floors, parameter_floors: below which errors of columns are absolute, (m,) and (p,).
         rtol, tangent_rtol: tolerances of state and columns.
+        units: of the state's leaves and of time.
         time_limit: longest time to the section [s]; from `almost` on, a step there ends there.
         most_attempts: cap on attempted steps.
     """
@@ -30,6 +33,7 @@ class Crossing(NamedTuple):
     parameter_floors: Any
     rtol: Any
     tangent_rtol: Any
+    units: Units
     time_limit: Any
     almost: Any
     most_attempts: Any

@@ -17,6 +17,7 @@ from jaxbiped.solve._columns import Seeded, Tangents
 from jaxbiped.solve._landing import Watch
 from jaxbiped.solve._passage import Precision
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+from jaxbiped.solve._units import Units, units_of
 
 _QUICK = 50_000
 """Attempted steps that take less than a second."""
@@ -54,6 +55,7 @@ def cross(
         parameter_floors=args.floors[m:],
         rtol=_number(precision.rtol),
         tangent_rtol=_number(precision.tangent_rtol),
+        units=jtu.tree_map(_number, units_of(args.args, y0.state)),
         time_limit=_number(time_limit),
         almost=almost(_number(time_limit)),
         most_attempts=_number(max_solver_steps),
@@ -92,7 +94,12 @@ def _compiled(
         numbers(),
         numbers(directions),
         numbers(p),
-        *[numbers()] * 5,
+        rtol=numbers(),
+        tangent_rtol=numbers(),
+        units=Units(jtu.tree_unflatten(state, [numbers()] * c), numbers()),
+        time_limit=numbers(),
+        almost=numbers(),
+        most_attempts=numbers(),
     )
     body = AdaptiveColumns(solver, watch, active, save_nodes=save_nodes)
     return CompiledProgram(body.program(), shapes)

@@ -25,6 +25,7 @@ from jaxbiped.solve._columns import Seeded, Tangents
 from jaxbiped.solve._landing import Watch
 from jaxbiped.solve._passage import Precision
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+from jaxbiped.solve._units import units_of
 
 _LOOSER = 10.0
 """Tolerance of derivatives, in units of the state's."""
@@ -182,7 +183,9 @@ def _columns(
     start[places, range(m)] = 1.0
     leaves = jtu.tree_leaves(solve.scene)
     sizes = [jnp.where(leaves[i] == 0.0, 1.0, jnp.abs(leaves[i])) for i in active]
-    floors = jnp.stack([*[jnp.asarray(_FLOOR)] * m, *[_FLOOR / size for size in sizes]])
+    inverse = units_of(solve.scene, solve.state).inverse
+    by_state = [jnp.asarray(_FLOOR * inverse[i]) for i in places]
+    floors = jnp.stack([*by_state, *(_FLOOR / size for size in sizes)])
     return cross(
         _WATCH,
         setting.solver,

@@ -1,5 +1,7 @@
 """Ambrósio's friction law."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -30,6 +32,7 @@ class Ambrosio(AbstractFrictionLaw):
         ArgumentError: mu below 0, v0 not above 0 or v1 not above v0.
     """
 
+    builds_up_over: ClassVar[str | None] = "v1"
     mu: Parameter = eqx.field(converter=as_float)
     v0: Parameter = eqx.field(converter=as_float)
     v1: Parameter = eqx.field(converter=as_float)

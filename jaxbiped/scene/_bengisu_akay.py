@@ -1,5 +1,7 @@
 """The seed's friction law, with its Stribeck peak."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -29,6 +31,7 @@ class BengisuAkay(AbstractFrictionLaw):
         ArgumentError: a coefficient or xi below 0, or v0 not above 0.
     """
 
+    builds_up_over: ClassVar[str | None] = "v0"
     mu_static: Parameter = eqx.field(converter=as_float)
     mu_kinetic: Parameter = eqx.field(converter=as_float)
     v0: Parameter = eqx.field(converter=as_float)

@@ -1,5 +1,7 @@
 """Brown and McPhee's friction law."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -40,6 +42,7 @@ class BrownMcPhee(AbstractFrictionLaw):
             above 0, or a mu_v above 0 without N_t.
     """
 
+    builds_up_over: ClassVar[str | None] = "v_t"
     mu_static: Parameter = eqx.field(converter=as_float)
     mu_dynamic: Parameter = eqx.field(converter=as_float)
     v_t: Parameter = eqx.field(converter=as_float)

@@ -1,5 +1,7 @@
 """Coulomb friction, regularised at rest."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -19,6 +21,7 @@ class RegularisedCoulomb(AbstractFrictionLaw):
         ArgumentError: mu below 0 or v_d not above 0.
     """
 
+    builds_up_over: ClassVar[str | None] = "v_d"
     mu: Parameter = eqx.field(converter=as_float)
     v_d: Parameter = eqx.field(converter=as_float)
 

@@ -44,7 +44,15 @@ class AbstractNormalLaw(eqx.Module):
 
 
 class AbstractFrictionLaw(eqx.Module):
-    """Tangential force of the ground on a foot as a function of normal force and slip speed."""
+    """Tangential force of the ground on a foot as a function of normal force and slip speed.
+
+    Attributes:
+        builds_up_over: name of the parameter that is the slip speed [m/s] over which the force
+            builds up from rest, which steps must resolve; None for a law without one. A property
+            of the class.
+    """
+
+    builds_up_over: ClassVar[str | None] = None
 
     @abc.abstractmethod
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:

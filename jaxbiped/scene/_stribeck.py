@@ -1,5 +1,7 @@
 """Friction with an exponential Stribeck curve and a viscous part."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -35,6 +37,7 @@ class Stribeck(AbstractFrictionLaw):
         ArgumentError: a coefficient or k_v below 0, or v_s, p or v_d not above 0.
     """
 
+    builds_up_over: ClassVar[str | None] = "v_d"
     mu_static: Parameter = eqx.field(converter=as_float)
     mu_kinetic: Parameter = eqx.field(converter=as_float)
     v_s: Parameter = eqx.field(converter=as_float)

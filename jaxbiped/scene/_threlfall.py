@@ -1,5 +1,7 @@
 """Threlfall's friction law."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 
@@ -27,6 +29,7 @@ class Threlfall(AbstractFrictionLaw):
         ArgumentError: mu below 0 or v0 not above 0.
     """
 
+    builds_up_over: ClassVar[str | None] = "v0"
     mu: Parameter = eqx.field(converter=as_float)
     v0: Parameter = eqx.field(converter=as_float)
 

@@ -124,6 +124,7 @@ def _solve(run: "Simulation") -> Solve:
         almost=almost(run.duration),
         rtol=run.rtol,
         atol=run.atol,
+        units=run.units,
         footsteps=number(footsteps),
         patience=number(PATIENCE * footsteps),
         most_attempts=number(run.max_solver_steps),

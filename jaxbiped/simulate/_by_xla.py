@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @eqx.filter_jit
 def by_xla(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`. A trajectory saved step by step keeps its full length."""
-    controller: Any = step_control(run.rtol, run.atol, rms_norm)
+    controller: Any = step_control(run.rtol, run.atol, rms_norm, run.units)
     if run.dt is not None:
         controller = diffrax.ConstantStepSize()
     if run.steps is not None:
@@ -44,7 +44,7 @@ def by_xla(run: "Simulation") -> Trajectory:
         solver,
         t0=zero,
         t1=run.duration,
-        dt0=first_step(run.duration) if run.dt is None else run.dt,
+        dt0=first_step(run.duration, run.units.time) if run.dt is None else run.dt,
         y0=run.state,
         args=run.scene,
         saveat=_saveat(run),

@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import Array, PyTree
 
 from jaxbiped._checks import (
@@ -37,6 +38,7 @@ from jaxbiped.solve._footstep_limit import PATIENCE
 from jaxbiped.solve._projected import check_adjoint
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._units import Units, si_units, units_of
 
 
 def simulate(
@@ -74,9 +76,11 @@ def simulate(
         steps: footsteps (heel strikes) after which to end; with a `duration`, too, the simulation
             ends at whichever comes first, and is "walking" either way.
         solver: a name (see `SOLVERS`) or any diffrax solver.
-        accuracy: "fast", "balanced" or "tight" (see `ACCURACIES`).
+        accuracy: "fast", "balanced" or "tight" (see `ACCURACIES`), or finer where that would not
+            resolve the slip speed over which friction builds up.
         rtol: relative tolerance, in place of the accuracy's.
-        atol: absolute tolerance (SI), in place of a hundredth of the relative one.
+        atol: absolute tolerance (SI), in place of a hundredth of the relative one: for the seed's
+            leg length and gravity in SI, for a walker of another size in proportion to that.
         dt: steps of this size [s], in place of tolerances; explicit methods fail on stiff contact
             unless it is about 1e-6, and their derivatives unless it is half of that: friction's
             rate, up to 5e6 1/s, makes a longer Euler step unstable, which the state survives
@@ -94,7 +98,7 @@ def simulate(
             needs `diffrax.ForwardMode()`. Where a method projects after each step, only adjoints
             that see the steps are allowed.
         engine: "xla", "lanes" or "auto" (see `ENGINES`). The results of the two agree to within
-            the tolerance, not bit by bit.
+            the tolerance, not bit by bit, nor are their steps the same: rounding decides on them.
 
     Returns:
         The motion, and how it ended.
@@ -133,6 +137,7 @@ class Simulation(eqx.Module):
     times: Array | None
     rtol: Scalar
     atol: Scalar
+    units: Units
     dt: Scalar | None
     solver: diffrax.AbstractSolver
     adjoint: diffrax.AbstractAdjoint
@@ -189,7 +194,7 @@ class Simulation(eqx.Module):
         timed = section is None and not isinstance(save, str)
         if timed:
             check_times(save, time)
-        relative, absolute = tolerances(accuracy, rtol, atol)
+        relative, absolute = tolerances(accuracy, rtol, atol, scene)
         dtype = jnp.result_type(jtu.tree_leaves(state)[0])
         check_precision(scene, dtype)
         if isinstance(given, State | BristleState):
@@ -202,6 +207,13 @@ class Simulation(eqx.Module):
         def cast(leaf: Any) -> Array:
             return jnp.asarray(leaf, dtype=dtype)
 
+        def known(leaf: Any) -> Any:
+            # As it is where nothing is traced: each array of JAX's costs 0.1 ms.
+            return cast(leaf) if isinstance(leaf, jax.core.Tracer) else np.asarray(leaf, dtype)
+
+        # A tolerance that is given is one in SI units.
+        units = units_of(scene, state)
+        units = units if atol is None else si_units(units)
         save_steps = isinstance(save, str) and save == "steps"
         chosen = chosen_engine(
             engine,
@@ -223,6 +235,7 @@ class Simulation(eqx.Module):
             times=cast(save) if timed else None,
             rtol=cast(relative),
             atol=cast(absolute),
+            units=jtu.tree_map(known, units),
             dt=None if dt is None else cast(dt),
             solver=method,
             adjoint=diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint,

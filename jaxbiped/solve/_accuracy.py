@@ -13,10 +13,10 @@ from jaxbiped._types import Scalar
 
 
 class Tolerances(NamedTuple):
-    """Tolerances of the step-size control: relative, and absolute in SI units.
+    """Tolerances of the step-size control: relative, and absolute.
 
-    The absolute one must resolve the slip speed v0 at which friction peaks, or steps chatter
-    about it; by default it is a hundredth of the relative one.
+    Both must resolve the slip speed over which friction builds up, or steps chatter about it. By
+    default the absolute one is a hundredth of the relative one, in the scene's `Units`.
     """
 
     rtol: float
@@ -24,24 +24,46 @@ class Tolerances(NamedTuple):
 
 
 ACCURACIES = {"fast": 1e-5, "balanced": 1e-6, "tight": 2e-9}
-"""Relative tolerance of each named accuracy.
+"""Relative tolerance of each named accuracy, at most.
 
 Looser than "fast" is no faster: the tolerance of a velocity comes near v0, and steps chatter.
 """
 
 
-def tolerances(accuracy: str, rtol: float | None, atol: float | None) -> Tolerances:
-    """The tolerances that a name stands for, either one replaced where it is given.
+_RESOLVED = 0.5
+"""Error of a walker's speed √(g l), in units of the slip speed over which friction builds up, from
+which steps may chatter about that."""
+
+
+def tolerances(
+    accuracy: str, rtol: float | None, atol: float | None, scene: Any = None
+) -> Tolerances:
+    """The tolerances that a name stands for in a scene, either one replaced where it is given.
 
     Raises:
         ArgumentError: an unknown name, or a tolerance that is not above zero.
     """
     check_choice("accuracy", accuracy, ACCURACIES)
-    relative = ACCURACIES[accuracy] if rtol is None else rtol
+    relative = resolving(ACCURACIES[accuracy], scene) if rtol is None else rtol
     check_positive("rtol", relative)
     absolute = 1e-2 * relative if atol is None else atol
     check_positive("atol", absolute)
     return Tolerances(relative, absolute)
+
+
+def resolving(rtol: float, scene: Any) -> Any:
+    """A relative tolerance, or the largest below it that resolves how friction builds up."""
+    law = getattr(scene, "friction", None)
+    name = getattr(law, "builds_up_over", None)
+    if name is None:
+        return rtol
+    leaves = (getattr(law, name), scene.ground.g, scene.walker.l)
+    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
+    xp: Any = jnp if traced else np  # where numbers are known nothing is compiled for them
+    slow, g, l = (jax.lax.stop_gradient(leaf) if traced else np.asarray(leaf) for leaf in leaves)
+    fast = xp.sqrt(g * l)
+    finest = _RESOLVED * slow / xp.where(fast > 0.0, fast, 1.0)
+    return xp.where(_RESOLVED * slow < rtol * fast, finest, rtol)
 
 
 def rms_norm(error: PyTree) -> Scalar:

@@ -9,7 +9,7 @@ ENGINES = ("auto", "xla", "lanes")
 
 - xla: diffrax, compiled by XLA: on every device, for every solver, in every mode of
   differentiation.
-- lanes: the same steps compiled to vector code for this machine's CPU: many times faster.
+- lanes: the same method compiled to vector code for this machine's CPU: many times faster.
 - auto: lanes where JAX computes on a CPU and they can do what is asked, else xla. `simulate` keeps
   to xla inside `jit`, `vmap` and derivatives, for it is not known what will be asked of it there.
 """

@@ -13,7 +13,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._columns import Seeded, Tangents, along_columns, as_columns
 from jaxbiped.solve._ending import Ending
-from jaxbiped.solve._landing import Landed, Landing, Watch, plain_state
+from jaxbiped.solve._landing import Landed, Landing, Watch, plain_args, plain_state
 from jaxbiped.solve._step_control import first_step, step_control
 from jaxbiped.solve._tangents import (
     TangentControl,
@@ -21,6 +21,7 @@ from jaxbiped.solve._tangents import (
     VariationalField,
     worst_norm,
 )
+from jaxbiped.solve._units import units_of
 
 Along: TypeAlias = Callable[[Callable[[PyTree, PyTree], Any], Tangents, Seeded], tuple[Any, Any]]
 """Values of a function of state and arguments, and their derivatives along columns."""
@@ -30,7 +31,8 @@ class Precision(NamedTuple):
     """How exactly to solve.
 
     Attributes:
-        rtol: relative tolerance of the state; the absolute one (SI) is a hundredth of it.
+        rtol: relative tolerance of the state; the absolute one is a hundredth of it in the
+            scene's units.
         tangent_rtol: relative tolerance of the columns.
     """
 
@@ -103,10 +105,11 @@ def passage(
     """
     carries = isinstance(y0, Tangents)
     norm = worst_norm if carries else rms_norm
-    controller: Any = step_control(precision.rtol, 1e-2 * precision.rtol, norm)
+    units = units_of(plain_args(args), plain_state(y0))
+    controller: Any = step_control(precision.rtol, 1e-2 * precision.rtol, norm, units)
     field: Any = watch.field
     if carries:
-        controller = TangentControl.around(controller, precision.tangent_rtol)
+        controller = TangentControl.around(controller, precision.tangent_rtol, units)
         solver = TangentSolver(watch, solver, columns_only_steer)
         field = VariationalField(watch.field)
     end = diffrax.SubSaveAt(t1=True)
@@ -118,7 +121,7 @@ def passage(
         solver,
         t0=jnp.zeros_like(limit),
         t1=limit,
-        dt0=first_step(limit),
+        dt0=first_step(limit, units.time),
         y0=y0,
         args=args,
         saveat=diffrax.SaveAt(subs=subs, controller_state=True),

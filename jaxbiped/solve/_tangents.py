@@ -19,6 +19,7 @@ from jaxbiped.solve._leap import can_leap, leap_at, leaping_values
 from jaxbiped.solve._projected import Projected
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.solve._rosenbrock_columns import rosenbrock_columns
+from jaxbiped.solve._units import Units
 
 SHARE = 0.1
 """Of a column's largest entry: what its smaller entries' errors are measured against."""
@@ -141,11 +142,13 @@ class TangentControl(diffrax.AbstractAdaptiveStepSizeController):
     """Lets the columns' errors into a controller's norm, with a tolerance of their own.
 
     An entry's error is measured against its own size, a share of the largest entry of its column,
-    and the column's floor: a column that is zero, or fades away, must not choose the steps.
+    and the column's floor, each in its leaf's unit: a column that is zero, or fades away, must not
+    choose the steps.
 
     Attributes:
         controller: decides every step's size from the worse of the state's and the columns' norm.
         tangent_rtol: tolerance of the columns, relative.
+        inverse_units: of the state's leaves, shape (c,).
     """
 
     rtol: Any
@@ -153,12 +156,14 @@ class TangentControl(diffrax.AbstractAdaptiveStepSizeController):
     norm: Callable[[PyTree], Any]
     controller: Any
     tangent_rtol: Any
+    inverse_units: Any
 
     @staticmethod
-    def around(controller: diffrax.PIDController, tangent_rtol: Any) -> "TangentControl":
+    def around(controller: Any, tangent_rtol: Any, units: Units) -> "TangentControl":
         """Wraps a controller whose norm is `worst_norm`."""
+        each = jnp.stack(jtu.tree_leaves(units.inverse))
         return TangentControl(
-            controller.rtol, controller.atol, controller.norm, controller, tangent_rtol
+            controller.rtol, controller.atol, controller.norm, controller, tangent_rtol, each
         )
 
     def wrap(self, direction: Any) -> "TangentControl":
@@ -181,10 +186,11 @@ class TangentControl(diffrax.AbstractAdaptiveStepSizeController):
         controller_state: Any,
     ) -> Any:
         """Accepts or rejects a step, as diffrax asks."""
-        size = jnp.maximum(jnp.abs(y0.columns), jnp.abs(y1_candidate.columns))
+        inverse = self.inverse_units[:, None]
+        size = jnp.maximum(jnp.abs(y0.columns), jnp.abs(y1_candidate.columns)) * inverse
         floor = SHARE * jnp.max(size, axis=0) + args.floors
         # The wrapped controller divides by its absolute tolerance; nothing else is left to it.
-        scaled = y_error.columns * (self.atol / (self.tangent_rtol * (size + floor)))
+        scaled = y_error.columns * inverse * (self.atol / (self.tangent_rtol * (size + floor)))
         nothing = jnp.zeros_like(scaled)
         return self.controller.adapt_step_size(
             t0,

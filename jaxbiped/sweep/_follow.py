@@ -14,6 +14,7 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+from jaxbiped.solve._units import units_of
 from jaxbiped.sweep._by_lanes import labelled_by_lanes
 from jaxbiped.sweep._by_xla import labelled_by_xla
 from jaxbiped.sweep._course import AbstractCourse, CompliantCourse, Outcome, RigidCourse, Start
@@ -31,7 +32,7 @@ class Effort(NamedTuple):
     """How starts are followed. All hashable.
 
     Attributes:
-        rtol: relative tolerance; the absolute one (SI) is a hundredth of it.
+        rtol: relative tolerance; the absolute one is a hundredth of it in the scene's units.
         footsteps: after which a start that is not certain is given up.
         most_attempts: cap on the solver's attempted steps.
         gap: see `arrived`.
@@ -70,7 +71,8 @@ def follow(
     else:
         last = same(almost(jnp.asarray(_LONGEST)))
         atol = same(1e-2 * effort.rtol)
-        solve = Solve(**common, almost=last, atol=atol, patience=same(np.inf))
+        units = jtu.tree_map(same, units_of(scene, states))
+        solve = Solve(**common, almost=last, atol=atol, units=units, patience=same(np.inf))
     waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
     with _MAKING:

@@ -22,7 +22,7 @@ from jaxbiped.scene._parameters import parameter_values, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._rigid_walk import RIGID_ACCURACIES
-from jaxbiped.solve._accuracy import ACCURACIES
+from jaxbiped.solve._accuracy import ACCURACIES, resolving
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve._rosenbrock import AbstractRosenbrock
 from jaxbiped.solve._solvers import solver_named
@@ -184,7 +184,7 @@ def checked_effort(
         )
     names = RIGID_ACCURACIES if isinstance(scene, RigidScene) else ACCURACIES
     check_choice("accuracy", accuracy, names)
-    tolerance = names[accuracy] if rtol is None else rtol
+    tolerance = resolving(names[accuracy], scene) if rtol is None else rtol
     check_positive("rtol", tolerance)
     method = solver_named(solver)
     if not isinstance(method, AbstractRosenbrock):

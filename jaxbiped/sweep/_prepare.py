@@ -44,7 +44,7 @@ def labelling(
         footsteps: after which a start that is not certain is "unresolved".
         accuracy: "fast", "balanced" or "tight": `ACCURACIES`, a rigid walker's those of
             `rigid_walk`.
-        rtol: relative tolerance, in place of the accuracy's; the absolute one (SI) is a hundredth.
+        rtol: relative tolerance, in place of the accuracy's; the absolute one is a hundredth.
         solver: of the compliant walker, "rodas3p" to "rodas5p".
         max_solver_steps: cap on a start's attempted steps.
         engine: "lanes", "xla" or "auto" (see `ENGINES`). Both give the same labels, but for starts

@@ -23,6 +23,7 @@ from jaxbiped.lanes._engine import CompiledProgram, default_threads
 from jaxbiped.lanes._host import host
 from jaxbiped.lanes._program import Program
 from jaxbiped.lanes._solve import Setting, compiled_solve
+from jaxbiped.solve._units import units_of
 
 SCENE = jb.seed_scene()
 SEED = np.array([float(leaf) for leaf in jb.seed_state()])
@@ -47,6 +48,7 @@ def _inputs(starts, duration=0.3, most=20000.0, scene=SCENE):
         almost=each(almost(jnp.asarray(duration))),
         rtol=each(1e-6),
         atol=each(1e-8),
+        units=jtu.tree_map(each, units_of(SCENE, jb.seed_state())),
         footsteps=each(0),
         patience=each(0),
         most_attempts=each(most),

@@ -110,8 +110,24 @@ def test_every_step_and_the_motion_between_them_agree():
         assert walk.t.shape == (int(walk.accepted) + 1,) == walk.state.hip_x.shape
         assert (float(walk.t[0]), float(walk.t[-1])) == (0.0, 0.5)
         assert walk.at(walk.t[0]) == jb.seed_state()
-        with pytest.raises(ValueError, match="lasts from"):
+        with pytest.raises(jb.ArgumentError, match=r"t = 0\.6 is not allowed"):
             walk.at(0.6)
+
+
+def test_rounding_alone_makes_the_engines_steps_differ():
+    walks = [
+        _end(jb.seed_state(), engine, duration=0.5, save="steps") for engine in ("lanes", "xla")
+    ]
+    assert {walk.engine for walk in walks} == {"lanes", "xla"}
+    first = [np.diff(walk.t)[:10] for walk in walks]
+    np.testing.assert_allclose(*first, rtol=1e-6)
+    counts = [int(walk.accepted) for walk in walks]
+    start = jb.seed_state()
+    nudged = start._replace(theta_1=np.nextafter(float(start.theta_1), 1.0))
+    other = _end(nudged, "lanes", duration=0.5, save="steps")
+    assert max(abs(count - int(other.accepted)) for count in counts) < 20
+    for walk in (walks[1], other):
+        np.testing.assert_allclose(walk.final, walks[0].final, atol=1e-5)
 
 
 @pytest.mark.parametrize("solver", ["rodas3p", "rodas4", "rodas4p", "rodas5p"])
