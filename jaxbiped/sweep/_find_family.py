@@ -8,7 +8,6 @@ import numpy as np
 
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -31,7 +30,7 @@ def find_family(
     """The gait of one footstep for every combination of the parameters' values.
 
     Each search begins from the nearest gait found so far, the first from the guess, and one that
-    fails begins again from the seed's start.
+    fails goes on without a guess.
     """
     names = tuple(parameters)
     grids = np.meshgrid(*[np.asarray(parameters[name], float) for name in names], indexing="ij")
@@ -49,7 +48,7 @@ def find_family(
     for k in [*range(len(table)), *reversed(range(len(table)))]:
         if not rows[k]:
             own = scene_with(scene, names, table[k])
-            guesses = [*(near(k) or [guess]), seed_start(own)]
+            guesses = [*(near(k) or [guess]), None]
             rows[k] = _found(own, guesses, 1, effort)
     return _family(scene, names, table, tuple(rows), guess)
 
@@ -89,7 +88,7 @@ def _found(
     for guess in guesses:
         gait = find_gait(
             scene,
-            jtu.tree_map(as_float, guess),
+            None if guess is None else jtu.tree_map(as_float, guess),
             period=period,
             parameters=(),
             radius_sensitivities=False,

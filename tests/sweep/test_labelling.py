@@ -283,3 +283,10 @@ def test_bristles_start_straight():
     found = jb.sweep(labelling, jb.GivenStarts(short), look_for_gaits=False)
     assert found.start_hip_z.shape == (2,)
     assert jtu.tree_leaves(labelling.settings()["scene"])
+
+
+def test_a_labelling_knows_the_stable_gait_where_the_seeds_start_leads_to_another():
+    """At 0.03 rad Newton's method from the seed's start comes to an unstable gait."""
+    label = jb.labelling(jb.seed_scene(slope=0.03))
+    (gait,) = label.family.rows[0]
+    assert gait.duration == pytest.approx(0.4464368, abs=1e-6)
