@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 OUT := out/walk
 
-.PHONY: walk gait test lint types clean
+.PHONY: walk gait test lint types notebooks clean
 
 walk: $(VENV)/.installed
 	$(BIN)/jaxbiped walk --out $(OUT)
@@ -24,6 +24,10 @@ lint: $(VENV)/.installed-dev
 
 types: $(VENV)/.installed-dev
 	$(BIN)/mypy
+
+# Runs all notebooks at full size and keeps them with their outputs; takes some minutes.
+notebooks: $(VENV)/.installed-dev
+	$(BIN)/python notebooks/execute.py
 
 $(VENV)/.made:
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "jaxbiped needs Python 3.11 or newer"'

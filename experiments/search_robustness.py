@@ -14,6 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from _options import Options, parse
 from _settled import Settled, settled
+from matplotlib.ticker import NullFormatter
 
 import jaxbiped as jb
 
@@ -22,15 +23,24 @@ SAME = 1e-6
 RANDOM, SPREAD = 200, 0.5
 """Random scenes, and by how much each of their parameters may differ from the seed's."""
 BODY = ("m", "J", "l", "d", "r", "slope", "n", "K", "c", "mu_static", "mu_kinetic", "v0", "xi")
-COLOURS = {
-    "agrees": "#1b7837",
-    "agrees, longer cycle": "#7fbf7b",
-    "unstable, no walk settles": "#2166ac",
-    "none, no walk settles": "#bdbdbd",
-    "stable, walks not seen": "#762a83",
-    "missed": "#d6604d",
+MARKS = {
+    "agrees": ("#1b7837", "o"),
+    "agrees, longer cycle": ("#7fbf7b", "s"),
+    "stable, walks not seen": ("#762a83", "D"),
+    "unstable, no walk settles": ("#2166ac", "^"),
+    "none, no walk settles": ("#7f7f7f", "|"),
+    "missed": ("#d6604d", "x"),
 }
-"""Verdicts, with their colours."""
+"""Verdicts, with their colours and markers."""
+TITLES = {
+    "random": "200 random scenes",
+    "rigid": "the seed's walker on rigid feet",
+    "simplest": "simplest walker",
+    "compass": "compass gait",
+}
+AXES = {"mu": "static friction", "random": "number", "J": "moment of inertia J"} | dict.fromkeys(
+    ("rigid", "simplest", "compass"), "slope"
+)
 
 
 class Family(NamedTuple):
@@ -75,14 +85,14 @@ def families(quick: bool) -> dict[str, Family]:
         "J": grid("J", "kg m$^2$", 0.0096 / 10**0.5, 0.0096 * 10**0.5, 10),
         "m": grid("m", "kg", 10**-0.5, 10**0.5, 10),
         "mu": Family("1", np.geomspace(0.2, 2.0, 2 if quick else 10), _rough, log=True),
-        "random": Family("scene", np.arange(2 if quick else RANDOM) + 1.0, _random),
+        "random": Family("–", np.arange(2 if quick else RANDOM) + 1.0, _random),
     }
     steep = np.linspace(0.02, 0.05, 2) if quick else np.arange(5, 101, 5) * 1e-3
     simplest = [0.004, 0.009] if quick else [*np.arange(5, 190, 5) * 1e-4, 0.0187, 0.0189]
     found["rigid"] = Family("rad", steep, _rigid_seed)
     found["simplest"] = Family("rad", np.asarray(simplest), _simplest)
     found["compass"] = Family("degrees", np.arange(1, 3 if quick else 11) * 0.5, _compass)
-    return found
+    return {name: found[name] for name in ("slope", "mu", "simplest")} if quick else found
 
 
 def _rough(mu: float) -> jb.Scene:
@@ -176,26 +186,37 @@ def _verdict(gait: jb.Gait, walk: Settled) -> str:
 
 def picture(options: Options, found: dict[str, list[Result]], kinds: dict[str, Family]) -> None:
     """Periods over each family's parameter, coloured as the verdicts are."""
-    figure, grid = plt.subplots(4, 3, figsize=(12.0, 12.5), layout="constrained")
-    for axes, (name, rows) in zip(grid.flat, found.items(), strict=True):
-        for verdict, colour in COLOURS.items():
-            chosen = [row for row in rows if row.verdict == verdict]
+    rows = -(-len(found) // 3)
+    size = (12.0, 0.8 + 2.9 * rows)
+    figure, grid = plt.subplots(rows, 3, figsize=size, layout="constrained", squeeze=False)
+    for axes, (name, results_) in zip(grid.flat, found.items(), strict=True):
+        for verdict, (colour, marker) in MARKS.items():
+            chosen = [row for row in results_ if row.verdict == verdict]
             values = [row.value for row in chosen]
-            marker = "x" if verdict == "missed" else "o"
+            periods = [row.period / max(1, row.cycle) for row in chosen]
+            if verdict != "none, no walk settles":
+                axes.plot(values, periods, marker, color=colour, ms=4)
+                continue
             # A scene without a gait stands at the bottom.
-            bottom = 0.0 * np.asarray(values)
-            periods = np.asarray([row.period for row in chosen])
-            none = verdict == "none, no walk settles"
-            axes.plot(values, bottom if none else periods, marker, color=colour, ms=4)
+            bottom = dict(transform=axes.get_xaxis_transform(), clip_on=False)
+            (mark,) = axes.plot(
+                values, 0.0 * np.asarray(values), marker, color=colour, ms=6, **bottom
+            )
+            mark.set_in_layout(False)
         if kinds[name].log:
             axes.set_xscale("log")
-        axes.set_ylim(bottom=-0.02)
-        axes.set_xlabel(f"{name} [{kinds[name].unit}]")
-        axes.set_ylabel("period of the cycle [s]")
+            axes.xaxis.set_minor_formatter(NullFormatter())
+            values = kinds[name].values
+            if values[-1] < 100.0 * values[0]:
+                few = values[:: max(1, len(values) // 3)]
+                axes.set_xticks(few, [f"{value:.2g}" for value in few])
+        axes.set_title(TITLES.get(name, ""), fontsize=10)
+        axes.set_xlabel(f"{AXES.get(name, name)} [{kinds[name].unit}]")
+        axes.set_ylabel("time per footstep [s]")
         axes.grid(alpha=0.3)
     handles = [
-        plt.Line2D([], [], color=c, marker="x" if v == "missed" else "o", ls="", label=v)
-        for v, c in COLOURS.items()
+        plt.Line2D([], [], color=colour, marker=marker, ls="", label=verdict)
+        for verdict, (colour, marker) in MARKS.items()
     ]
     figure.legend(handles=handles, loc="outside upper center", ncols=3)
     figure.savefig(options.path("search_robustness.png"), dpi=130)
@@ -208,7 +229,7 @@ def main() -> None:
     kinds, found = families(options.quick), {}
     for name, family in kinds.items():
         rows = found[name] = results(name, family)
-        counts = {v: sum(row.verdict == v for row in rows) for v in COLOURS}
+        counts = {v: sum(row.verdict == v for row in rows) for v in MARKS}
         counts = {v: count for v, count in counts.items() if count}
         slowest = max(row.seconds for row in rows[1:])
         options.say(f"{name:>9} ({len(rows):3d}): {counts}; slowest search {slowest:.2f} s")

@@ -46,45 +46,27 @@ class Point(NamedTuple):
 
 def swept(name: str, count: int, radius: bool) -> list[Point]:
     """Gaits from the seed's value outwards, each searched from its neighbour's state."""
-    values = (SEED[name] * np.logspace(-DECADES, DECADES, count)).tolist()
-    middle = count // 2
-    centre = gait_at(name, values[middle], None, radius)
-    gaits = {middle: centre}
-    for places in (range(middle + 1, count), range(middle - 1, -1, -1)):
-        guess = centre.measures.state
-        for i in places:
-            gaits[i] = gait_at(name, values[i], guess, radius)
-            if gaits[i].outcome is jb.Search.FOUND:
-                guess = gaits[i].measures.state
-    return [point(name, values[i], gaits[i]) for i in range(count)]
+    values = SEED[name] * np.logspace(-DECADES, DECADES, count)
+    gaits = jb.gait_sweep(
+        jb.seed_scene(), {name: values}, parameters=tuple(SEED), radius_sensitivities=radius
+    )
+    return [point(name, float(values[i]), gaits.isel({name: i})) for i in range(count)]
 
 
-def gait_at(name: str, value: float, guess: jb.State | None, radius: bool) -> jb.Gait:
-    """The gait with one parameter replaced; all searches share one compiled program."""
-    scene = jb.seed_scene(**{name: value})
-    return jb.find_gait(scene, guess, parameters=tuple(SEED), radius_sensitivities=radius)
-
-
-def point(name: str, value: float, gait: jb.Gait) -> Point:
-    found = gait.outcome is jb.Search.FOUND
-    misfortune = gait.outcome is jb.Search.NO_RETURN
+def point(name: str, value: float, gait: Any) -> Point:
     parameters = np.asarray(list((SEED | {name: value}).values()))
 
-    def number(values: Any) -> Any:
-        return np.where(found, np.asarray(values), np.nan).tolist()
-
     def error(key: str) -> Any:
-        measure = np.abs(getattr(gait.measures, key))
-        return number(getattr(gait.sensitivity_errors, key) * parameters / measure)
+        return gait[f"sensitivity_error_{key}"].data * parameters / abs(float(gait[key]))
 
     return Point(
         value=value,
-        outcome=f"{gait.outcome}: {gait.walk_outcome}" if misfortune else str(gait.outcome),
-        stable=bool(gait.stable),
+        outcome=str(jb.Search(int(gait.ending))),
+        stable=float(gait.spectral_radius) < 1.0,
         residual=float(gait.residual),
-        measures={key: number(getattr(gait.measures, key)) for key in MEASURES},
-        elasticities={key: number(getattr(gait.elasticities, key)) for key in MEASURES},
-        errors={key: error(key) for key in MEASURES},
+        measures={key: float(gait[key]) for key in MEASURES},
+        elasticities={key: gait[f"elasticity_{key}"].data.tolist() for key in MEASURES},
+        errors={key: error(key).tolist() for key in MEASURES},
     )
 
 

@@ -90,6 +90,7 @@ class Walk:
         with stage("measuring the footsteps"):
             steps = footsteps(scene, trajectory)
             ledger = energy_ledger(scene, trajectory)
+        rtol = self.solve.rtol if self.solve.dt is None else None
         numbers: dict[str, Any] = {
             "ending": ending_name(scene, trajectory),
             "slope_rad": float(scene.ground.slope),
@@ -100,14 +101,14 @@ class Walk:
             "gravity_work_J": float(ledger.gravity_work[0]),
             "solver": {
                 "name": self.solve.solver,
-                "rtol": self.solve.rtol,
+                "rtol": rtol,
+                "dt": self.solve.dt,
                 "engine": trajectory.engine,
                 "accepted": int(trajectory.accepted),
                 "rejected": int(trajectory.rejected),
             },
             "wall_s": wall,
         }
-        rtol = self.solve.rtol if self.solve.dt is None else None
         numbers["warnings"] = walk_warnings(scene, numbers, rtol=rtol)
         report = Report(self.output.json)
         if isinstance(scene, RedundantScene):

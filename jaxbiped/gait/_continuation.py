@@ -20,8 +20,8 @@ _LEAST_COSINE = 0.85
 """Of the angle between the tangents at the two ends of a step."""
 _FOLD_STEPS = 3
 """Secant steps towards a fold."""
-_BEYOND_FOLD = 40
-"""Steps for which a branch is followed behind its last fold."""
+_BEYOND_FOLD, _BACK = 24, 0.25
+"""Steps, and distance in s, for which a branch is followed back behind its first fold."""
 
 
 class BranchEnd(enum.IntEnum):
@@ -133,7 +133,8 @@ def follow_branch(
             return _branch(path, sizes, BranchEnd.REACHED)
         if folded:
             since_fold += 1
-            if since_fold > _BEYOND_FOLD or here[-1] < -0.05:
+            back = max(point[-1] for point in path) - here[-1]
+            if since_fold > _BEYOND_FOLD or back > _BACK:
                 return _branch(path, sizes, BranchEnd.FOLD)
         step = min(_LARGEST, step * (1.7 if quick else 1.1))
     else:

@@ -46,8 +46,13 @@ def _branch(scene: Any, gait: Gait) -> str:
     """Where the branch of the seed's gait ended, after a semicolon; nothing where it came here."""
     end = BranchEnd(int(gait.origin.branch_end))
     modelled = scene.scene if isinstance(scene, RedundantScene) else scene
-    if end in (BranchEnd.NOT_FOLLOWED, BranchEnd.REACHED):
+    if end is BranchEnd.NOT_FOLLOWED or (end is BranchEnd.REACHED and gait.outcome is Search.FOUND):
         return ""
+    if end is BranchEnd.REACHED:
+        return (
+            "; the branch of the seed's gait comes to this scene, but a finer search from there "
+            'does not converge: try accuracy="tight"'
+        )
     if end is BranchEnd.NO_BEGINNING:
         return "; the seed's walker has no gait under these laws, from which one could be followed"
     place = _place(modelled, gait.origin.nearest)

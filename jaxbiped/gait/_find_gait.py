@@ -1,5 +1,6 @@
 """The search for the walker's periodic gait."""
 
+import dataclasses
 import functools
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal
@@ -135,6 +136,7 @@ def find_gait(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
         most_turns=int(most),
         residual=_RESIDUAL_SHARE * precision.rtol,
+        patience=np.asarray(int(most)),
     )
     searching = (turning, scene, active, start, precision, how)
     describing = (names, active, radius_sensitivities)
@@ -191,8 +193,9 @@ def _search_on(
         modelled, section, solver, scout_engine, steps=1, most=MOST_SOLVER_STEPS["balanced"]
     )
 
-    def search_from(turning: Turning, scene: Any, start: Any) -> Found:
-        return _searched(turning, scene, active, start, precision, how)
+    def search_from(turning: Turning, scene: Any, start: Any, most_turns: int) -> Found:
+        hasty = dataclasses.replace(how, patience=np.asarray(min(most_turns, how.most_turns)))
+        return _searched(turning, scene, active, start, precision, hasty)
 
     staged = search_in_stages(search_from, turning, scout, scene, modelled, first)
     if staged.best is not None:

@@ -29,13 +29,15 @@ class Method(eqx.Module):
     Attributes:
         optimiser: of the squared residual, by its gradient; None for Newton's method, damped by
             its natural level function.
-        most_turns: turns allowed.
+        most_turns: turns for whose history there is room.
+        patience: turns allowed, at most as many.
         residual: largest change of a recurring component over a turn that counts as none.
     """
 
     optimiser: optax.GradientTransformation | None = eqx.field(static=True)
     most_turns: int = eqx.field(static=True)
     residual: Any
+    patience: Any
 
 
 class Stage(enum.IntEnum):

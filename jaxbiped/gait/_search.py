@@ -112,8 +112,13 @@ def search(
         both=jax.tree.map(lambda *pair: jnp.stack(pair), end.base_turn, end.coarse),
         turns=end.turns,
         history=end.history,
-        sound=is_sound(args, state_with(turning.system, guess, end.base), end.base_turn.advance[0]),
+        sound=_sound(turning, args, guess, end),
     )
+
+
+def _sound(turning: Turning, args: PyTree, guess: PyTree, end: Progress) -> Scalar:
+    state, last = state_with(turning.system, guess, end.base), end.base_turn
+    return is_sound(args, state, last.advance[0], last.period)
 
 
 def _runner(
@@ -144,7 +149,7 @@ def _advanced(run: Run, begin: Progress, method: Method) -> Progress:
     """Searches on until it has ended or the turns are used up."""
 
     def goes_on(now: Progress) -> Scalar:
-        return (now.stage < Stage.FOUND) & (now.turns < method.most_turns)
+        return (now.stage < Stage.FOUND) & (now.turns < method.patience)
 
     def advance(now: Progress) -> Progress:
         on = goes_on(now)

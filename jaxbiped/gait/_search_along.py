@@ -21,9 +21,13 @@ from jaxbiped.gait._turn import Turning, recurring_of, state_with
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._passage import Precision
 
-_FIRST, _LARGEST, _SMALLEST = 0.25, 0.5, 1e-3
+_FIRST, _LARGEST, _SMALLEST = 0.05, 0.3, 1e-3
 """Steps along the line: the first, at most, and at which it is given up."""
-_MOST_SEARCHES = 60
+_FLOOR, _JUMP, _ASIDE = 0.1, 0.2, 0.5
+"""Size below which components count as of one size; how far, relative to it, the first step may
+lead, and others aside from where they pointed, in units of their length: else it is another gait's
+branch that they came to."""
+_MOST_SEARCHES = 80
 
 
 class _Way(NamedTuple):
@@ -35,6 +39,7 @@ class _Way(NamedTuple):
         step: from the last gait that was found on the line.
         known, before: points of the last gait found on the line and of the one before it, with
             their places `at`, shape (2,).
+        ahead: the point that the next search begins from.
         best: the gait to be returned, `radius` its spectral radius, infinite where there is none.
         origin: what will be told.
         searches: how many there were.
@@ -46,6 +51,7 @@ class _Way(NamedTuple):
     known: Scalar
     before: Scalar
     at: Scalar
+    ahead: Scalar
     best: Found
     radius: Scalar
     origin: Origin
@@ -69,12 +75,8 @@ def search_along(
     first = recurring_of(turning.system, seed_start(of_seed))
 
     def run(way: _Way) -> Found:
-        from_start, from_seed = way.s < 0.0, way.s == 0.0
-        share = (way.s - way.at[1]) / jnp.where(way.at[1] > way.at[0], way.at[1] - way.at[0], 1.0)
-        point = way.known + share * (way.known - way.before)
-        point = jnp.where(from_start, fitted, jnp.where(from_seed, first, point))
-        there = line.at(jnp.where(from_start, 1.0, way.s))
-        guess = state_with(turning.system, start, point)
+        there = line.at(jnp.where(way.s < 0.0, 1.0, way.s))
+        guess = state_with(turning.system, start, way.ahead)
         return search(turning, there, active, guess, precision, method, ~way.over)
 
     shape = jax.eval_shape(
@@ -87,6 +89,7 @@ def search_along(
         known=fitted,
         before=fitted,
         at=jnp.zeros(2),
+        ahead=fitted,
         best=nothing,
         radius=jnp.asarray(jnp.inf),
         origin=jax.tree.map(jnp.asarray, origin),
@@ -95,7 +98,7 @@ def search_along(
     )
     end = jax.lax.while_loop(
         lambda way: ~way.over,
-        lambda way: chosen(way.over, way, _after(way, run(way), line)),
+        lambda way: chosen(way.over, way, _after(way, run(way), line, first)),
         begin,
     )
     no_walk = (end.best.ending == int(Search.FOUND)) & ~end.best.sound
@@ -103,10 +106,11 @@ def search_along(
     return end.best._replace(ending=ending), end.origin
 
 
-def _after(way: _Way, latest: Found, line: Homotopy) -> _Way:
-    """One search further."""
+def _after(way: _Way, latest: Found, line: Homotopy, first: Scalar) -> _Way:
+    """One search further; `first` is where that of the seed's gait begins."""
     from_start, from_seed = way.s < 0.0, way.s == 0.0
     found = latest.ending == int(Search.FOUND)
+    found &= from_start | from_seed | _is_ahead(way, latest.recurring)
     radius = jnp.where(found & latest.sound, _radius(latest), jnp.inf)
     at_end = from_start | (way.s == 1.0)
     # What the fitted start gave is kept where nothing better comes, found or not.
@@ -126,6 +130,9 @@ def _after(way: _Way, latest: Found, line: Homotopy) -> _Way:
     end = jnp.where(found, int(BranchEnd.UNFINISHED), end)
     end = jnp.where(found & (way.s == 1.0), int(BranchEnd.REACHED), end)
     followed = over & ~from_start
+    s = jnp.where(from_start, 0.0, jnp.minimum(at[1] + step, 1.0))
+    share = (s - at[1]) / jnp.where(at[1] > at[0], at[1] - at[0], 1.0)
+    ahead = jnp.where(from_start, first, known + share * (known - before))
     origin = way.origin._replace(
         found_by=jnp.where(better & ~from_start, int(FoundBy.CONTINUATION), way.origin.found_by),
         branch_end=jnp.where(followed, end, way.origin.branch_end),
@@ -133,17 +140,28 @@ def _after(way: _Way, latest: Found, line: Homotopy) -> _Way:
         nearest=_nearest(way.origin.nearest, line, at[1], followed & ~from_seed),
     )
     return _Way(
-        s=jnp.where(from_start, 0.0, jnp.minimum(at[1] + step, 1.0)),
+        s=s,
         step=step,
         known=known,
         before=before,
         at=at,
+        ahead=ahead,
         best=chosen(better, latest, way.best),
         radius=jnp.where(better, radius, way.radius),
         origin=origin,
         searches=way.searches + 1,
         over=over,
     )
+
+
+def _is_ahead(way: _Way, point: Scalar) -> Scalar:
+    """Whether a point lies where those before it on the line point to."""
+
+    def distance(a: Scalar, b: Scalar) -> Scalar:
+        return jnp.max(jnp.abs(a - b) / (_FLOOR + jnp.abs(way.known)))
+
+    aside, length = distance(point, way.ahead), distance(point, way.known)
+    return jnp.where(way.at[1] > way.at[0], aside < _ASIDE * length + 0.01, length < _JUMP)
 
 
 def _nearest(kept: Any, line: Homotopy, s: Scalar, wanted: Scalar) -> Any:

@@ -6,25 +6,31 @@ deep underground and be caught there. Stability does not tell them from gaits, s
 
 from typing import Any
 
+import jax.numpy as jnp
+
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 
+_SHORTEST = 0.1
+"""Duration of a cycle in units of √(l/g), about 2 for a footstep: a foot may also chatter."""
 _DEEPEST = 3.0
 """Elastic force of a standing foot, in units of the walker's weight: about 1 where it stands."""
 
 
-def is_sound(scene: Any, state: Any, step_length: Scalar) -> Scalar:
+def is_sound(scene: Any, state: Any, step_length: Scalar, period: Scalar) -> Scalar:
     """Whether an orbit through a state on its section steps downhill and on the ground (boolean).
 
     Args:
         scene: the walker.
         state: on the section, where a foot stands or comes down.
         step_length: advance along the slope in a cycle [m].
+        period: duration of a cycle [s].
     """
-    forward = step_length > 0.0
+    pace = jnp.sqrt(scene.walker.l / scene.ground.g)
+    forward = (step_length > 0.0) & (period > _SHORTEST * pace)
     if isinstance(scene, RigidScene):
         return forward
     modelled = scene.scene if isinstance(scene, RedundantScene) else scene

@@ -27,14 +27,16 @@ _SPREADS = (0.3, 0.8)
 """Largest relative scatter of the starts' angles and rates, of one half and of the other."""
 _PUSHES = (-0.05, -0.01, 0.01, 0.05)
 """Sizes (scaled) of the pushes off an unstable gait from which walks begin as well."""
+_TURNS = 20
+"""Turns that each further search may take."""
 _SCATTERED = 12
 """Starts of the last stage."""
 _SAME = 1e-5
 """Relative difference of period and length up to which two finds are of one gait."""
 
 
-Searching = Callable[[Turning, Any, Any], Found]
-"""Newton's method on the return map of a scene, from a start."""
+Searching = Callable[[Turning, Any, Any, int], Found]
+"""Newton's method on the return map of a scene, from a start, in at most so many turns."""
 
 
 class Seen(NamedTuple):
@@ -100,7 +102,7 @@ def search_in_stages(
 
     def try_all(points: Sequence[np.ndarray] | np.ndarray, by: FoundBy) -> None:
         for point in points:
-            add(search(turning, scene, _state(start, point)), by)
+            add(search(turning, scene, _state(start, point), _TURNS), by)
             if has_stable():
                 return
 
@@ -208,7 +210,7 @@ def _pushed(found: Found, sizes: np.ndarray) -> list[np.ndarray]:
 
 def _followed(search: Searching, scout: Turning, line: Homotopy, like: Any) -> Branch:
     """The branch of gaits from the seed's scene."""
-    first = search(scout, line.first, seed_start(line.first))
+    first = search(scout, line.first, seed_start(line.first), _TURNS)
     point = np.asarray(first.recurring)
     if int(first.ending) != int(Search.FOUND):
         return Branch(point[None], np.zeros(1), BranchEnd.NO_BEGINNING, int(first.code))

@@ -14,13 +14,15 @@ from jaxbiped.scene._law import AbstractNormalLaw
 
 _DEEPEST = 0.25
 """Penetration of a foot that touches, in units of l, from which it starts below the ground."""
+_HIGHEST = 100.0
+"""Energy stored in a foot's contact, in units of m g l, from which it does."""
 
 
 def check_start_height(scene: Any, state: Any) -> None:
     """Refuses a start below the ground, where all values are known.
 
-    The deepest that is allowed is l/4, and so deep that the contact stores what would lift the
-    walker by its leg's length, m g l: contact that stiff must be started from near its surface.
+    The deepest that is allowed is l/4, and so deep that the contact stores what would throw the
+    walker a hundred legs high, 100 m g l: contact so stiff is to be started near its surface.
 
     Raises:
         ArgumentError: a deeper start.
@@ -42,7 +44,7 @@ def check_start_height(scene: Any, state: Any) -> None:
         return
     energies = _stored(scene.clearance, scene.normal, depths, rates)
     stored, depth, leg = max(zip(map(float, energies), depths, (1, 2), strict=True))
-    if stored > 0.0 and (depth > _DEEPEST * walker.l or stored > lift > 0.0):
+    if stored > 0.0 and (depth > _DEEPEST * walker.l or stored > _HIGHEST * lift > 0.0):
         raise ArgumentError(
             f"state.hip_z = {hip_z:g} is not allowed: foot {leg} starts {depth:.3g} m below the "
             f"ground, where its contact stores {stored:.3g} J (m g l is {lift:.3g} J); it just "

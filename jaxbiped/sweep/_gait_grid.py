@@ -15,7 +15,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._origin import FoundBy
 from jaxbiped.gait._search import Search
 from jaxbiped.sweep._same_store import ALSO, SETTINGS, check_same, check_writers
-from jaxbiped.sweep._store import opened, unwritable
+from jaxbiped.sweep._store import consolidate, opened, unwritable
 
 if TYPE_CHECKING:
     import xarray
@@ -123,6 +123,7 @@ def open_gait_grid(
             half = path.with_name(f".{path.name}.unfinished")
             shutil.rmtree(half, ignore_errors=True)
             dataset.to_zarr(half, consolidated=False, zarr_format=3)
+            consolidate(half)
             if path.exists():
                 path.rmdir()
             half.rename(path)
@@ -135,6 +136,7 @@ def _note(path: Path, attributes: dict[str, Any]) -> None:
     import zarr
 
     zarr.open_group(str(path), mode="r+", use_consolidated=False).attrs.update(attributes)
+    consolidate(path)
 
 
 def _empty(gait: Gait, values: Mapping[str, np.ndarray]) -> "xarray.Dataset":
@@ -146,7 +148,7 @@ def _empty(gait: Gait, values: Mapping[str, np.ndarray]) -> "xarray.Dataset":
         whole = value.dtype.kind in "ib"
         empty = np.full((*shape, *value.shape), -1 if whole else np.nan, value.dtype)
         variables[name] = ((*dims, *own), empty, attributes)
-    coordinates: dict[str, Any] = {**values, "parameter": list(gait.parameters)}
+    coordinates: dict[str, Any] = {**values, "parameter": np.array(gait.parameters, object)}
     return xarray.Dataset(variables, coordinates)
 
 

@@ -104,7 +104,8 @@ def gait_sweep(
             for place in order:
                 if not grid.is_done(place, found=again):
                     gait = search(place, again=again) if place != order[0] or again else first
-                    if gait is not None:
+                    # What the first pass found out about a failure is kept.
+                    if gait is not None and (not again or gait.outcome is Search.FOUND):
                         grid.write(place, gait)
                 known[place] = grid.state(place)
                 bar.update(not again)

@@ -135,7 +135,7 @@ class Store:
         """
         try:
             self._group.attrs.update(dict(attributes))
-            _consolidate(self.path)
+            consolidate(self.path)
         except OSError as error:
             raise unwritable(self.path, error) from None
 
@@ -213,7 +213,7 @@ def _create(
             dimension_names=["chunk"],
             attributes=done,
         )
-        _consolidate(half)
+        consolidate(half)
         if path.exists():
             path.rmdir()
         half.rename(path)
@@ -222,7 +222,7 @@ def _create(
         raise
 
 
-def _consolidate(path: Path) -> None:
+def consolidate(path: Path) -> None:
     """Lets `xarray.open_zarr` read all arrays' metadata at once, without a warning."""
     import zarr
 

@@ -61,3 +61,10 @@ def test_a_cap_on_steps_bounds_a_walk_of_any_duration(capsys):
 def test_a_walk_that_ends_ends_whatever_its_duration(capsys):
     numbers = _walked(capsys, "--duration", "1e9", "--slope", "0.06")
     assert numbers["ending"] == "fell forward"
+
+
+def test_steps_of_one_size_that_are_too_long(capsys):
+    numbers = _walked(capsys, "--solver", "euler", "--dt", "1e-3", "--duration", "0.3")
+    assert (numbers["solver"]["dt"], numbers["solver"]["rtol"]) == (1e-3, None)
+    (warning,) = numbers["warnings"]
+    assert "--dt" in warning

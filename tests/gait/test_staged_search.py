@@ -92,7 +92,7 @@ def test_under_vmap_a_branch_is_followed_and_each_lane_says_how():
     assert int(gaits.ending[3]) != int(jb.Search.FOUND)
     ends = [jb.BranchEnd(int(code)) for code in gaits.origin.branch_end]
     reached = jb.BranchEnd.REACHED
-    assert ends == [jb.BranchEnd.NOT_FOLLOWED, reached, reached, jb.BranchEnd.BREAKS_OFF]
+    assert ends == [jb.BranchEnd.NOT_FOLLOWED, reached, reached, jb.BranchEnd.WALK_ENDS]
     assert 0.2 < float(gaits.origin.nearest.ground.slope[3]) < 0.3
 
 
