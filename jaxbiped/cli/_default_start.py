@@ -42,7 +42,7 @@ def default_start(scene: Any) -> State | RigidState:
     if not math.isfinite(fitted):
         return start
     fitted = min(fitted, _DEEPEST * float(scene.walker.l))
-    return start._replace(hip_z=start.hip_z + (depth - fitted))
+    return start._replace(hip_z=standing_height(scene, seed.theta_2, fitted))
 
 
 def _known(*parts: Any) -> Any:

@@ -17,13 +17,15 @@ from jaxbiped.scene._walker import Walker
 
 
 def seed_start(scene: Any) -> Any:
-    """The seed's start, fitted to the scene's legs; a rigid walker's rates also to its gravity."""
+    """The seed's start, fitted to the scene's legs and gravity."""
     seed, own = _seed()
     if isinstance(scene, RigidScene):
         pace = jnp.sqrt(scene.ground.g / scene.walker.l * own.walker.l / own.ground.g)
         rates = dict(omega_1=seed.omega_1 * pace, omega_2=seed.omega_2 * pace)
         return jax.tree.map(as_float, rigid_state(seed)._replace(**rates))
-    depth = standing_height(own, seed.theta_2) - seed.hip_z
+    size = scene.walker.l / own.walker.l
+    pace = jnp.sqrt(scene.ground.g / own.ground.g / size)
+    depth = (standing_height(own, seed.theta_2) - seed.hip_z) * size
 
     def reach(walker: Walker) -> tuple[Scalar, Scalar]:
         return walker.hip_to_foot * jnp.cos(seed.theta_2) + walker.r, walker.hip_to_foot
@@ -31,8 +33,10 @@ def seed_start(scene: Any) -> Any:
     (forward, up), (own_forward, own_up) = reach(scene.walker), reach(own.walker)
     fitted = seed._replace(
         hip_z=standing_height(scene, seed.theta_2, depth),
-        hip_vx=seed.hip_vx * forward / own_forward,
-        hip_vz=seed.hip_vz * up / own_up,
+        hip_vx=seed.hip_vx * forward / own_forward * pace,
+        hip_vz=seed.hip_vz * up / own_up * pace,
+        omega_1=seed.omega_1 * pace,
+        omega_2=seed.omega_2 * pace,
     )
     return jax.tree.map(as_float, fitted)
 
