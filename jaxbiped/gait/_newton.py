@@ -30,14 +30,19 @@ class Method(eqx.Module):
         optimiser: of the squared residual, by its gradient; None for Newton's method, damped by
             its natural level function.
         most_turns: turns for whose history there is room.
-        patience: turns allowed, at most as many.
+        patience: turns allowed, at most as many; None for as many.
         residual: largest change of a recurring component over a turn that counts as none.
     """
 
     optimiser: optax.GradientTransformation | None = eqx.field(static=True)
     most_turns: int = eqx.field(static=True)
     residual: Any
-    patience: Any
+    patience: Any = None
+
+    @property
+    def turns_allowed(self) -> Any:
+        """How many turns a search may take."""
+        return self.most_turns if self.patience is None else self.patience
 
 
 class Stage(enum.IntEnum):

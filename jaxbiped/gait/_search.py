@@ -149,7 +149,7 @@ def _advanced(run: Run, begin: Progress, method: Method) -> Progress:
     """Searches on until it has ended or the turns are used up."""
 
     def goes_on(now: Progress) -> Scalar:
-        return (now.stage < Stage.FOUND) & (now.turns < method.patience)
+        return (now.stage < Stage.FOUND) & (now.turns < method.turns_allowed)
 
     def advance(now: Progress) -> Progress:
         on = goes_on(now)

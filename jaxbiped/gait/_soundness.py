@@ -13,6 +13,7 @@ from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
 
 _SHORTEST = 0.1
 """Duration of a cycle in units of √(l/g), about 2 for a footstep: a foot may also chatter."""
@@ -24,11 +25,13 @@ def is_sound(scene: Any, state: Any, step_length: Scalar, period: Scalar) -> Sca
     """Whether an orbit through a state on its section steps downhill and on the ground (boolean).
 
     Args:
-        scene: the walker.
+        scene: the walker; what is none has nothing to be held to.
         state: on the section, where a foot stands or comes down.
         step_length: advance along the slope in a cycle [m].
         period: duration of a cycle [s].
     """
+    if not isinstance(scene, Scene | RigidScene | RedundantScene):
+        return jnp.asarray(True)
     pace = jnp.sqrt(scene.walker.l / scene.ground.g)
     forward = (step_length > 0.0) & (period > _SHORTEST * pace)
     if isinstance(scene, RigidScene):
