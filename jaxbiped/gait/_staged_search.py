@@ -160,7 +160,8 @@ def origin_of(staged: Staged, scene: Scene | RigidScene, start: Any) -> Origin:
 
 def spectral_radius(found: Found) -> float:
     """Largest absolute value of a Floquet multiplier: on the section the trivial one is zero."""
-    jacobian = np.asarray(found.last.jacobian)[:, : found.recurring.shape[0]]
+    # Not by `last`, which would take every leaf apart.
+    jacobian = np.asarray(found.both.jacobian)[0, :, : found.recurring.shape[0]]
     if not np.all(np.isfinite(jacobian)):
         return float("inf")
     return float(np.max(np.abs(np.linalg.eigvals(jacobian))))

@@ -58,7 +58,7 @@ def test_json_keys(numbers):
         "ending", "period_s", "step_length_m", "speed_m_s", "peak_normal_N", "state", "residual",
         "multipliers", "multiplier_errors", "unit_multiplier_error", "spectral_radius", "stable",
         "bifurcation", "sensitivities", "sensitivity_errors", "elasticities", "walk_ending",
-        "solver_steps", "engine", "wall_s",
+        "solver_steps", "engine", "wall_s", "search", "found_by", "others", "branch_end",
     }  # fmt: skip
     states = {f"state.{name}" for name in numbers["state"]}
     assert len(states) == 8
@@ -75,6 +75,11 @@ def test_the_seed_walker_s_gait(numbers):
     assert numbers["speed_m_s"] == pytest.approx(0.1792270 / 0.4408349, abs=1e-5)
     assert numbers["stable"] is True
     assert numbers["bifurcation"] == "none"
+    assert (numbers["found_by"], numbers["others"], numbers["branch_end"]) == (
+        "start",
+        [],
+        "not followed",
+    )
     assert numbers["unit_multiplier_error"] < 1e-4
     assert numbers["residual"] < 1e-6
 

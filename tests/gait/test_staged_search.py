@@ -122,3 +122,13 @@ def test_a_search_that_may_take_few_cycles_stays_at_its_start():
     gait = jb.find_gait(jb.seed_scene(slope=0.03), most_turns=3, **PLAIN)
     assert gait.outcome is jb.Search.NOT_CONVERGED
     assert gait.found_by is jb.FoundBy.START
+
+
+def test_a_scene_with_bristles_is_searched_in_stages_too():
+    """LuGre's bristles on the slope where Newton's method alone comes to an unstable gait."""
+    like = jb.friction_law_like("lugre", mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1e3)
+    scene = eqx.tree_at(lambda s: s.friction, jb.seed_scene(slope=0.03), like)
+    gait = jb.find_gait(scene, **PLAIN)
+    assert bool(gait.stable)
+    assert float(gait.measures.period) == pytest.approx(0.4464, abs=1e-3)
+    assert gait.measures.state._fields[-1] == "bristle_2"
