@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._bristles import BristleState, state_type
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import rigid_state
 from jaxbiped.dynamics._state import State, seed_state
@@ -17,7 +18,7 @@ from jaxbiped.scene._walker import Walker
 
 
 def seed_start(scene: Any) -> Any:
-    """The seed's start, fitted to the scene's legs and gravity."""
+    """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight."""
     seed, own = _seed()
     if isinstance(scene, RigidScene):
         pace = jnp.sqrt(scene.ground.g / scene.walker.l * own.walker.l / own.ground.g)
@@ -38,7 +39,11 @@ def seed_start(scene: Any) -> Any:
         omega_1=seed.omega_1 * pace,
         omega_2=seed.omega_2 * pace,
     )
-    return jax.tree.map(as_float, fitted)
+    start: State = jax.tree.map(as_float, fitted)
+    if state_type(scene) is BristleState:
+        straight = jnp.zeros_like(start.hip_x)
+        return BristleState(**start._asdict(), bristle_1=straight, bristle_2=straight)
+    return start
 
 
 @functools.cache
