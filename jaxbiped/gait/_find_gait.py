@@ -184,10 +184,10 @@ def _search_on(
 ) -> tuple[Found, Origin]:
     """The stages of a search beyond the first."""
     turning, scene, active, start, precision, how = searching
-    solver, section = orbit_solver(None, rigid=isinstance(modelled, RigidScene)), None
+    solver = orbit_solver(None, rigid=isinstance(modelled, RigidScene))
+    section = checked_section(modelled, None)
     if isinstance(scene, RedundantScene):
         engine = "auto"
-    section = checked_section(modelled, None)
     scout_engine = orbit_engine(engine, solver=solver, section=section, leaves=(modelled, start))
     scout = _turning(
         modelled, section, solver, scout_engine, steps=1, most=MOST_SOLVER_STEPS["balanced"]
