@@ -12,12 +12,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from jaxbiped._checks import ArgumentError, check_finite
+from jaxbiped.basins._arguments import check_known
+from jaxbiped.basins._fractions import fractions as fractions_of
+from jaxbiped.basins._label import Label, label_names
 from jaxbiped.plot._label_colours import GAIT_SUFFIX, in_order, label_colour
 from jaxbiped.plot._style import axes_or_new, figure_of
 from jaxbiped.plot._symbols import axis_label
-from jaxbiped.sweep._arguments import check_known
-from jaxbiped.sweep._fractions import basin_fractions
-from jaxbiped.sweep._label import Label, label_names
 
 _HATCH = "////"
 """Over what is pending, so that it reads as missing in print without colour too."""
@@ -188,7 +188,7 @@ def finish(
 
 def _patches(words: np.ndarray) -> list[Patch]:
     """Entries of the legend: labels that occur, with their parts of what is labelled."""
-    fractions = basin_fractions(words)
+    fractions = fractions_of(words)
     patches = []
     for name in in_order(set(words.ravel().tolist())):
         if name == str(Label.PENDING):
