@@ -9,12 +9,16 @@ from jaxbiped.constraints._constraint_method import (
     AbstractProjectingMethod,
     Constrained,
     Row,
+    applied_impulse,
     gram,
     inverse_masses,
-    moved_by,
 )
-from jaxbiped.constraints._penalised import augmented_multipliers, check_augmented, repeated
-from jaxbiped.linalg._symmetric import factorised
+from jaxbiped.constraints._penalised import (
+    augmented_multipliers,
+    check_augmented,
+    iterate_multipliers,
+)
+from jaxbiped.linalg._symmetric import factorise
 
 
 class Index1Augmented(AbstractProjectingMethod):
@@ -49,6 +53,6 @@ class Index1Augmented(AbstractProjectingMethod):
 
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
         weights = inverse_masses(masses)
-        factors = factorised(gram(rows, weights, 1.0 / self.A))
-        found = repeated(factors, gram(rows, weights), residual, self.iterations)
-        return moved_by(rows, weights, found)
+        factors = factorise(gram(rows, weights, 1.0 / self.A))
+        found = iterate_multipliers(factors, gram(rows, weights), residual, self.iterations)
+        return applied_impulse(rows, weights, found)

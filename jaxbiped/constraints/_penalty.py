@@ -7,7 +7,7 @@ import equinox as eqx
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
 from jaxbiped.constraints._penalised import check_penalty, penalty_system
-from jaxbiped.linalg._symmetric import solved
+from jaxbiped.linalg._symmetric import solve
 
 
 class Penalty(AbstractConstraintMethod):
@@ -40,4 +40,4 @@ class Penalty(AbstractConstraintMethod):
         check_penalty(self.A, self.omega, self.zeta)
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
-        return solved(*penalty_system(system, self.A, self.omega, self.zeta))
+        return solve(*penalty_system(system, self.A, self.omega, self.zeta))
