@@ -30,17 +30,17 @@ PARAMETER_FLOOR = 1e-4
 
 
 class ReturnMapSpec(eqx.Module):
-    """How to turn: what does not change from one turn of the search to the next.
+    """What does not change from one evaluation of the return map to the next.
 
     Attributes:
         system, section: whose return map.
         solver: one-step solver.
-        steps: arrivals that make one turn.
+        steps: arrivals that make one cycle.
         time_limit: longest time to the next arrival [s].
         max_solver_steps: cap on the attempted steps to the next arrival.
         engine: "xla" or "lanes".
         within: the system that is solved, where its coordinates are redundant: every passage
-            enters them and leaves them again, so that a turn knows nothing of constraints.
+            enters them and leaves them again, so that a cycle knows nothing of constraints.
     """
 
     system: AbstractSystem
@@ -84,15 +84,15 @@ class _Arrival(eqx.Module):
 
 
 class LinearisedReturn(NamedTuple):
-    """One turn. With m recurring components, p parameters and n = m + p directions:
+    """One return. With m recurring components, p parameters and n = m + p directions:
 
     Attributes:
         recurring: the m components that must return.
         jacobian: their derivatives on the section, shape (m, n).
         monodromy: their derivatives at a fixed time, shape (m, n).
-        velocity: their rates where the turn ends, shape (m,).
+        velocity: their rates where the cycle ends, shape (m,).
         period: duration [s]; `period_row` its derivatives, shape (n,).
-        advance: what the drifting components gained, shape (d,); `advance_rows` (d, n).
+        advance: what the cyclic coordinates gained, shape (d,); `advance_rows` (d, n).
         peak: largest load; `peak_row` (n,). Zeros where the system has none.
         code: 0 or that of an `Ending`.
         attempted: solver steps attempted.
@@ -161,7 +161,7 @@ def linearised_return(
     *,
     steered: Any = True,
 ) -> LinearisedReturn:
-    """Follows the orbit from `y` for one turn, with derivatives; nothing where `idle`.
+    """Follows the orbit from `y` for one cycle, with derivatives; nothing where `idle`.
 
     Where not `steered`, derivatives by parameters choose no steps, and lanes do without them.
     """
@@ -199,7 +199,7 @@ def linearised_return(
 
 
 def _watch_for(spec: ReturnMapSpec, args: PyTree, y: PyTree) -> Watch:
-    """What the passages of a turn land on."""
+    """What the passages of a cycle land on."""
     if spec.within is None:
         return spec.watch(args, y)
     inside = eqx.filter_eval_shape(redundant_state, args, y)
@@ -215,7 +215,7 @@ def _entry_coordinates(spec: ReturnMapSpec, y: Tangents, args: Seeded) -> Tangen
 
 
 def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) -> SectionArrival:
-    """A passage told in the turn's own coordinates."""
+    """A passage told in its own coordinates."""
     if spec.within is None:
         return found
     state, columns = along_columns(lambda s, a: minimal_state(a, s), found.y, args)
