@@ -30,8 +30,8 @@ from jaxbiped.gait._fixed_point_search import Found, Search, search
 from jaxbiped.gait._gait import Gait, summarise_gait
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._origin import FoundBy, Origin, single_stage_origin
-from jaxbiped.gait._poincare_map import ReturnMapSpec
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius

@@ -19,12 +19,12 @@ from jaxbiped.gait._newton import (
 )
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
-    ReturnMapSpec,
     linearised_return,
     recurring_components,
     seed_directions,
     state_with,
 )
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._soundness import is_sound
 from jaxbiped.variational._solve_to_section import Precision
 

@@ -9,7 +9,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._fixed_point_search import Found
-from jaxbiped.gait._poincare_map import LinearisedReturn, ReturnMapSpec, seed_directions, state_with
+from jaxbiped.gait._poincare_map import LinearisedReturn, seed_directions, state_with
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.gait._stability import Stability, stability_of
 from jaxbiped.linalg._small_matrices import eigenpairs, invert, solve

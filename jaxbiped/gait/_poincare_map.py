@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
-from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._units import recurring_inverse_units
 from jaxbiped.variational._hybrid_system import AbstractSystem
 from jaxbiped.variational._section_by_lanes import solve_to_section_by_lanes
@@ -27,60 +27,6 @@ STATE_FLOOR = 0.1
 """Size below which errors of derivatives by the state are absolute, in the scene's units."""
 PARAMETER_FLOOR = 1e-4
 """The same by the logarithm of a parameter: small sensitivities are wanted to digits as well."""
-
-
-class ReturnMapSpec(eqx.Module):
-    """What does not change from one evaluation of the return map to the next.
-
-    Attributes:
-        system, section: whose return map.
-        solver: one-step solver.
-        steps: arrivals that make one cycle.
-        time_limit: longest time to the next arrival [s].
-        max_solver_steps: cap on the attempted steps to the next arrival.
-        engine: "xla" or "lanes".
-        within: the system that is solved, where its coordinates are redundant: every passage
-            enters them and leaves them again, so that a cycle knows nothing of constraints.
-    """
-
-    system: AbstractSystem
-    section: AbstractSection
-    solver: Any
-    time_limit: Any
-    steps: int = eqx.field(static=True)
-    max_solver_steps: int = eqx.field(static=True)
-    engine: str = eqx.field(static=True)
-    within: AbstractSystem | None = None
-
-    def watch(
-        self,
-        args: PyTree,
-        y: PyTree,
-        *,
-        peak: bool = True,
-        of: AbstractSystem | None = None,
-    ) -> Watch:
-        """What the solves land on: a section is looked at after the arrival's renewal."""
-        system = self.system if of is None else of
-        loaded = eqx.filter_eval_shape(system.load, args, y) is not None
-        return Watch(
-            field=system.vector_field,
-            switches=system.switches,
-            section=_Arrival(system, self.section),
-            ending=system.ending,
-            peak=system.load if peak and loaded else None,
-        )
-
-
-class _Arrival(eqx.Module):
-    """The section's value and whether a crossing counts, looked at after the renewal."""
-
-    system: AbstractSystem
-    section: AbstractSection
-
-    def __call__(self, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
-        renewed = minimal_state(args, self.system.reset_map(args, y))
-        return self.section.value(args, renewed), self.section.counts(args, renewed)
 
 
 class LinearisedReturn(NamedTuple):

@@ -6,7 +6,8 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._poincare_map import LinearisedReturn, ReturnMapSpec, recurring_indices
+from jaxbiped.gait._poincare_map import LinearisedReturn, recurring_indices
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.variational._adjoint_solve import carry_tangents, pull_back
 from jaxbiped.variational._adjoint_step import Adjoints
 from jaxbiped.variational._curvature import jet_along_path

@@ -23,11 +23,11 @@ from jaxbiped.gait._origin import (
     single_stage_origin,
 )
 from jaxbiped.gait._poincare_map import (
-    ReturnMapSpec,
     linearised_return,
     seed_directions,
     state_with,
 )
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._rolling_starts import rolling_starts
 from jaxbiped.gait._settled_walks import component_sizes, settle_walks
 from jaxbiped.scene._rigid_scene import RigidScene
