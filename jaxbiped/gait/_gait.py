@@ -9,13 +9,13 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Recording
 from jaxbiped.gait._fixed_point_search import Found, Search
 from jaxbiped.gait._orbit import Orbit, orbit_of
 from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
-from jaxbiped.gait._poincare_map import LinearisedReturn, 
+from jaxbiped.gait._poincare_map import LinearisedReturn
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.solve._ending import Ending
 
