@@ -36,11 +36,11 @@ class Slopes(NamedTuple):
 
 
 class Orbit(NamedTuple):
-    """A periodic orbit of a system with m recurring components and d drifting ones.
+    """A periodic orbit of a system with m recurring components and d cyclic ones.
 
     Attributes:
         found: how the search went, and the last return.
-        state: the state on the section, its drifting components zero.
+        state: the state on the section, its cyclic components zero.
         stability: its Floquet multipliers.
         slopes: its derivatives by the parameters; `slope_errors` their estimated errors.
         radius_slopes: derivatives of the spectral radius, shape (p,); NaN where not asked for.

@@ -75,7 +75,7 @@ def recurring_components(system: AbstractSystem, y: PyTree) -> Scalar:
 
 
 def state_with(system: AbstractSystem, like: PyTree, recurring: Scalar) -> PyTree:
-    """A state with these recurring components, and zero for the drifting ones."""
+    """A state with these recurring components, and zero for the cyclic ones."""
     leaves, structure = jtu.tree_flatten(like)
     places = recurring_indices(system, like)
     zero = jnp.zeros_like(recurring[0])

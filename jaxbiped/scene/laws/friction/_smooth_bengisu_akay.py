@@ -19,7 +19,7 @@ class SmoothBengisuAkay(AbstractFrictionLaw):
     - |u| ≥ 1: F = F_C + (F_S − F_C) exp(−xi R(s − v0)), R a C² ramp from zero that equals its
       argument from v0 on.
 
-    From 2 v0 on it is the original. README, "Smooth laws", tells how much it changes the gait.
+    From 2 v0 on it is the original. `docs/laws.md` tells how much it changes the gait.
 
     Attributes (leaves of any batch shape):
         mu_static: static coefficient, reached at v0 [–].

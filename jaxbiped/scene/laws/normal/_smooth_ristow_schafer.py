@@ -22,7 +22,7 @@ class SmoothRistowSchafer(AbstractNormalLaw):
 
     Penetration passes through a C² ramp of width `depth_width` and the force through one of
     width `force_width`; above both widths the law is the original, and it is exactly zero out of
-    contact. README, "Smooth laws", tells how much that changes the gait.
+    contact. `docs/laws.md` tells how much that changes the gait.
 
     Attributes (leaves of any batch shape):
         K: contact stiffness [N/mⁿ].
