@@ -1,8 +1,6 @@
 """`jaxbiped models`: what can be modelled, and what it costs."""
 
 import dataclasses
-import inspect
-import re
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +17,7 @@ from jaxbiped.scene._catalogue import (
     normal_law_like,
 )
 from jaxbiped.scene._ladder import ladder
+from jaxbiped.scene._parameter import parameter_infos
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
@@ -61,14 +60,13 @@ class Models:
 
 def _law(name: str, scene: Scene, law: Any) -> dict[str, Any]:
     """A law that stands in the seed's scene, with the value of each parameter there."""
-    units = _units(type(law))
     return {
         "name": name,
         "class": type(law).__name__,
         "parameters": {
-            field.name: {"value": float(getattr(law, field.name)), "unit": units[field.name]}
-            for field in dataclasses.fields(law)
-            if getattr(law, field.name) is not None
+            name: {"value": float(getattr(law, name)), "unit": info.quantity.unit_in_text}
+            for name, info in parameter_infos(law).items()
+            if getattr(law, name) is not None
         },
         "operations": sum(operation_counts(scene).values()),
     }
@@ -81,13 +79,6 @@ def _rung(name: str, scene: Scene | RigidScene) -> dict[str, Any]:
         "states": len(kind._fields),
         "operations": sum(operation_counts(scene).values()),
     }
-
-
-def _units(law: type) -> dict[str, str]:
-    """Units of a law's parameters, from its docstring."""
-    text = inspect.getdoc(law) or ""
-    found = re.findall(r"^    (\w+): (?:[^\[]|\n)*?\[([^\]]+)\]", text, flags=re.MULTILINE)
-    return dict(found)
 
 
 def _print(report: Report, numbers: dict[str, Any]) -> None:

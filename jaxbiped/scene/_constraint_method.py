@@ -7,6 +7,7 @@ import equinox as eqx
 
 from jaxbiped._symmetric import factorised, solved
 from jaxbiped._types import Scalar
+from jaxbiped.scene._parameter import check_parameters
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
@@ -45,6 +46,9 @@ class AbstractConstraintMethod(eqx.Module):
     """
 
     needs_independent: AbstractClassVar[bool]
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
 
     @abc.abstractmethod
     def multipliers(self, system: Constrained) -> list[Scalar]:

@@ -2,10 +2,8 @@
 
 from typing import Self
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene._law import (
     AbstractNormalLaw,
@@ -14,6 +12,7 @@ from jaxbiped.scene._law import (
     hertz_force,
     pushing,
 )
+from jaxbiped.scene._parameter import parameter
 from jaxbiped.scene._weight import matched_to_weight
 
 
@@ -34,12 +33,8 @@ class KuwabaraKono(AbstractNormalLaw):
         ArgumentError: K not above 0 or gamma below 0.
     """
 
-    K: Parameter = eqx.field(converter=as_float)
-    gamma: Parameter = eqx.field(converter=as_float)
-
-    def __check_init__(self) -> None:
-        check_positive("K", self.K, "N/m^1.5")
-        check_not_negative("gamma", self.gamma, "N s/m^1.5")
+    K: Parameter = parameter("contact stiffness", "$K$", "N/m^1.5", positive=True)
+    gamma: Parameter = parameter("contact damping", r"$\gamma$", "N s/m^1.5", minimum=0.0)
 
     @classmethod
     def from_weight(

@@ -7,6 +7,8 @@ from typing import Any, TypeVar
 import jax.tree_util as jtu
 
 from jaxbiped._checks import check_choice
+from jaxbiped._quantity import Quantity
+from jaxbiped.scene._parameter import parameter_infos
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -34,6 +36,29 @@ def parameter_values(scene: Scene | RigidScene) -> dict[str, Any]:
     """A scene's parameters by name (see `parameter_names`), their own leaves."""
     by_leaf = dict(zip(_names_by_leaf(scene), jtu.tree_leaves(scene), strict=True))
     return {name: by_leaf[name] for name in parameter_names(scene)}
+
+
+def parameter_quantities(scene: Scene | RigidScene | RedundantScene) -> dict[str, Quantity]:
+    """What each of a scene's parameters is, with its unit, by name (see `parameter_names`).
+
+    Of a law's field that is no `jaxbiped.parameter` no more is known than its name.
+    """
+    if isinstance(scene, RedundantScene):
+        return parameter_quantities(scene.scene)
+    paths = [path for path, _ in jtu.tree_flatten_with_path(scene)[0]]
+    by_leaf = dict(zip(_names_by_leaf(scene), paths, strict=True))
+    return {name: _quantity(scene, name, by_leaf[name]) for name in parameter_names(scene)}
+
+
+def _quantity(part: Any, name: str, path: tuple[Any, ...]) -> Quantity:
+    for key in path:
+        if not dataclasses.is_dataclass(part):
+            break  # an entry of a user's own list, or of a dictionary
+        infos = parameter_infos(part)
+        if key.name in infos:
+            return infos[key.name].quantity
+        part = getattr(part, key.name)
+    return Quantity(name)
 
 
 def chosen_parameters(

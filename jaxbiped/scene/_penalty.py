@@ -2,12 +2,11 @@
 
 from typing import ClassVar
 
-import equinox as eqx
-
 from jaxbiped._symmetric import solved
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene._constraint_method import AbstractConstraintMethod, Constrained
-from jaxbiped.scene._penalised import check_penalty, penalty_system
+from jaxbiped.scene._parameter import parameter
+from jaxbiped.scene._penalised import penalty_system
 
 
 class Penalty(AbstractConstraintMethod):
@@ -31,13 +30,12 @@ class Penalty(AbstractConstraintMethod):
         ArgumentError: A not above 0, or ω or ζ below 0.
     """
 
-    A: Parameter = eqx.field(converter=as_float, default=1e10)
-    omega: Parameter = eqx.field(converter=as_float, default=10.0)
-    zeta: Parameter = eqx.field(converter=as_float, default=1.0)
+    A: Parameter = parameter("penalty", "$A$", "kg", positive=True, default=1e10)
+    omega: Parameter = parameter(
+        "constraint frequency", r"$\omega$", "1/s", minimum=0.0, default=10.0
+    )
+    zeta: Parameter = parameter("constraint damping ratio", r"$\zeta$", minimum=0.0, default=1.0)
     needs_independent: ClassVar[bool] = False
-
-    def __check_init__(self) -> None:
-        check_penalty(self.A, self.omega, self.zeta)
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
         return solved(*penalty_system(system, self.A, self.omega, self.zeta))
