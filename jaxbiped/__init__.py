@@ -13,6 +13,7 @@ import jax as _jax
 _jax.config.update("jax_enable_x64", True)
 
 from jaxbiped._checks import ArgumentError as ArgumentError
+from jaxbiped._quantity import Quantity as Quantity
 from jaxbiped.dynamics._bristles import BristleState as BristleState
 from jaxbiped.dynamics._energy import Energies as Energies
 from jaxbiped.dynamics._energy import Powers as Powers
@@ -57,7 +58,9 @@ from jaxbiped.gait._gradient import Implicit as Implicit
 from jaxbiped.gait._gradient import Reverse as Reverse
 from jaxbiped.gait._ledger import EnergyLedger as EnergyLedger
 from jaxbiped.gait._ledger import energy_ledger as energy_ledger
+from jaxbiped.scene._parameter import parameter as parameter
 from jaxbiped.scene._parameters import parameter_names as parameter_names
+from jaxbiped.scene._parameters import parameter_quantities as parameter_quantities
 from jaxbiped.scene._parameters import parameter_values as parameter_values
 from jaxbiped.scene._parameters import with_parameters as with_parameters
 from jaxbiped.gait._return_map import Return as Return
@@ -142,6 +145,7 @@ from jaxbiped.sweep._attractor import Attractor as Attractor
 from jaxbiped.sweep._cluster import cluster_executor as cluster_executor
 from jaxbiped.sweep._cluster import local_executor as local_executor
 from jaxbiped.sweep._coordinates import coordinate_names as coordinate_names
+from jaxbiped.sweep._coordinates import coordinate_quantities as coordinate_quantities
 from jaxbiped.sweep._dimension import Dimension as Dimension
 from jaxbiped.sweep._dimension import boundary_dimension as boundary_dimension
 from jaxbiped.sweep._entropy import BasinEntropy as BasinEntropy

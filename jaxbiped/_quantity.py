@@ -6,7 +6,8 @@ The one place that knows how a unit is written: in files, in text and in figures
 import re
 from typing import NamedTuple
 
-_SUPERSCRIPTS = str.maketrans("0123456789n", "⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ")
+_EXPONENT = re.compile(r"\^([\w.]+)")
+_SUPERSCRIPTS = dict(zip("0123456789n", "⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True))
 
 
 class Quantity(NamedTuple):
@@ -25,13 +26,12 @@ class Quantity(NamedTuple):
     @property
     def unit_in_text(self) -> str:
         """The unit as tables print it, "N·s/m²"; "–" for a pure number."""
-        return re.sub(r"\^(\w)(?![\w.])", _superscript, self.unit).replace(" ", "·") or "–"
+        return _EXPONENT.sub(_in_text, self.unit).replace(" ", "·") or "–"
 
     @property
     def unit_in_figure(self) -> str:
         """The unit as figures show it, "N s/m²"; "–" for a pure number."""
-        digits = re.sub(r"\^(\d)(?![\w.])", _superscript, self.unit)
-        return re.sub(r"\^([\w.]+)", r"$^{\1}$", digits) or "–"
+        return _EXPONENT.sub(_in_figure, self.unit) or "–"
 
     def in_row(self) -> str:
         """Words and symbol."""
@@ -42,5 +42,12 @@ class Quantity(NamedTuple):
         return f"{self.in_row()} ({self.unit_in_figure if unit is None else unit})"
 
 
-def _superscript(found: re.Match[str]) -> str:
-    return found[1].translate(_SUPERSCRIPTS)
+def _in_text(found: re.Match[str]) -> str:
+    return _SUPERSCRIPTS.get(found[1], found[0])
+
+
+def _in_figure(found: re.Match[str]) -> str:
+    exponent = found[1]
+    if exponent.isdigit() and exponent in _SUPERSCRIPTS:
+        return _SUPERSCRIPTS[exponent]
+    return f"$^{exponent}$" if len(exponent) == 1 else f"$^{{{exponent}}}$"

@@ -22,7 +22,7 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._cluster import cluster_executor, local_executor
-from jaxbiped.sweep._coordinates import COORDINATES
+from jaxbiped.sweep._coordinates import COORDINATES, coordinate_quantities
 from jaxbiped.sweep._fractions import basin_fractions
 from jaxbiped.sweep._given_starts import GivenStarts
 from jaxbiped.sweep._label import label_names
@@ -208,11 +208,12 @@ def _written(
         from jaxbiped import plot
 
         y, x = names
+        quantities = coordinate_quantities(known.scene)
         figure = plot.basin(
             found.label.values,
             found[x].values,
             found[y].values,
-            names=(x, y),
+            names=(quantities[x], quantities[y]),
             period=found.period.values,
             mark=_mark(known, x, y),
         )

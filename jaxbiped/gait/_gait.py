@@ -9,6 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
 from jaxbiped.gait._orbit import Orbit, orbit_of
 from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
@@ -16,6 +17,7 @@ from jaxbiped.gait._search import Found, Search
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.gait._turn import Turn, Turning
 from jaxbiped.lanes._call import Recording
+from jaxbiped.scene._parameters import parameter_quantities
 from jaxbiped.solve._ending import Ending
 
 _NOTHING = 1e-9
@@ -79,6 +81,7 @@ class Gait(eqx.Module):
         orbit: times [s] and states at the ends of the last cycle's solver steps, NaN beyond.
         parameters: names of the p parameters.
         engine: what computed it, "xla" or "lanes".
+        quantities: what the parameters are, with their units; () where that is not known.
     """
 
     ending: Scalar
@@ -103,6 +106,7 @@ class Gait(eqx.Module):
     orbit: tuple[Scalar, Any]
     parameters: tuple[str, ...] = eqx.field(static=True)
     engine: str = eqx.field(static=True)
+    quantities: tuple[Quantity, ...] = eqx.field(static=True, default=())
 
     @property
     def outcome(self) -> Search:
@@ -198,6 +202,7 @@ def described(
         orbit=_path(last, start),
         parameters=names,
         engine=turning.engine,
+        quantities=tuple(map(parameter_quantities(scene).__getitem__, names)),
     )
 
 

@@ -71,8 +71,8 @@ def parameter(
     Args:
         words: what it is, as "contact stiffness": for tables and figures.
         symbol: as mathematics that matplotlib sets, as "$K$".
-        unit: SI unit, as "N s/m^2"; the exponent may be a parameter's name, "N/m^n". None for a
-            pure number.
+        unit: SI unit, as "N s/m^2"; the exponent may be a parameter's name, "N/m^n"; empty
+            for a pure number.
         positive: whether it must be above 0.
         minimum: the smallest value allowed, any unless given.
         size_below: what its absolute value must be below.

@@ -14,7 +14,12 @@ from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search import Search
-from jaxbiped.scene._parameters import parameter_names, parameter_values, with_parameters
+from jaxbiped.scene._parameters import (
+    parameter_names,
+    parameter_quantities,
+    parameter_values,
+    with_parameters,
+)
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -98,7 +103,10 @@ def gait_sweep(
     first = search(order[0], again=False)
     assert first is not None
     path = None if store is None else Path(store)
-    grid = open_gait_grid(first, values, settings, provenance(scene), path, any_version=any_version)
+    units = {name: parameter_quantities(scene)[name].unit for name in values}
+    grid = open_gait_grid(
+        first, values, units, settings, provenance(scene), path, any_version=any_version
+    )
     with tqdm(total=math.prod(shape), unit="gaits", disable=not progress) as bar:
         for again in (False, True):
             for place in order:

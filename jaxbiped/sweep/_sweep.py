@@ -11,6 +11,7 @@ from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped.sweep._arguments import check_whole
+from jaxbiped.sweep._coordinates import coordinate_quantities
 from jaxbiped.sweep._label import Label
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._layout import FIELDS, Layout, fields_of
@@ -82,7 +83,9 @@ def sweep(
     if store is not None:
         check_store(Path(store))
     began = time.perf_counter()
-    layout = Layout.of(starts, int(chunk))
+    quantities = coordinate_quantities(labelling.scene)
+    units = {name: quantity.unit for name, quantity in quantities.items()}
+    layout = Layout.of(starts, int(chunk), units)
     own = {"starts": starts.described(), "chunk_shape": list(layout.chunk_shape)}
     writer = provenance(labelling.scene, labelling.effort.solver, starts)
     if store is not None:
