@@ -15,10 +15,10 @@ from _options import Options, parse
 
 import jaxbiped as jb
 from jaxbiped.gait._orbit import slopes_of
+from jaxbiped.gait._poincare_map import Turn, Turning, recurring_of, seeded, state_with, turn
 from jaxbiped.gait._stability import stability_of
-from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with, turn
 from jaxbiped.scene._parameters import chosen_parameters
-from jaxbiped.solve._passage import Precision
+from jaxbiped.variational._solve_to_section import Precision
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 QUICK_TOLERANCES = (1e-5, 1e-6)
@@ -56,35 +56,35 @@ class Stepping(NamedTuple):
     lands: Any
 
 
-class Stepped(jb.AbstractSystem):
+class Stepped(jb.gait.AbstractSystem):
     """The walker, its switches hidden from the solver or not."""
 
-    drifting = jb.Walking.drifting
+    drifting = jb.gait.Walking.drifting
 
     def vector_field(self, t: Any, y: jb.State, args: Stepping) -> jb.State:
         """The walker's."""
-        return jb.vector_field(t, y, args.scene)
+        return jb.dynamics.vector_field(t, y, args.scene)
 
-    def switches(self, args: Stepping, y: jb.State) -> tuple[jb.Switch, ...]:
+    def switches(self, args: Stepping, y: jb.State) -> tuple[jb.dynamics.Switch, ...]:
         """The walker's; where steps do not land, none is live."""
         lands = args.lands > 0.0
-        found = jb.switches(args.scene, y)
+        found = jb.dynamics.switches(args.scene, y)
         return tuple(each._replace(live=each.live & lands) for each in found)
 
     def ending(self, args: Stepping, y: jb.State) -> Any:
         """The walker's."""
-        return jb.Walking().ending(args.scene, y)
+        return jb.gait.Walking().ending(args.scene, y)
 
     def renew(self, args: Stepping, y: jb.State) -> jb.State:
         """Legs exchanged."""
-        return jb.exchange_legs(y)
+        return jb.dynamics.exchange_legs(y)
 
     def load(self, args: Stepping, y: jb.State) -> None:
         """No largest load: no step is spent on it."""
         return None
 
 
-class Stance(jb.AbstractSection):
+class Stance(jb.dynamics.AbstractSection):
     """Mid-stance."""
 
     def value(self, args: Stepping, y: jb.State) -> Any:
@@ -120,8 +120,8 @@ def laws(quick: bool) -> dict[str, jb.Scene]:
     normal, friction = seed.normal, seed.friction
     smooth = dataclasses.replace(
         seed,
-        normal=jb.SmoothRistowSchafer(K=normal.K, c=normal.c, n=normal.n),
-        friction=jb.SmoothBengisuAkay(
+        normal=jb.laws.SmoothRistowSchafer(K=normal.K, c=normal.c, n=normal.n),
+        friction=jb.laws.SmoothBengisuAkay(
             friction.mu_static, friction.mu_kinetic, friction.v0, friction.xi
         ),
     )
@@ -136,7 +136,7 @@ def footstep(scene: jb.Scene, start: jb.State, lands: bool, precision: Precision
     turning = Turning(
         system=Stepped(),
         section=Stance(),
-        solver=jb.Rodas4(),
+        solver=jb.solvers.Rodas4(),
         time_limit=jnp.asarray(10.0),
         steps=1,
         max_solver_steps=MOST_STEPS,
@@ -153,7 +153,7 @@ def exact_gait(scene: jb.Scene, rtol: float) -> Exact:
 
     `find_gait` would find the same; this needs no other program compiled.
     """
-    system, y = jb.Walking(), jb.seed_state()
+    system, y = jb.gait.Walking(), jb.seed_state()
     first = footstep(scene, y, True, Precision(1e-6, 1e-5))
     x = first.recurring
     for tolerance in (1e-6, rtol, rtol, rtol):
@@ -183,16 +183,16 @@ def measured(scene: jb.Scene, exact: Exact, stepping: str, rtol: float) -> Point
 
 def unit_error(scene: jb.Scene, start: jb.State, found: Turn) -> float:
     """Distance from 1 of the multiplier of the direction along the orbit."""
-    system = jb.Walking()
+    system = jb.gait.Walking()
     m = len(found.recurring)
-    velocity = recurring_of(system, jb.vector_field(0.0, start, scene))
+    velocity = recurring_of(system, jb.dynamics.vector_field(0.0, start, scene))
     square = found.monodromy[:, :m]
     return float(stability_of(square, square, velocity, 1e-3).unit_error)
 
 
 def residual(exact: Exact) -> float:
     """Largest change of a component of the state over the reference footstep, SI units."""
-    before = recurring_of(jb.Walking(), exact.start)
+    before = recurring_of(jb.gait.Walking(), exact.start)
     return float(jnp.max(jnp.abs(exact.turn.recurring - before)))
 
 

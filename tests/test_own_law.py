@@ -11,10 +11,10 @@ from jaxbiped.plot import basin, elasticities
 from tests.sweep.walkers import gaitless
 
 
-class Grip(jb.AbstractFrictionLaw):
+class Grip(jb.laws.AbstractFrictionLaw):
     """F = grip F_N V_T, opposing V_T."""
 
-    grip: float = jb.parameter("grip per slip", "$G$", "s/m", minimum=0.0)
+    grip: float = jb.laws.parameter("grip per slip", "$G$", "s/m", minimum=0.0)
 
     def force(self, normal_force, slip_speed):
         return -self.grip * normal_force * slip_speed
@@ -29,10 +29,10 @@ SCENE = dataclasses.replace(jb.seed_scene(), friction=Grip(5000.0))
 def test_in_a_sweep():
     axes = {"theta_stance": [0.15, 0.16], "grip": [4000.0, 5000.0]}
     labelling = gaitless(SCENE, jb.seed_state(), footsteps=1)
-    found = jb.sweep(labelling, jb.grid(SCENE, axes), look_for_gaits=False)
+    found = jb.sweep(labelling, jb.starts.grid(SCENE, axes), look_for_gaits=False)
     assert found.grip.attrs["units"] == "s/m"
     assert found.theta_stance.attrs["units"] == "rad"
-    sampled = jb.sample(SCENE, {"grip": (4000.0, 5000.0)}, 2)
+    sampled = jb.starts.sample(SCENE, {"grip": (4000.0, 5000.0)}, 2)
     found = jb.sweep(labelling, sampled, look_for_gaits=False)
     assert found.start_grip.attrs["units"] == "s/m"
 
@@ -48,7 +48,7 @@ def test_in_a_sweep_of_gaits_and_in_the_chart_of_a_gaits_elasticities():
 
 
 def test_on_an_axis():
-    quantities = jb.coordinate_quantities(SCENE)
+    quantities = jb.starts.coordinate_quantities(SCENE)
     axes = Figure().subplots()
     basin(
         np.zeros((2, 2), int), [0.0, 1.0], [0.0, 1.0],

@@ -13,9 +13,9 @@ from jaxbiped.dynamics._rigid_state import rigid_state
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.sweep._coordinates import check_coordinates
-from jaxbiped.sweep._given_starts import GivenStarts
-from jaxbiped.sweep._starts import AbstractStarts, grid, sample
+from jaxbiped.sweep.starts._coordinates import check_coordinates
+from jaxbiped.sweep.starts._given_starts import GivenStarts
+from jaxbiped.sweep.starts._starts import AbstractStarts, grid, sample
 
 _USUAL = ("theta_swing=-0.5:0.3:100", "omega_swing=-2:4:100")
 """Axes of a basin that nobody chose, and as many starts on each."""

@@ -11,10 +11,10 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State, seed_state
-from jaxbiped.gait._seed_start import seed_start
-from jaxbiped.scene._law import AbstractNormalLaw
+from jaxbiped.gait._default_guess import seed_start
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 _DEEPEST = 0.1
 """The deepest that a foot begins in a soft ground, in units of l."""

@@ -19,8 +19,8 @@ from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._explain_search import explain_search
 from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
-from jaxbiped.gait._search import Search
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._rigid_scene import RigidScene
 

@@ -7,20 +7,20 @@ from typing import Any
 from jaxbiped._checks import check_writable_file
 from jaxbiped._progress import stage
 from jaxbiped.cli._report import Report, table
-from jaxbiped.dynamics._bristles import state_type
+from jaxbiped.dynamics._bristle_state import state_type
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.lanes._count import operation_counts
-from jaxbiped.scene._catalogue import (
-    FRICTION_LAWS,
-    NORMAL_LAWS,
-    friction_law_like,
-    normal_law_like,
-)
+from jaxbiped.measure._operation_counts import operation_counts
 from jaxbiped.scene._ladder import ladder
 from jaxbiped.scene._parameter import parameter_infos
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene.laws._catalogue import (
+    FRICTION_LAWS,
+    NORMAL_LAWS,
+    friction_law_like,
+    normal_law_like,
+)
 
 _SEED_NORMAL = dict(K=1e6, c=1e7, n=1.5, mass=2.0)
 _SEED_FRICTION = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)

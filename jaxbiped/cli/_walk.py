@@ -19,8 +19,8 @@ from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, SolveOptions
 from jaxbiped.cli._warnings import ending_name, relative_residual, walk_warnings
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
-from jaxbiped.gait._footsteps import Footsteps, footsteps
-from jaxbiped.gait._ledger import energy_ledger
+from jaxbiped.measure._energy_ledger import energy_ledger
+from jaxbiped.measure._footsteps import Footsteps, footsteps
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._simulate import Simulation
@@ -152,7 +152,7 @@ def _run(request: Simulation) -> tuple[Trajectory, float]:
 def write_outputs(scene: Any, trajectory: Trajectory, out: Path) -> list[Path]:
     """Writes the figures, the animation and the trajectory; returns their paths."""
     from jaxbiped import plot
-    from jaxbiped.gait._dataset import trajectory_dataset
+    from jaxbiped.measure._dataset import trajectory_dataset
 
     figures: dict[str, Callable[..., Any]] = {
         "strobe.png": plot.gait_strobe,

@@ -17,15 +17,9 @@ from jaxbiped._checks import (
 )
 from jaxbiped._types import as_float
 from jaxbiped.cli._default_start import default_start
+from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._catalogue import (
-    FRICTION_LAWS,
-    NORMAL_LAWS,
-    friction_law_like,
-    normal_law_like,
-)
-from jaxbiped.scene._constraint_methods import method_named
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
@@ -33,6 +27,12 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
+from jaxbiped.scene.laws._catalogue import (
+    FRICTION_LAWS,
+    NORMAL_LAWS,
+    friction_law_like,
+    normal_law_like,
+)
 
 _SEED = {
     parameter.name: parameter.default for parameter in signature(seed_scene).parameters.values()

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._constraints import Heading, constraints_of, masses_of
-from jaxbiped.scene._constraint_method import AbstractConstraintMethod, Constrained
-from jaxbiped.scene._linkage import Linkage
+from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
+from jaxbiped.constraints._linkage import Linkage
+from jaxbiped.constraints._linkage_constraints import Heading, constraints_of, masses_of
 from jaxbiped.scene._linkage_scene import LinkageScene
 
 

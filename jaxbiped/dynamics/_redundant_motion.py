@@ -6,16 +6,21 @@ import jax.numpy as jnp
 
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._constraints import constraints_of, headings_of, point_of, torque_on
+from jaxbiped.constraints._linkage_constraints import (
+    constraints_of,
+    headings_of,
+    point_of,
+    torque_on,
+)
 from jaxbiped.dynamics._feet import feet, feet_of
 from jaxbiped.dynamics._forces import foot_force
 from jaxbiped.dynamics._linkage_motion import LinkageMotion, moved_under
-from jaxbiped.dynamics._motion import Accelerations, accelerations, bristle_rates
+from jaxbiped.dynamics._minimal_motion import Accelerations, accelerations, bristle_rates
 from jaxbiped.dynamics._redundant_state import Leg, legs_of
-from jaxbiped.scene._bristle_law import AbstractBristleLaw
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._walker_linkage import leg_of
+from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 
 class HipForce(NamedTuple):

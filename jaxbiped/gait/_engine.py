@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped.solve._engine import engine_for
-from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 
 def orbit_engine(

@@ -3,8 +3,8 @@
 from typing import Any
 
 from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._search import Search
 from jaxbiped.scene._parameters import parameter_values
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._ending import Ending

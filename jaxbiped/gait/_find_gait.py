@@ -17,30 +17,30 @@ from jaxtyping import PyTree
 from jaxbiped._checks import check_choice, check_count, check_type, check_unbatched
 from jaxbiped._progress import stage
 from jaxbiped._types import as_float
-from jaxbiped.dynamics._bristles import state_for
-from jaxbiped.dynamics._consistent import consistent_state
+from jaxbiped.compiler import lowered_ahead
+from jaxbiped.dynamics._bristle_state import state_for
+from jaxbiped.dynamics._consistent_state import consistent_state
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import checked_state
+from jaxbiped.gait._default_guess import seed_start
 from jaxbiped.gait._engine import orbit_engine
+from jaxbiped.gait._fixed_point_search import Found, Search, search
 from jaxbiped.gait._gait import Gait, described
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._origin import FoundBy, Origin, plain_origin
+from jaxbiped.gait._poincare_map import Turning
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
-from jaxbiped.gait._search import Found, Search, search
 from jaxbiped.gait._search_along import search_along
-from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
-from jaxbiped.gait._system import RedundantWalking, checked_section, system_of
-from jaxbiped.gait._turn import Turning
-from jaxbiped.lanes._call import lowered_ahead
 from jaxbiped.scene._parameters import chosen_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._projected import projecting
+from jaxbiped.solve._projected_solver import projecting
+from jaxbiped.variational._hybrid_system import RedundantWalking, checked_section, system_of
 
 _RESIDUAL_SHARE = 0.3
 """Residual that counts as none, in units of the state's tolerance."""

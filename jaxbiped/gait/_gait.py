@@ -11,12 +11,12 @@ from jaxtyping import PyTree
 
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
+from jaxbiped.compiler import Recording
+from jaxbiped.gait._fixed_point_search import Found, Search
 from jaxbiped.gait._orbit import Orbit, orbit_of
 from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
-from jaxbiped.gait._search import Found, Search
+from jaxbiped.gait._poincare_map import Turn, Turning
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.gait._turn import Turn, Turning
-from jaxbiped.lanes._call import Recording
 from jaxbiped.scene._parameters import parameter_quantities
 from jaxbiped.solve._ending import Ending
 

@@ -16,13 +16,13 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
-from jaxbiped.gait._gradient import AbstractGradient, Implicit
+from jaxbiped.gait._gradient_modes import AbstractGradient, Implicit
 from jaxbiped.gait._return_map import Return, return_map
+from jaxbiped.linalg._elimination import solution
 from jaxbiped.scene._parameters import chosen_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._elimination import solution
 
 
 def gait_measures(

@@ -11,16 +11,16 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.scene._catalogue import (
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene.laws._catalogue import (
     FRICTION_LAWS,
     NORMAL_LAWS,
     friction_law_like,
     normal_law_like,
 )
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._seed import seed_scene
 
 
 class Homotopy(NamedTuple):

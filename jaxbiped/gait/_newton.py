@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import optax
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._small_matrices import solved
-from jaxbiped.gait._turn import Turn
+from jaxbiped.gait._poincare_map import Turn
+from jaxbiped.linalg._small_matrices import solved
 
 _NEAR, _NEARER = 1e-3, 1e-4
 """Residuals at which rough solves give way to coarse ones, and these to fine ones."""

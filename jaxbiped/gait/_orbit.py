@@ -8,11 +8,11 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._search import Found
-from jaxbiped.gait._second_turn import second_turn
-from jaxbiped.gait._small_matrices import eigen, inverted, solved
+from jaxbiped.gait._fixed_point_search import Found
+from jaxbiped.gait._poincare_map import Turn, Turning, seeded, state_with
+from jaxbiped.gait._second_variation import second_turn
 from jaxbiped.gait._stability import Stability, stability_of
-from jaxbiped.gait._turn import Turn, Turning, seeded, state_with
+from jaxbiped.linalg._small_matrices import eigen, inverted, solved
 
 CLOSENESS = 1e-3
 """Distance of a multiplier from the unit circle that is flagged as a bifurcation."""

@@ -11,13 +11,13 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
+from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR, Turning
 from jaxbiped.gait._return_by_xla import NO_REVERSE, full_tangents, renewed
-from jaxbiped.gait._turn import PARAMETER_FLOOR, STATE_FLOOR, Turning
-from jaxbiped.lanes._crossed import Crossed
-from jaxbiped.lanes._crossing import cross
-from jaxbiped.solve._columns import Seeded, Tangents
-from jaxbiped.solve._passage import Precision
 from jaxbiped.solve._units import units_of
+from jaxbiped.variational._solve_to_section import Precision
+from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._variational_solve import cross
+from jaxbiped.variational._variational_types import Crossed
 
 
 @eqx.filter_custom_jvp

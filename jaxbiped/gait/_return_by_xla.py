@@ -10,10 +10,10 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._turn import PARAMETER_FLOOR, STATE_FLOOR, Turning
-from jaxbiped.solve._columns import Seeded, Tangents
-from jaxbiped.solve._passage import Precision, passage
+from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR, Turning
 from jaxbiped.solve._units import units_of
+from jaxbiped.variational._solve_to_section import Precision, passage
+from jaxbiped.variational._tangents import Seeded, Tangents
 
 NO_REVERSE = (
     "gradient = Forward() carries tangents along the motion and has no reverse mode: pass "

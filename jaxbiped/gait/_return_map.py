@@ -13,21 +13,21 @@ from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._engine import orbit_engine
-from jaxbiped.gait._gradient import AbstractGradient, Forward, Reverse, check_anywhere
+from jaxbiped.gait._gradient_modes import AbstractGradient, Forward, Reverse, check_anywhere
+from jaxbiped.gait._poincare_map import Turning
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._return_by_lanes import forward_by_lanes, reverse_by_lanes
 from jaxbiped.gait._return_by_xla import chosen, forward_by_xla, reverse_by_xla
 from jaxbiped.gait._solver import orbit_solver
-from jaxbiped.gait._system import (
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.solve._projected_solver import projecting
+from jaxbiped.variational._hybrid_system import (
     AbstractSystem,
     RedundantWalking,
     checked_section,
     system_of,
 )
-from jaxbiped.gait._turn import Turning
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.solve._projected import projecting
 
 
 class Return(NamedTuple):

@@ -8,11 +8,11 @@ import jax.tree_util as jtu
 
 from jaxbiped._checks import check_positive, check_type
 from jaxbiped._types import as_float
-from jaxbiped.dynamics._bristles import state_for
+from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
-from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.gait._default_guess import seed_start
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 

@@ -11,15 +11,15 @@ import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._default_guess import seed_start
+from jaxbiped.gait._fixed_point_search import Found, Search, search
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
 from jaxbiped.gait._newton import Method, chosen
 from jaxbiped.gait._origin import FoundBy, Origin
-from jaxbiped.gait._search import Found, Search, search
-from jaxbiped.gait._seed_start import seed_start
-from jaxbiped.gait._small_matrices import eigen
-from jaxbiped.gait._turn import Turning, recurring_of, state_with
+from jaxbiped.gait._poincare_map import Turning, recurring_of, state_with
+from jaxbiped.linalg._small_matrices import eigen
 from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.solve._passage import Precision
+from jaxbiped.variational._solve_to_section import Precision
 
 _FIRST, _LARGEST, _SMALLEST = 0.05, 0.3, 1e-3
 """Steps along the line: the first, at most, and at which it is given up."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._small_matrices import eigen, solved
+from jaxbiped.linalg._small_matrices import eigen, solved
 
 
 class Bifurcation(enum.IntEnum):

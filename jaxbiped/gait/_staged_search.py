@@ -11,13 +11,13 @@ import numpy as np
 from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.gait._continuation import Branch, BranchEnd, Change, follow_branch
+from jaxbiped.gait._default_guess import seed_start
+from jaxbiped.gait._fixed_point_search import ROUGH, Found, Search
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
 from jaxbiped.gait._origin import MOST_OTHERS, FoundBy, Origin, OtherGait, code_array, plain_origin
+from jaxbiped.gait._poincare_map import Turning, seeded, state_with, turn
 from jaxbiped.gait._rolling_starts import rolling_starts
-from jaxbiped.gait._search import ROUGH, Found, Search
-from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.gait._settled_walks import component_sizes, settled_states
-from jaxbiped.gait._turn import Turning, seeded, state_with, turn
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 

@@ -13,12 +13,12 @@ from matplotlib.patches import Patch
 
 from jaxbiped._checks import ArgumentError, check_finite
 from jaxbiped._quantity import Quantity
+from jaxbiped.basins._arguments import check_known
+from jaxbiped.basins._fractions import fractions as fractions_of
+from jaxbiped.basins._label import Label, label_names
 from jaxbiped.plot._label_colours import GAIT_SUFFIX, in_order, label_colour
 from jaxbiped.plot._style import axes_or_new, figure_of
 from jaxbiped.plot._symbols import axis_label
-from jaxbiped.sweep._arguments import check_known
-from jaxbiped.sweep._fractions import basin_fractions
-from jaxbiped.sweep._label import Label, label_names
 
 _HATCH = "////"
 """Over what is pending, so that it reads as missing in print without colour too."""
@@ -45,7 +45,7 @@ def basin(
             of the cells, one more.
         names, units: what the axes are, as ("angle of the stance leg", …) and ("rad", …). A
             coordinate's or a parameter's own name, as "theta_swing", says it all by itself; so
-            does a `jaxbiped.Quantity`, as those of `jaxbiped.coordinate_quantities`.
+            does a `jaxbiped.laws.Quantity`, as those of `jaxbiped.starts.coordinate_quantities`.
         period: footsteps in the cycle of the gait that each start walks to, a shape that
             broadcasts to (ny, nx); only for codes. Unless given, it is not said.
         gait: which gait that is, from 0, to tell apart those of one period; only for codes.
@@ -190,7 +190,7 @@ def finish(
 
 def _patches(words: np.ndarray) -> list[Patch]:
     """Entries of the legend: labels that occur, with their parts of what is labelled."""
-    fractions = basin_fractions(words)
+    fractions = fractions_of(words)
     patches = []
     for name in in_order(set(words.ravel().tolist())):
         if name == str(Label.PENDING):

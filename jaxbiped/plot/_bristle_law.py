@@ -16,7 +16,7 @@ from jaxbiped.plot._style import (
     legend_above,
 )
 from jaxbiped.plot._symbols import FORCE_RATIO, law_name
-from jaxbiped.scene._bristle_law import AbstractBristleLaw
+from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 _GIVES = 5.0
 """Travel in one direction, in units of the slip over which the bristles bend."""

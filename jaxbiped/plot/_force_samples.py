@@ -4,7 +4,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped.dynamics._contacts import Contacts, contacts
-from jaxbiped.gait._samples import applied, observed
+from jaxbiped.measure._samples import applied, observed
 from jaxbiped.plot._samples import sampled
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
 from jaxbiped._quantity import Quantity
+from jaxbiped.basins._fractions import Fraction, wilson_interval
 from jaxbiped.plot._label_colours import in_order, label_colour, label_marker
 from jaxbiped.plot._style import axes_or_new, dress, figure_of
 from jaxbiped.plot._symbols import axis_label
-from jaxbiped.sweep._fractions import Fraction, wilson_interval
 
 
 def basin_fractions(
@@ -34,9 +34,9 @@ def basin_fractions(
 
     Args:
         values: the parameter, increasing, shape (n,).
-        fractions: what `jaxbiped.basin_fractions` found at each value.
+        fractions: what `jaxbiped.basins.fractions` found at each value.
         name, unit: of the parameter; its own name, as "K", says all by itself, as does a
-            `jaxbiped.Quantity`.
+            `jaxbiped.laws.Quantity`.
         kind: "lines", or "stacked": areas that add up to one, without bands.
         confidence: of the bands.
         log: whether the parameter's axis is logarithmic.

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.gait._samples import applied
+from jaxbiped.measure._samples import applied
 from jaxbiped.plot._samples import sampled
 from jaxbiped.plot._style import (
     LEG_COLOURS,

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.gait._footsteps import heel_strikes
+from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.plot._arrows import direction_arrows
 from jaxbiped.plot._samples import sampled
 from jaxbiped.plot._style import (

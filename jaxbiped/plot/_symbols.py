@@ -13,7 +13,7 @@ from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._parameter import parameter_infos
 from jaxbiped.scene._ristow_schafer import RistowSchafer
 from jaxbiped.scene._walker import Walker
-from jaxbiped.sweep._coordinates import START_QUANTITIES
+from jaxbiped.sweep.starts._coordinates import START_QUANTITIES
 
 TIME = Quantity("time", r"$t$", "s")
 HORIZONTAL = Quantity("horizontal position", r"$X$", "m")

@@ -80,8 +80,8 @@ def parameter(
         default: the value unless given; with None, None stays and the law does without it.
 
     Example:
-        class Sticky(jaxbiped.AbstractFrictionLaw):
-            grip: float = jaxbiped.parameter("grip", "$G$", "s/m", minimum=0.0)
+        class Sticky(jaxbiped.laws.AbstractFrictionLaw):
+            grip: float = jaxbiped.laws.parameter("grip", "$G$", "s/m", minimum=0.0)
     """
     one = _optional_float if default is None else as_float
     info = ParameterInfo(Quantity(words, symbol, unit), positive, minimum, size_below)

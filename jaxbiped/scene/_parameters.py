@@ -41,7 +41,7 @@ def parameter_values(scene: Scene | RigidScene) -> dict[str, Any]:
 def parameter_quantities(scene: Scene | RigidScene | RedundantScene) -> dict[str, Quantity]:
     """What each of a scene's parameters is, with its unit, by name (see `parameter_names`).
 
-    Of a law's field that is no `jaxbiped.parameter` no more is known than its name.
+    Of a law's field that is no `jaxbiped.laws.parameter` no more is known than its name.
     """
     if isinstance(scene, RedundantScene):
         return parameter_quantities(scene.scene)

@@ -12,10 +12,15 @@ from jaxtyping import Array
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._state import State
-from jaxbiped.lanes._adaptive import Solve, Solved
-from jaxbiped.lanes._end_of_solve import almost
-from jaxbiped.lanes._saved import Saved
-from jaxbiped.lanes._solve import (
+from jaxbiped.scene._scene import Scene
+from jaxbiped.simulate._recorded_steps import recorded_steps
+from jaxbiped.solve._adaptive_program import Solve, Solved
+from jaxbiped.solve._final_step import almost
+from jaxbiped.solve._saved_outputs import Saved
+from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve.controllers._footstep_limit import PATIENCE
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._differentiable_solve import (
     Setting,
     compiled_solve,
     expressible,
@@ -23,11 +28,6 @@ from jaxbiped.lanes._solve import (
     solved_and_saved,
     solved_step_by_step,
 )
-from jaxbiped.scene._scene import Scene
-from jaxbiped.simulate._recorded_steps import recorded_steps
-from jaxbiped.solve._footstep_limit import PATIENCE
-from jaxbiped.solve._rosenbrock import AbstractRosenbrock
-from jaxbiped.solve._trajectory import Trajectory
 
 if TYPE_CHECKING:
     from jaxbiped.simulate._simulate import Simulation

@@ -7,16 +7,16 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from jaxbiped.dynamics._motion import vector_field
+from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._redundant_motion import redundant_field
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import Ending, ending_code, ending_events
-from jaxbiped.solve._extremes import Extremes
-from jaxbiped.solve._footstep_limit import PATIENCE, FootstepLimit
-from jaxbiped.solve._projected import projecting
-from jaxbiped.solve._step_control import first_step, step_control
+from jaxbiped.solve._projected_solver import projecting
 from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve.controllers._extremes import Extremes
+from jaxbiped.solve.controllers._footstep_limit import PATIENCE, FootstepLimit
+from jaxbiped.solve.controllers._step_control import first_step, step_control
 
 if TYPE_CHECKING:
     from jaxbiped.simulate._simulate import Simulation

@@ -10,15 +10,15 @@ from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_positive, check_type
 from jaxbiped._progress import stage
+from jaxbiped.constraints._constraint_methods import CONSTRAINT_METHODS, method_named
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.scene._constraint_methods import CONSTRAINT_METHODS, method_named
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import Simulation
 from jaxbiped.solve._ending import Ending
-from jaxbiped.solve._solvers import SOLVERS
 from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve.solvers import SOLVERS
 
 ASTRAY = 0.05
 """Error of the state (SI units) from which a run that came to its end has still failed."""

@@ -18,11 +18,11 @@ from jaxbiped._checks import (
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import checked_state
-from jaxbiped.lanes._rigid import rigid_walk_by_lanes
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._start import check_single_scene, in_one_precision, in_own_precision
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._engine import engine_for
+from jaxbiped.solve._rigid_program import rigid_walk_by_lanes
 from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, ending_of, whole
 
 RIGID_ACCURACIES = {"fast": 1e-4, "balanced": 1e-6, "tight": 1e-11}

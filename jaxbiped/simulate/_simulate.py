@@ -20,25 +20,25 @@ from jaxbiped._checks import (
     check_unbatched,
 )
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._bristles import BristleState
-from jaxbiped.dynamics._consistent import Consistent
+from jaxbiped.dynamics._bristle_state import BristleState
+from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._by_lanes import by_lanes, can_by_lanes, prepared_lanes
 from jaxbiped.simulate._by_xla import by_xla
-from jaxbiped.simulate._engine import chosen_engine
+from jaxbiped.simulate._engine_choice import chosen_engine
 from jaxbiped.simulate._saved_times import check_times
 from jaxbiped.simulate._start import check_steps, start_for
 from jaxbiped.simulate._start_height import check_start_height
 from jaxbiped.solve._accuracy import check_precision, tolerances
 from jaxbiped.solve._ending import WATCHES
-from jaxbiped.solve._footstep_limit import PATIENCE
-from jaxbiped.solve._projected import check_adjoint
-from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve._projected_solver import check_adjoint
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import Units, si_units, units_of
+from jaxbiped.solve.controllers._footstep_limit import PATIENCE
+from jaxbiped.solve.solvers import solver_named
 
 
 def simulate(

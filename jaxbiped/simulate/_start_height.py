@@ -10,7 +10,7 @@ import jax.tree_util as jtu
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.scene._clearance import AbstractClearance
-from jaxbiped.scene._law import AbstractNormalLaw
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 _DEEPEST = 0.25
 """Penetration of a foot that touches, in units of l, from which it starts below the ground."""

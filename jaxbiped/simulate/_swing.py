@@ -9,17 +9,17 @@ import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError, check_count, check_finite, check_positive, check_type
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._constraints import Constraints, constraints_of
-from jaxbiped.dynamics._independence import check_independent
+from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
+from jaxbiped.constraints._independence import check_independent
+from jaxbiped.constraints._linkage_constraints import Constraints, constraints_of
+from jaxbiped.constraints._projection import nearest, stepped_back
 from jaxbiped.dynamics._linkage_motion import LinkageState, linkage_field
-from jaxbiped.dynamics._projection import nearest, stepped_back
-from jaxbiped.scene._constraint_method import AbstractProjectingMethod
 from jaxbiped.scene._linkage_scene import LinkageScene
 from jaxbiped.simulate._start import check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
-from jaxbiped.solve._projected import check_adjoint, wrapped
-from jaxbiped.solve._solvers import solver_named
-from jaxbiped.solve._step_control import first_step, step_control
+from jaxbiped.solve._projected_solver import check_adjoint, wrapped
+from jaxbiped.solve.controllers._step_control import first_step, step_control
+from jaxbiped.solve.solvers import solver_named
 
 
 class Swing(eqx.Module):

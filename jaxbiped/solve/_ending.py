@@ -11,13 +11,13 @@ import jax.tree_util as jtu
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import Foot, feet, touches
-from jaxbiped.dynamics._motion import accelerations
+from jaxbiped.dynamics._minimal_motion import accelerations
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._clearance import StanceRotation
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._fence import fenced
+from jaxbiped.solve._fusion_barrier import fenced
 
 _FALL_ANGLE = 1.0
 """A hip lower than a leg at this angle [rad] could carry it has fallen."""

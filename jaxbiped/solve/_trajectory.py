@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int, PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._state import State
-from jaxbiped.solve._between_steps import between_steps
+from jaxbiped.solve._dense_output import between_steps
 from jaxbiped.solve._ending import Ending
 
 

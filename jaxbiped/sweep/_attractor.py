@@ -9,11 +9,11 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._feet import feet
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._search import Search
-from jaxbiped.gait._system import checked_section
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.variational._hybrid_system import checked_section
 
 
 class Attractor(NamedTuple):

@@ -13,7 +13,7 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._attractor import Attractor, component_scales, unmeasured_attractor
 from jaxbiped.sweep._family import Family
-from jaxbiped.sweep._follow import Effort
+from jaxbiped.sweep._follow_start import Effort
 from jaxbiped.sweep._radius import with_radius
 
 _SAME = 1e-5

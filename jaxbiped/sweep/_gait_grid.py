@@ -12,11 +12,11 @@ import numpy as np
 
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._origin import FoundBy
-from jaxbiped.gait._search import Search
 from jaxbiped.sweep._same_store import ALSO, SETTINGS, check_same, check_writers
-from jaxbiped.sweep._store import consolidate, opened, unwritable
+from jaxbiped.sweep._zarr_store import consolidate, opened, unwritable
 
 if TYPE_CHECKING:
     import xarray

@@ -12,8 +12,8 @@ from tqdm import tqdm
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._search import Search
 from jaxbiped.scene._parameters import (
     parameter_names,
     parameter_quantities,
@@ -26,7 +26,7 @@ from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._gait_grid import open_gait_grid
 from jaxbiped.sweep._identity import identity
 from jaxbiped.sweep._provenance import provenance
-from jaxbiped.sweep._store import check_store
+from jaxbiped.sweep._zarr_store import check_store
 
 if TYPE_CHECKING:
     import xarray

@@ -15,7 +15,9 @@ from jaxbiped._checks import (
     check_type,
 )
 from jaxbiped._types import as_float
-from jaxbiped.dynamics._bristles import BristleState, state_type
+from jaxbiped.basins._arguments import check_whole
+from jaxbiped.basins._label import Label, label_names
+from jaxbiped.dynamics._bristle_state import BristleState, state_type
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._parameters import parameter_values, with_parameters
@@ -24,14 +26,12 @@ from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._rigid_walk import RIGID_ACCURACIES
 from jaxbiped.solve._accuracy import ACCURACIES, resolving
 from jaxbiped.solve._engine import engine_for
-from jaxbiped.solve._rosenbrock import AbstractRosenbrock
-from jaxbiped.solve._solvers import solver_named
-from jaxbiped.sweep._arguments import check_whole
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.solve.solvers import solver_named
 from jaxbiped.sweep._broadcast import repeated
 from jaxbiped.sweep._family import Family
-from jaxbiped.sweep._follow import Effort, follow
+from jaxbiped.sweep._follow_start import Effort, follow
 from jaxbiped.sweep._identity import identity
-from jaxbiped.sweep._label import Label, label_names
 
 _GAP, _GAP_SHARE = 1e-4, 30.0
 """Gap between states that repeat each other, at least; and in units of the tolerance."""

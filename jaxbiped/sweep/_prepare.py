@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
-from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.basins._arguments import check_whole
+from jaxbiped.basins._label import Label
+from jaxbiped.gait._default_guess import seed_start
 from jaxbiped.scene._parameters import parameter_names, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._rosenbrock import AbstractRosenbrock
-from jaxbiped.sweep._arguments import check_whole
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._find_family import find_family, with_gaits
-from jaxbiped.sweep._label import Label
 from jaxbiped.sweep._labelling import Labelling, checked_effort
-from jaxbiped.sweep._starts import AbstractStarts
+from jaxbiped.sweep.starts._starts import AbstractStarts
 
 _ALIKE = 0.05
 """Distance of two starts' last states, in the components' scales, that count as one guess."""

@@ -4,14 +4,14 @@ from typing import Any
 
 import numpy as np
 
+from jaxbiped.basins._label import Label
+from jaxbiped.basins._spherical_points import spread_directions
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._attractor import Attractor, component_scales, section_tangents
 from jaxbiped.sweep._broadcast import repeated
-from jaxbiped.sweep._follow import Effort, follow
+from jaxbiped.sweep._follow_start import Effort, follow
 from jaxbiped.sweep._goals import Goals
-from jaxbiped.sweep._label import Label
-from jaxbiped.sweep._sphere import spread_directions
 
 _SHELLS = 1e-5 * 1.5 ** np.arange(30)
 """Distances that are tried."""

@@ -10,18 +10,18 @@ import numpy as np
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped.sweep._arguments import check_whole
-from jaxbiped.sweep._coordinates import coordinate_quantities
-from jaxbiped.sweep._label import Label
+from jaxbiped.basins._arguments import check_whole
+from jaxbiped.basins._label import Label
+from jaxbiped.sweep._array_layout import FIELDS, Layout, fields_of
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._layout import FIELDS, Layout, fields_of
-from jaxbiped.sweep._memory import Memory
+from jaxbiped.sweep._memory_store import Memory
 from jaxbiped.sweep._prepare import Guesses, guesses_among, with_gaits_met, with_guesses
 from jaxbiped.sweep._provenance import provenance
 from jaxbiped.sweep._same_store import GAITS
-from jaxbiped.sweep._starts import AbstractStarts
-from jaxbiped.sweep._store import Store, check_store
 from jaxbiped.sweep._workers import computed
+from jaxbiped.sweep._zarr_store import Store, check_store
+from jaxbiped.sweep.starts._coordinates import coordinate_quantities
+from jaxbiped.sweep.starts._starts import AbstractStarts
 
 if TYPE_CHECKING:
     import xarray

@@ -16,10 +16,10 @@ from concurrent.futures import (
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.sweep._given_starts import GivenStarts
+from jaxbiped.sweep._array_layout import Layout, fields_of
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._layout import Layout, fields_of
-from jaxbiped.sweep._starts import AbstractStarts
+from jaxbiped.sweep.starts._given_starts import GivenStarts
+from jaxbiped.sweep.starts._starts import AbstractStarts
 
 _AHEAD = 2
 """Chunks handed out for each worker, so that none waits for the next."""

@@ -12,14 +12,14 @@ from scipy.optimize import brentq
 
 import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
+from jaxbiped.gait._fixed_point_search import search
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._orbit import orbit_of
+from jaxbiped.gait._poincare_map import Turning
 from jaxbiped.gait._precision import precision_of
-from jaxbiped.gait._search import search
-from jaxbiped.gait._turn import Turning
 
 
-class Smooth(jb.AbstractSystem):
+class Smooth(jb.gait.AbstractSystem):
     """Without switches, endings or load."""
 
     def switches(self, args, y):
@@ -197,7 +197,7 @@ def test_van_der_pol_multiplier_and_its_sensitivities():
             y, total, period = s.y_events[0][k][:2], s.y_events[0][k][2], s.t_events[0][k]
         return np.array([y[0], period, math.exp(total)])
 
-    turning = Turning(VanDerPol(), TURNING_POINT, jb.Rodas4(), 20.0, 1, 32768, "xla")
+    turning = Turning(VanDerPol(), TURNING_POINT, jb.solvers.Rodas4(), 20.0, 1, 32768, "xla")
     orbit = jax.jit(lambda mu: _orbit(turning, mu, (jnp.asarray(-2.1), jnp.asarray(0.1))))(
         jnp.asarray(1.0)
     )
@@ -218,7 +218,7 @@ def test_bouncing_ball_in_a_cycle_of_two():
     args = tuple(jnp.asarray(value) for value in (0.3, 0.8, 1.0))
     found = []
     for steps in (1, 2):
-        turning = Turning(Ball(), DOWN, jb.Rodas4(), 20.0, steps, 32768, "xla")
+        turning = Turning(Ball(), DOWN, jb.solvers.Rodas4(), 20.0, steps, 32768, "xla")
         guess = (jnp.asarray(0.0), jnp.asarray(4.0))
         found.append(_orbit(turning, args, guess))
     once, twice = found

@@ -6,7 +6,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.gait._samples import observed
+from jaxbiped.measure._samples import observed
 from jaxbiped.plot._force_samples import sampled_forces
 
 
@@ -51,7 +51,7 @@ def test_peaks_do_not_vary_from_step_to_step(walk):
 
 def test_between_two_times_and_without_friction(walk):
     scene, trajectory = walk
-    slippery = eqx.tree_at(lambda s: s.friction, scene, jb.Frictionless())
+    slippery = eqx.tree_at(lambda s: s.friction, scene, jb.laws.Frictionless())
     t, found = sampled_forces(slippery, trajectory, start=0.3, stop=0.5)
     assert (t[0], t[-1]) == (0.3, 0.5)
     assert found.forces.foot_1.tangential is None

@@ -3,7 +3,7 @@ import numpy as np
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.gait._samples import applied
+from jaxbiped.measure._samples import applied
 from jaxbiped.plot._samples import sampled, state_at
 
 
@@ -30,7 +30,7 @@ def test_contacts_are_feet_and_forces(seed_walk):
     scene, walk = seed_walk
     state = state_at(walk, np.linspace(0.0, 2.0, 11))
     found = applied(scene, state, contacts)
-    forces = jb.foot_forces(scene, jb.State(*(jnp.asarray(leaf) for leaf in state)))
+    forces = jb.dynamics.foot_forces(scene, jb.State(*(jnp.asarray(leaf) for leaf in state)))
     np.testing.assert_allclose(found.forces.foot_1.normal, np.asarray(forces.foot_1.normal))
     np.testing.assert_allclose(found.forces.foot_2.tangential, np.asarray(forces.foot_2.tangential))
     assert found.touching[0].shape == (11,)

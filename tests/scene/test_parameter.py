@@ -13,12 +13,15 @@ from jaxbiped._quantity import Quantity
 from jaxbiped.scene._parameter import parameter_infos
 
 SEED = jb.seed_scene()
-NORMALS = {name: jb.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0) for name in jb.NORMAL_LAWS}
+NORMALS = {
+    name: jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
+    for name in jb.laws.NORMAL_LAWS
+}
 FRICTIONS = {
-    name: jb.friction_law_like(name, mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1e3)
-    for name in jb.FRICTION_LAWS
-} | {"brown-mcphee, viscous": jb.BrownMcPhee(0.5, 0.4, 1e-4, mu_v=1.0, N_t=1.0)}
-METHODS = {name: kind() for name, kind in jb.CONSTRAINT_METHODS.items()}
+    name: jb.laws.friction_law_like(name, mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1e3)
+    for name in jb.laws.FRICTION_LAWS
+} | {"brown-mcphee, viscous": jb.laws.BrownMcPhee(0.5, 0.4, 1e-4, mu_v=1.0, N_t=1.0)}
+METHODS = {name: kind() for name, kind in jb.constraints.CONSTRAINT_METHODS.items()}
 SCENES = {
     **{
         name: jb.Scene(SEED.walker, SEED.ground, law, SEED.friction)
@@ -30,7 +33,7 @@ SCENES = {
     },
     **{name: jb.RedundantScene(SEED, method) for name, method in METHODS.items()},
     "rigid": jb.RigidScene(SEED.walker, SEED.ground),
-    "linkage": jb.LinkageScene(jb.walker_linkage(SEED.walker), jb.Index1()),
+    "linkage": jb.LinkageScene(jb.walker_linkage(SEED.walker), jb.constraints.Index1()),
 }
 
 
@@ -96,8 +99,8 @@ def test_the_unit_of_a_stiffness_follows_its_own_law():
         name: jb.parameter_quantities(SCENES[name])["K"].unit for name in ("kelvin-voigt", "tsuji")
     }
     assert units == {"kelvin-voigt": "N/m", "tsuji": "N/m^1.5"}
-    assert jb.coordinate_quantities(SEED)["K"].unit == "N/m^n"
-    assert jb.coordinate_quantities(SEED)["theta_stance"].unit == "rad"
+    assert jb.starts.coordinate_quantities(SEED)["K"].unit == "N/m^n"
+    assert jb.starts.coordinate_quantities(SEED)["theta_stance"].unit == "rad"
 
 
 @pytest.mark.parametrize(
@@ -115,16 +118,16 @@ def test_a_unit_as_text_and_in_a_figure(unit, text, figure):
     assert (quantity.unit_in_text, quantity.unit_in_figure) == (text, figure)
 
 
-class Ranged(jb.AbstractFrictionLaw):
+class Ranged(jb.laws.AbstractFrictionLaw):
     """A friction law whose parameters show every kind of range."""
 
-    positive: float = jb.parameter("a", "$a$", "N", positive=True, default=1.0)
-    natural: float = jb.parameter("b", "$b$", "s/m", minimum=0.0, default=0.0)
-    from_two: float = jb.parameter("c", "$c$", minimum=2.0, default=2.0)
-    small: float = jb.parameter("d", "$d$", "rad", size_below=1.0, default=0.0)
-    any_number: float = jb.parameter("e", default=0.0)
-    point: tuple = jb.parameter("f", "$f$", "m", pair=True, default=(0.0, 0.0))
-    optional: float | None = jb.parameter("h", "$h$", "m", positive=True, default=None)
+    positive: float = jb.laws.parameter("a", "$a$", "N", positive=True, default=1.0)
+    natural: float = jb.laws.parameter("b", "$b$", "s/m", minimum=0.0, default=0.0)
+    from_two: float = jb.laws.parameter("c", "$c$", minimum=2.0, default=2.0)
+    small: float = jb.laws.parameter("d", "$d$", "rad", size_below=1.0, default=0.0)
+    any_number: float = jb.laws.parameter("e", default=0.0)
+    point: tuple = jb.laws.parameter("f", "$f$", "m", pair=True, default=(0.0, 0.0))
+    optional: float | None = jb.laws.parameter("h", "$h$", "m", positive=True, default=None)
 
     def force(self, normal_force, slip_speed):
         return -self.natural * normal_force * slip_speed
@@ -169,7 +172,7 @@ def test_a_parameter_is_a_float_array_and_what_is_none_is_not_modelled():
     assert len(jtu.tree_leaves(law)) == 7
 
 
-class Plain(jb.AbstractFrictionLaw):
+class Plain(jb.laws.AbstractFrictionLaw):
     """A law with a field that carries nothing, and numbers in a list."""
 
     k: object

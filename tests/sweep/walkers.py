@@ -60,4 +60,4 @@ def simplest_grid(scene, count=8):
         "theta_stance": np.linspace(0.16, 0.24, count),
         "omega_stance": np.linspace(-0.25, -0.17, count),
     }
-    return jb.grid(scene, axes)
+    return jb.starts.grid(scene, axes)

@@ -1,0 +1,51 @@
+"""The seed's friction law, with its Stribeck peak."""
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+
+from jaxbiped._types import Parameter, Scalar
+from jaxbiped.scene._parameter import parameter
+from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
+
+
+class BengisuAkay(AbstractFrictionLaw):
+    """Regularised dry friction that rises to its static peak at v0 and decays to kinetic.
+
+    With F_S = mu_static F_N, F_C = mu_kinetic F_N and s = |V_T|:
+
+    - s < v0: F = F_S − (F_S/v0²)(s − v0)²
+    - s ≥ v0: F = F_C + (F_S − F_C) exp(−xi (s − v0))
+
+    Source: the seed paper, section 2.2, after Bengisu and Akay. Its printed first branch lost a
+    minus sign, a square and a bracket; this reading alone is zero at rest and continuous at v0.
+
+    Attributes (leaves of any batch shape):
+        mu_static: static coefficient, reached at v0 [–].
+        mu_kinetic: kinetic coefficient, reached far above v0 [–].
+        v0: slip speed of the peak [m/s].
+        xi: Stribeck rate, the decay above v0 [s/m].
+
+    Raises:
+        ArgumentError: a coefficient or xi below 0, or v0 not above 0.
+    """
+
+    builds_up_over: ClassVar[str | None] = "v0"
+    mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
+    mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
+    v0: Parameter = parameter("slip at the peak", "$v_0$", "m/s", positive=True)
+    xi: Parameter = parameter("decay of friction", r"$\xi$", "s/m", minimum=0.0)
+
+    def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
+        u = slip_speed / self.v0
+        speed = jnp.abs(slip_speed)
+        sticking = speed < self.v0
+        # u (2 − |u|) is the first branch written so that its slope at rest is exact.
+        rise = self.mu_static * u * (2.0 - jnp.abs(u))
+        beyond = jnp.where(sticking, 0.0, speed - self.v0)
+        decay = self.mu_kinetic + (self.mu_static - self.mu_kinetic) * jnp.exp(-self.xi * beyond)
+        return -normal_force * jnp.where(sticking, rise, jnp.sign(slip_speed) * decay)
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        # At rest it is the second derivative that jumps.
+        return slip_speed - self.v0, slip_speed + self.v0, slip_speed

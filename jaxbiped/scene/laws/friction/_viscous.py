@@ -1,0 +1,27 @@
+"""Viscous friction."""
+
+from jaxbiped._types import Parameter, Scalar
+from jaxbiped.scene._parameter import parameter
+from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
+
+
+class Viscous(AbstractFrictionLaw):
+    """F = k F_N V_T, opposing V_T. Smooth everywhere and without bound.
+
+    Proportional to the load, unlike the viscous term of a lubricated joint, so that it fades with
+    contact: a foot that carries nothing feels no friction.
+
+    Attributes (leaves of any batch shape):
+        k: friction per load and slip speed [s/m].
+
+    Raises:
+        ArgumentError: k below 0.
+    """
+
+    k: Parameter = parameter("friction per slip", "$k$", "s/m", minimum=0.0)
+
+    def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
+        return -self.k * normal_force * slip_speed
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        return ()
