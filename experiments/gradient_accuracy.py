@@ -15,9 +15,16 @@ from _options import Options, parse
 
 import jaxbiped as jb
 from jaxbiped.gait._orbit import slopes_of
-from jaxbiped.gait._poincare_map import Turn, Turning, recurring_of, seeded, state_with, turn
+from jaxbiped.gait._poincare_map import (
+    LinearisedReturn,
+    ReturnMapSpec,
+    linearised_return,
+    recurring_components,
+    seed_directions,
+    state_with,
+)
 from jaxbiped.gait._stability import stability_of
-from jaxbiped.scene._parameters import chosen_parameters
+from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.variational._solve_to_section import Precision
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
@@ -59,7 +66,7 @@ class Stepping(NamedTuple):
 class Stepped(jb.gait.AbstractSystem):
     """The walker, its switches hidden from the solver or not."""
 
-    drifting = jb.gait.Walking.drifting
+    cyclic_coordinates = jb.gait.Walking.cyclic_coordinates
 
     def vector_field(self, t: Any, y: jb.State, args: Stepping) -> jb.State:
         """The walker's."""
@@ -75,7 +82,7 @@ class Stepped(jb.gait.AbstractSystem):
         """The walker's."""
         return jb.gait.Walking().ending(args.scene, y)
 
-    def renew(self, args: Stepping, y: jb.State) -> jb.State:
+    def reset_map(self, args: Stepping, y: jb.State) -> jb.State:
         """Legs exchanged."""
         return jb.dynamics.exchange_legs(y)
 
@@ -111,7 +118,7 @@ class Exact(NamedTuple):
     """A gait's state on the section, and the reference footstep from there."""
 
     start: jb.State
-    turn: Turn
+    orbit: LinearisedReturn
 
 
 def laws(quick: bool) -> dict[str, jb.Scene]:
@@ -128,12 +135,14 @@ def laws(quick: bool) -> dict[str, jb.Scene]:
     return {"exact laws": seed} if quick else {"exact laws": seed, "smoothed laws": smooth}
 
 
-def footstep(scene: jb.Scene, start: jb.State, lands: bool, precision: Precision) -> Turn:
+def footstep(
+    scene: jb.Scene, start: jb.State, lands: bool, precision: Precision
+) -> LinearisedReturn:
     """One footstep from mid-stance, with derivatives by the state and by log K.
 
     Landing and tolerances are traced: all of them share one compiled program.
     """
-    turning = Turning(
+    spec = ReturnMapSpec(
         system=Stepped(),
         section=Stance(),
         solver=jb.solvers.Rodas4(),
@@ -142,10 +151,10 @@ def footstep(scene: jb.Scene, start: jb.State, lands: bool, precision: Precision
         max_solver_steps=MOST_STEPS,
         engine="xla",
     )
-    _, active = chosen_parameters(scene, ("K",))  # whose places are the same in a Stepping
-    seeds, _ = seeded(Stepping(scene, jnp.asarray(float(lands))), active, len(start) - 1)
+    _, active = select_parameters(scene, ("K",))  # whose places are the same in a Stepping
+    seeds, _ = seed_directions(Stepping(scene, jnp.asarray(float(lands))), active, len(start) - 1)
     traced = Precision(*map(jnp.asarray, precision))
-    return turn(turning, seeds, start, traced, jnp.asarray(False))
+    return linearised_return(spec, seeds, start, traced, jnp.asarray(False))
 
 
 def exact_gait(scene: jb.Scene, rtol: float) -> Exact:
@@ -170,30 +179,30 @@ def measured(scene: jb.Scene, exact: Exact, stepping: str, rtol: float) -> Point
     lands, heard = STEPPINGS[stepping]
     precision = Precision(rtol, TANGENT_SHARE * rtol if heard else UNHEARD)
     found = footstep(scene, exact.start, lands, precision)
-    slope, true_slope = (float(slopes_of(each).period[0]) for each in (found, exact.turn))
+    slope, true_slope = (float(slopes_of(each).period[0]) for each in (found, exact.orbit))
     return Point(
         rtol=rtol,
         steps=int(found.attempted),
-        state=float(jnp.max(jnp.abs(found.recurring - exact.turn.recurring))),
-        period_s=abs(float(found.period - exact.turn.period)),
+        state=float(jnp.max(jnp.abs(found.recurring - exact.orbit.recurring))),
+        period_s=abs(float(found.period - exact.orbit.period)),
         unit_multiplier=unit_error(scene, exact.start, found),
         period_slope=abs(slope / true_slope - 1.0),
     )
 
 
-def unit_error(scene: jb.Scene, start: jb.State, found: Turn) -> float:
+def unit_error(scene: jb.Scene, start: jb.State, found: LinearisedReturn) -> float:
     """Distance from 1 of the multiplier of the direction along the orbit."""
     system = jb.gait.Walking()
     m = len(found.recurring)
-    velocity = recurring_of(system, jb.dynamics.vector_field(0.0, start, scene))
+    velocity = recurring_components(system, jb.dynamics.vector_field(0.0, start, scene))
     square = found.monodromy[:, :m]
     return float(stability_of(square, square, velocity, 1e-3).unit_error)
 
 
 def residual(exact: Exact) -> float:
     """Largest change of a component of the state over the reference footstep, SI units."""
-    before = recurring_of(jb.gait.Walking(), exact.start)
-    return float(jnp.max(jnp.abs(exact.turn.recurring - before)))
+    before = recurring_components(jb.gait.Walking(), exact.start)
+    return float(jnp.max(jnp.abs(exact.orbit.recurring - before)))
 
 
 def report(options: Options, points: dict[str, list[Point]]) -> None:
@@ -242,10 +251,10 @@ def main() -> None:
             name: [measured(scene, exact, name, rtol) for rtol in levels] for name in STEPPINGS
         }
         references[law] = {
-            "period_s": float(exact.turn.period),
-            "period_slope_s": float(slopes_of(exact.turn).period[0]),
-            "steps": int(exact.turn.attempted),
-            "unit_multiplier": unit_error(scene, exact.start, exact.turn),
+            "period_s": float(exact.orbit.period),
+            "period_slope_s": float(slopes_of(exact.orbit).period[0]),
+            "steps": int(exact.orbit.attempted),
+            "unit_multiplier": unit_error(scene, exact.start, exact.orbit),
             "residual": residual(exact),
         }
         options.say(f"\n{law}, in {time.perf_counter() - began:.0f} s")

@@ -13,7 +13,7 @@ from jaxbiped.basins._label import label_names as label_names
 from jaxbiped.basins._minimal_fatal_shock import FatalShock as FatalShock
 from jaxbiped.basins._minimal_fatal_shock import minimal_fatal_shock as minimal_fatal_shock
 from jaxbiped.basins._refined_boundary import RefinedBoundary as RefinedBoundary
-from jaxbiped.basins._refined_boundary import refined_boundary as refined_boundary
+from jaxbiped.basins._refined_boundary import refine_boundary as refine_boundary
 from jaxbiped.basins._uncertainty_exponent import Uncertainty as Uncertainty
 from jaxbiped.basins._uncertainty_exponent import sampled_uncertainty as sampled_uncertainty
 from jaxbiped.basins._uncertainty_exponent import uncertainty_exponent as uncertainty_exponent

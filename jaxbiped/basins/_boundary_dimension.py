@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.basins._arguments import check_label_grid, check_whole
-from jaxbiped.basins._power_law import fitted_exponent
+from jaxbiped.basins._power_law import fit_exponent
 from jaxbiped.basins._refined_boundary import RefinedBoundary
 
 
@@ -57,7 +57,7 @@ def boundary_dimension(
     else:
         sizes, counts = _grid_counts(check_label_grid(boundary), sides)
     fitted = slice(None, len(sizes) - skip if skip < len(sizes) else 0)
-    slope = fitted_exponent(sizes[fitted], counts[fitted], "boundary")
+    slope = fit_exponent(sizes[fitted], counts[fitted], "boundary")
     return Dimension(-slope.estimate, slope.error, sizes, counts)
 
 

@@ -1,4 +1,4 @@
-"""Which fraction of the starts has each label, and how sure that is."""
+"""Fractions of the starts with each label, and their confidence intervals."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""What became of a start."""
+"""Labels: what became of a start."""
 
 import enum
 

@@ -1,4 +1,4 @@
-"""Asking for labels: in calls of bounded size, counted."""
+"""Label oracle: asks for labels in calls of bounded size and counts them."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ LabelOf = Callable[[np.ndarray], npt.ArrayLike]
 """Labels, shape (n,), of points, shape (n, d)."""
 
 
-class Ask:
+class LabelOracle:
     """Calls `label_of` with at most `batch` points at a time; keeps count of points and calls."""
 
     def __init__(self, label_of: LabelOf, batch: int):

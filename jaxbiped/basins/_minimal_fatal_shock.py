@@ -1,4 +1,4 @@
-"""The smallest push that is fatal: from a gait to the nearest start with another label."""
+"""Minimal fatal shock: the nearest start about a gait with another label."""
 
 from typing import NamedTuple
 
@@ -7,10 +7,10 @@ import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError, check_finite, check_positive
 from jaxbiped.basins._arguments import check_vector, check_whole
-from jaxbiped.basins._label_oracle import Ask, LabelOf
-from jaxbiped.basins._ray_descent import GivenNormals, Normal, SecantNormals, turned
-from jaxbiped.basins._rays import Brackets, Surroundings, first_exits, narrowed
-from jaxbiped.basins._spherical_points import normalised, spread_directions
+from jaxbiped.basins._label_oracle import LabelOf, LabelOracle
+from jaxbiped.basins._ray_descent import GivenNormals, Normal, SecantNormals, descend_rays
+from jaxbiped.basins._rays import Brackets, Surroundings, bisect_brackets, first_exits
+from jaxbiped.basins._spherical_points import normalise, spread_directions
 
 _APART = 0.5
 """Angle [rad] between the rays that are improved, so that they lead to different places."""
@@ -99,7 +99,7 @@ def minimal_fatal_shock(
     Raises:
         ArgumentError: an argument that is not allowed, or labels or normals of a wrong shape.
     """
-    around = _surroundings(Ask(label_of, batch), origin, scales)
+    around = _surroundings(LabelOracle(label_of, batch), origin, scales)
     ways = _directions(directions, around.origin.size)
     check_positive("farthest", farthest)
     check_positive("tolerance", tolerance)
@@ -114,7 +114,7 @@ def minimal_fatal_shock(
     rays = first_exits(around, ways, marks)
     rays = rays.take(np.isfinite(rays.outside))
     if not rays.inside.size:
-        return _nothing(around)
+        return _without_failure(around)
     rays = _nearest(around, rays, max(improved, 1), tolerance)
     bisected = float(rays.outside.min())
     normals_of = (
@@ -122,11 +122,11 @@ def minimal_fatal_shock(
     )
     angle = np.full(len(rays.inside), np.nan)
     if improved:
-        rays, angle = turned(around, rays, normals_of, tolerance)
+        rays, angle = descend_rays(around, rays, normals_of, tolerance)
     return _result(around, rays, angle, bisected, tolerance)
 
 
-def _surroundings(ask: Ask, origin: npt.ArrayLike, scales: npt.ArrayLike) -> Surroundings:
+def _surroundings(ask: LabelOracle, origin: npt.ArrayLike, scales: npt.ArrayLike) -> Surroundings:
     centre, units = check_vector("origin", origin), check_vector("scales", scales)
     check_positive("scales", units)
     if centre.shape != units.shape:
@@ -147,7 +147,7 @@ def _directions(directions: int | npt.ArrayLike | None, d: int) -> np.ndarray:
         raise ArgumentError(f"directions has shape {given.shape}: it must be (n, {d}), n above 0.")
     if not given.any(axis=1).all():
         raise ArgumentError("directions holds a row of zeros: each must point somewhere.")
-    return normalised(given)
+    return normalise(given)
 
 
 def _nearest(around: Surroundings, rays: Brackets, most: int, tolerance: float) -> Brackets:
@@ -156,10 +156,10 @@ def _nearest(around: Surroundings, rays: Brackets, most: int, tolerance: float) 
     Only those that may be among them are: to tell which, a few halvings of all brackets do.
     """
     widest = np.max(rays.outside - rays.inside)
-    rays = narrowed(around, rays, max(tolerance, widest * _ROUGHLY))
+    rays = bisect_brackets(around, rays, max(tolerance, widest * _ROUGHLY))
     may_be_nearest = rays.inside <= rays.outside.min()
     may_be_nearest[_nearest_apart(rays, most)] = True
-    rays = narrowed(around, rays.take(may_be_nearest), tolerance)
+    rays = bisect_brackets(around, rays.take(may_be_nearest), tolerance)
     return rays.take(_nearest_apart(rays, most))
 
 
@@ -196,7 +196,7 @@ def _result(
     )
 
 
-def _nothing(around: Surroundings) -> FatalShock:
+def _without_failure(around: Surroundings) -> FatalShock:
     unknown = np.full(around.origin.size, np.nan)
     return FatalShock(
         distance=np.inf,

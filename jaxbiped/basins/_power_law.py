@@ -1,4 +1,4 @@
-"""Exponents by least squares on logarithms."""
+"""Power laws: exponents by least squares on logarithms."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ class Exponent(NamedTuple):
     error: float
 
 
-def fitted_exponent(x: np.ndarray, y: np.ndarray, what: str) -> Exponent:
+def fit_exponent(x: np.ndarray, y: np.ndarray, what: str) -> Exponent:
     """Exponent p of y ~ x^p: the slope of log y against log x, of shape (n,), by least squares.
 
     The standard error is that of a slope whose scatter is seen in the residuals (n − 2 of them

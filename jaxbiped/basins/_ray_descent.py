@@ -1,4 +1,4 @@
-"""Turning rays towards the boundary's normal: that is where the boundary is nearest."""
+"""Descent of rays towards the boundary's normal, where the boundary is nearest."""
 
 from collections.abc import Callable
 
@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.basins._rays import Brackets, Surroundings, narrowed, nearest_of
-from jaxbiped.basins._spherical_points import normalised
+from jaxbiped.basins._rays import Brackets, Surroundings, bisect_brackets, nearest_of
+from jaxbiped.basins._spherical_points import normalise
 
 Normal = Callable[[np.ndarray], npt.ArrayLike]
 """Gradients, shape (n, d), of points on the boundary, shape (n, d)."""
@@ -44,7 +44,7 @@ class GivenNormals:
                 f"normal returned shape {gradients.shape} for points of shape {points.shape}: "
                 "it must return the same shape."
             )
-        normals = normalised(gradients * self.around.scales)
+        normals = normalise(gradients * self.around.scales)
         inward = np.sum(normals * rays.directions, axis=1) < 0.0
         return np.where(inward[:, None], -normals, normals)
 
@@ -64,7 +64,7 @@ class SecantNormals:
         # Wide enough for the tolerance not to drown the difference.
         angle = np.clip(2.0 * np.sqrt(self.tolerance / rays.outside), 1e-3, 0.2)
         tangents = _tangents(rays.directions)
-        beside = _beside(rays.directions, tangents, angle).reshape(-1, d)
+        beside = _neighbouring_directions(rays.directions, tangents, angle).reshape(-1, d)
         each = 2 * (d - 1)
         distance = self._distances(beside, np.repeat(rays.outside, each), np.repeat(angle, each))
         rise = (distance.reshape(n, 2, d - 1) - rays.outside[:, None, None]) / angle[:, None, None]
@@ -73,7 +73,7 @@ class SecantNormals:
         known = np.isfinite(rise)
         slope = np.sum(rise, axis=1, where=known) / np.maximum(known.sum(axis=1), 1)
         slope = np.where(known.any(axis=(1, 2))[:, None], slope, np.nan)
-        return normalised(
+        return normalise(
             rays.directions - np.einsum("nj,njd->nd", slope, tangents) / rays.outside[:, None]
         )
 
@@ -89,7 +89,7 @@ class SecantNormals:
         rays = Brackets(directions, inside, marks[row, exits], labels[row, exits])
         meets = fails.any(axis=1)
         distances = np.full(n, np.inf)
-        distances[meets] = narrowed(self.around, rays.take(meets), self.tolerance).outside
+        distances[meets] = bisect_brackets(self.around, rays.take(meets), self.tolerance).outside
         return distances
 
 
@@ -99,13 +99,15 @@ def _tangents(directions: np.ndarray) -> np.ndarray:
     return full[:, 1:]
 
 
-def _beside(directions: np.ndarray, tangents: np.ndarray, angle: np.ndarray) -> np.ndarray:
+def _neighbouring_directions(
+    directions: np.ndarray, tangents: np.ndarray, angle: np.ndarray
+) -> np.ndarray:
     """Directions turned by an angle (n,) along each tangent, then against; (n, 2 (d − 1), d)."""
     ways = np.concatenate([tangents, -tangents], axis=1)
-    return normalised(directions[:, None] + np.tan(angle)[:, None, None] * ways)
+    return normalise(directions[:, None] + np.tan(angle)[:, None, None] * ways)
 
 
-def turned(
+def descend_rays(
     around: Surroundings, rays: Brackets, normals_of: GivenNormals | SecantNormals, tolerance: float
 ) -> tuple[Brackets, np.ndarray]:
     """Turns each ray towards the boundary's normal while that brings the boundary nearer.
@@ -130,9 +132,9 @@ def turned(
         if not k.size:
             break
         old = rays.take(k)
-        tried = _between(old, normals[k], length[k])
+        tried = _intermediate_directions(old, normals[k], length[k])
         if normals_of.polls:
-            tried = np.concatenate([tried, _around(old, _POLL * length[k], random)], axis=1)
+            tried = np.concatenate([tried, _perturbed_rays(old, _POLL * length[k], random)], axis=1)
         new = nearest_of(around, tried, old.outside, tolerance)
         found = np.isfinite(new.outside)
         length[k] *= 0.5
@@ -149,17 +151,17 @@ def turned(
     return rays, angle
 
 
-def _between(rays: Brackets, normals: np.ndarray, length: np.ndarray) -> np.ndarray:
+def _intermediate_directions(rays: Brackets, normals: np.ndarray, length: np.ndarray) -> np.ndarray:
     """Directions part of the way to the normals, and beyond; shape (n, turns, d)."""
     parts = np.multiply.outer(length, _TURNS)[:, :, None]
-    return normalised(rays.directions[:, None] + parts * (normals - rays.directions)[:, None])
+    return normalise(rays.directions[:, None] + parts * (normals - rays.directions)[:, None])
 
 
-def _around(rays: Brackets, angle: np.ndarray, random: np.random.Generator) -> np.ndarray:
+def _perturbed_rays(rays: Brackets, angle: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """Directions at an angle (n,) to the rays, another way each time; shape (n, 2 (d − 1), d)."""
     tangents = _tangents(rays.directions)
     basis = np.linalg.qr(random.normal(size=(tangents.shape[1],) * 2))[0]
-    return _beside(rays.directions, basis @ tangents, angle)
+    return _neighbouring_directions(rays.directions, basis @ tangents, angle)
 
 
 def _angle(rays: Brackets, normals: np.ndarray) -> np.ndarray:

@@ -1,11 +1,11 @@
-"""Rays from a gait outward, and where along them the label changes."""
+"""Rays from a gait outward, and the brackets in which the label changes along them."""
 
 import dataclasses
 from typing import NamedTuple
 
 import numpy as np
 
-from jaxbiped.basins._label_oracle import Ask
+from jaxbiped.basins._label_oracle import LabelOracle
 
 _LOOK_ON = 1.5
 """Rays are followed this much farther than the first exit: a nearer one may lie beside them."""
@@ -50,7 +50,7 @@ class Surroundings:
         label: the origin's.
     """
 
-    ask: Ask
+    ask: LabelOracle
     origin: np.ndarray
     scales: np.ndarray
     label: int
@@ -84,7 +84,7 @@ def first_exits(around: Surroundings, directions: np.ndarray, distances: np.ndar
     return found
 
 
-def narrowed(around: Surroundings, rays: Brackets, tolerance: float) -> Brackets:
+def bisect_brackets(around: Surroundings, rays: Brackets, tolerance: float) -> Brackets:
     """The brackets halved, or split further where few are left, until none is wider than this."""
     while True:
         wide = rays.outside - rays.inside > tolerance

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.basins._arguments import check_box, check_whole
-from jaxbiped.basins._label_oracle import Ask, LabelOf
+from jaxbiped.basins._label_oracle import LabelOf, LabelOracle
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class RefinedBoundary:
         return grid[tuple(nearest)]
 
 
-def refined_boundary(
+def refine_boundary(
     label_of: LabelOf,
     lower: npt.ArrayLike,
     upper: npt.ArrayLike,
@@ -134,7 +134,7 @@ def refined_boundary(
         raise ArgumentError(
             f"levels = {levels} is not allowed: the finest grid must have fewer than 2^62 points."
         )
-    lattice = _Lattice(Ask(label_of, batch), low, high, [n << levels for n in coarse])
+    lattice = _Lattice(LabelOracle(label_of, batch), low, high, [n << levels for n in coarse])
     corners = np.asarray(list(itertools.product((0, 1), repeat=low.size)))
     cells = np.indices(coarse).reshape(low.size, -1).T
     found = []
@@ -165,7 +165,7 @@ def _places(
 class _Lattice:
     """Labels of the finest lattice's points: asked for once, then remembered by number."""
 
-    def __init__(self, ask: Ask, lower: np.ndarray, upper: np.ndarray, across: list[int]):
+    def __init__(self, ask: LabelOracle, lower: np.ndarray, upper: np.ndarray, across: list[int]):
         self.ask = ask
         self.lower, self.upper = lower, upper
         self.across = np.asarray(across)

@@ -12,7 +12,7 @@ def spread_points(count: int, d: int) -> np.ndarray:
     return points + 0.5 ** (bits + 1)
 
 
-def normalised(vectors: np.ndarray) -> np.ndarray:
+def normalise(vectors: np.ndarray) -> np.ndarray:
     """Unit vectors along the last axis; NaN where a vector has no direction."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
@@ -28,4 +28,4 @@ def spread_directions(count: int, d: int) -> np.ndarray:
     axes = np.concatenate([np.eye(d), -np.eye(d)])
     if d == 1 or count <= 2 * d:
         return axes
-    return np.concatenate([axes, normalised(ndtri(spread_points(count - 2 * d, d)))])
+    return np.concatenate([axes, normalise(ndtri(spread_points(count - 2 * d, d)))])

@@ -8,9 +8,9 @@ import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.basins._arguments import check_box, check_label_grid, check_vector, check_whole
-from jaxbiped.basins._label_oracle import Ask, LabelOf
-from jaxbiped.basins._power_law import fitted_exponent
-from jaxbiped.basins._spherical_points import normalised, spread_points
+from jaxbiped.basins._label_oracle import LabelOf, LabelOracle
+from jaxbiped.basins._power_law import fit_exponent
+from jaxbiped.basins._spherical_points import normalise, spread_points
 
 
 class Uncertainty(NamedTuple):
@@ -108,11 +108,11 @@ def sampled_uncertainty(
     if parts[-1] >= 0.5:
         raise ArgumentError(f"distances holds {parts[-1]:g}: each must be below 0.5.")
     d = low.size
-    ask = Ask(label_of, batch)
+    ask = LabelOracle(label_of, batch)
     spread = spread_points(check_whole("samples", samples, 1), 2 * d)
     # Starts keep from the box's faces, so that none is asked for outside.
     centres = parts[-1] + (1.0 - 2.0 * parts[-1]) * spread[:, :d]
-    ways = normalised(ndtri(spread[:, d:]))
+    ways = normalise(ndtri(spread[:, d:]))
     shifts = np.concatenate([[0.0], parts, -parts])
     starts = (centres + shifts[:, None, None] * ways).reshape(-1, d)
     labels = ask(low + starts * (high - low)).reshape(len(shifts), samples)
@@ -121,5 +121,5 @@ def sampled_uncertainty(
 
 
 def _result(distances: np.ndarray, fractions: np.ndarray, d: int) -> Uncertainty:
-    slope = fitted_exponent(distances, fractions, "labels")
+    slope = fit_exponent(distances, fractions, "labels")
     return Uncertainty(slope.estimate, slope.error, d - slope.estimate, distances, fractions)

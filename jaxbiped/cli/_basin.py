@@ -24,7 +24,7 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._cluster import cluster_executor, local_executor
-from jaxbiped.sweep._labelling import Labelling, checked_effort
+from jaxbiped.sweep._labelling import Labelling, effort_of
 from jaxbiped.sweep._prepare import labelling
 from jaxbiped.sweep._sweep import CHUNK, sweep
 from jaxbiped.sweep._zarr_store import check_store
@@ -100,7 +100,7 @@ class Basin:
             accuracy=self.sweep.accuracy,
             engine=self.sweep.engine,
         )
-        effort = checked_effort(scene, **how)
+        effort = effort_of(scene, **how)
         check_count("chunk", self.sweep.chunk)
         self.output.check()
         if self.sweep.store is not None:
@@ -131,7 +131,7 @@ class Basin:
         _print(report, numbers)
         if self.output.out is not None:
             with stage("drawing the basin"):
-                paths = _written(found, known, starts, self.output.out)
+                paths = _write_results(found, known, starts, self.output.out)
             for path in paths:
                 report.say(f"wrote {path}")
         numbers["wall_s"] = time.perf_counter() - _clock.IMPORT_BEGAN
@@ -197,7 +197,7 @@ def _at(parameters: dict[str, float]) -> str:
     return "".join(f", {name} {value:.4g}" for name, value in parameters.items())
 
 
-def _written(
+def _write_results(
     found: "xarray.Dataset", known: Labelling, starts: AbstractStarts, out: Path
 ) -> list[Path]:
     """Writes the results, and the picture where there are two axes; returns the paths."""

@@ -74,7 +74,7 @@ class StartsOptions:
         named = [text for text in (*self.more, self.y, self.x) if text is not None]
         axes: dict[str, tuple[float, float, int]] = {}
         for text in named or reversed(usual):
-            name, axis = parsed_axis(text)
+            name, axis = parse_axis(text)
             check_coordinates(scene, [name])
             if name in axes:
                 raise ArgumentError(f"{name} is named by two axes: each needs its own.")
@@ -82,7 +82,7 @@ class StartsOptions:
         return axes
 
 
-def parsed_axis(text: str) -> tuple[str, tuple[float, float, int]]:
+def parse_axis(text: str) -> tuple[str, tuple[float, float, int]]:
     """Name, first, last and count of an axis, from name=first:last:count."""
     match = re.fullmatch(r"([\w.-]+)=([^:]+):([^:]+):([^:]+)", text.strip())
     try:

@@ -1,4 +1,4 @@
-"""What `jaxbiped walk` says of a hip held together by constraints."""
+"""Constraint report of `jaxbiped walk`: violations of the hip's constraints."""
 
 from typing import Any
 

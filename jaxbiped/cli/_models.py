@@ -84,7 +84,7 @@ def _rung(name: str, scene: Scene | RigidScene) -> dict[str, Any]:
 def _print(report: Report, numbers: dict[str, Any]) -> None:
     for kind in ("normal", "friction"):
         rows = [
-            (law["name"], str(law["operations"]), _shown(law["parameters"]))
+            (law["name"], str(law["operations"]), _format(law["parameters"]))
             for law in numbers[kind]
         ]
         width = max(len(row[0]) for row in rows)
@@ -97,7 +97,7 @@ def _print(report: Report, numbers: dict[str, Any]) -> None:
     report.say("operations: of one evaluation of the vector field, equal ones shared")
 
 
-def _shown(parameters: dict[str, Any]) -> str:
+def _format(parameters: dict[str, Any]) -> str:
     if not parameters:
         return "none"
     return ", ".join(

@@ -64,7 +64,7 @@ class Walk:
             request = self._request(scene, state)
         self.output.check()
         began = time.perf_counter()
-        trajectory, seconds = _simulated(request)
+        trajectory, seconds = _simulate(request)
         wall = {
             "import": imported - _clock.IMPORT_BEGAN,
             "compile": time.perf_counter() - began - seconds,
@@ -126,7 +126,7 @@ class Walk:
         report.finish(numbers)
 
 
-def _simulated(request: Simulation) -> tuple[Trajectory, float]:
+def _simulate(request: Simulation) -> tuple[Trajectory, float]:
     """The trajectory, and how long the solve took once it was compiled [s]."""
     most = room = request.max_solver_steps
     if request.engine == "xla" and request.dt is None:

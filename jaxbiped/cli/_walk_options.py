@@ -127,7 +127,7 @@ class SceneOptions:
     def _compliant(self) -> Scene:
         own = seed_scene(**{name: getattr(self, name) for name in _SEED})
         normal = normal_law_like(
-            _known("normal", self.normal, NORMAL_LAWS),
+            _known_name("normal", self.normal, NORMAL_LAWS),
             K=self.K,
             c=self.c,
             n=self.n,
@@ -135,7 +135,7 @@ class SceneOptions:
             g=self.g,
         )
         friction = friction_law_like(
-            _known("friction", self.friction, FRICTION_LAWS),
+            _known_name("friction", self.friction, FRICTION_LAWS),
             mu_static=self.mu_static,
             mu_kinetic=self.mu_kinetic,
             v0=self.v0,
@@ -156,7 +156,7 @@ class SceneOptions:
         return RigidScene(walker=Walker(**body), ground=Ground(slope=self.slope, g=self.g))
 
 
-def _known(name: str, value: str, known: Iterable[str]) -> str:
+def _known_name(name: str, value: str, known: Iterable[str]) -> str:
     check_choice(name, value, known)
     return value
 

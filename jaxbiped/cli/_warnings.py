@@ -1,4 +1,4 @@
-"""What `jaxbiped walk` warns of: a walk that is no walk, and numbers not to be relied on."""
+"""Warnings of `jaxbiped walk`: a walk that is no walk, numbers not to be relied on."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""What a method must tell that holds constraints in redundant coordinates."""
+"""Constraint methods: the interface of what holds constraints in redundant coordinates."""
 
 import abc
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import equinox as eqx
 
 from jaxbiped._types import Scalar
-from jaxbiped.linalg._symmetric import factorised, solved
+from jaxbiped.linalg._symmetric import factorise, solve
 from jaxbiped.scene._parameter import check_parameters
 
 if TYPE_CHECKING:
@@ -110,10 +110,10 @@ def inverse_masses(masses: list[Scalar]) -> list[Scalar]:
 def exact_multipliers(system: Constrained, right: list[Scalar] | None = None) -> list[Scalar]:
     """λ with (J M⁻¹ Jᵀ) λ = right, the free residual unless given."""
     right = free_residual(system) if right is None else right
-    return solved(factorised(gram(system.rows, inverse_masses(system.masses))), right)
+    return solve(factorise(gram(system.rows, inverse_masses(system.masses))), right)
 
 
-def moved_by(rows: list[Row], weights: list[Scalar], multipliers: list[Scalar]) -> Row:
+def applied_impulse(rows: list[Row], weights: list[Scalar], multipliers: list[Scalar]) -> Row:
     """−W Jᵀ μ, for the coordinates that any constraint knows."""
     moves: Row = {}
     for row, value in zip(rows, multipliers, strict=True):
@@ -125,4 +125,4 @@ def moved_by(rows: list[Row], weights: list[Scalar], multipliers: list[Scalar]) 
 
 def projection(rows: list[Row], weights: list[Scalar], residual: list[Scalar]) -> Row:
     """−W Jᵀ(J W Jᵀ)⁻¹ r for a diagonal W."""
-    return moved_by(rows, weights, solved(factorised(gram(rows, weights)), residual))
+    return applied_impulse(rows, weights, solve(factorise(gram(rows, weights)), residual))

@@ -1,4 +1,4 @@
-"""The seven methods by the paper's names."""
+"""Constraint methods by the paper's names."""
 
 from jaxbiped._checks import check_choice
 from jaxbiped.constraints._augmented import Augmented

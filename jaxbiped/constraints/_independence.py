@@ -1,4 +1,4 @@
-"""Whether a linkage's constraints are independent."""
+"""Independence of a linkage's constraints."""
 
 from collections.abc import Sequence
 

@@ -10,12 +10,15 @@ from jaxbiped.constraints._constraint_method import (
     AbstractProjectingMethod,
     Constrained,
     Row,
+    applied_impulse,
     gram,
     inverse_masses,
-    moved_by,
 )
-from jaxbiped.constraints._penalised import augmented_multipliers, repeated
-from jaxbiped.linalg._symmetric import factorised
+from jaxbiped.constraints._penalised import (
+    augmented_multipliers,
+    iterate_multipliers,
+)
+from jaxbiped.linalg._symmetric import factorise
 from jaxbiped.scene._parameter import parameter
 
 
@@ -53,6 +56,6 @@ class Index1Augmented(AbstractProjectingMethod):
 
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
         weights = inverse_masses(masses)
-        factors = factorised(gram(rows, weights, 1.0 / self.A))
-        found = repeated(factors, gram(rows, weights), residual, self.iterations)
-        return moved_by(rows, weights, found)
+        factors = factorise(gram(rows, weights, 1.0 / self.A))
+        found = iterate_multipliers(factors, gram(rows, weights), residual, self.iterations)
+        return applied_impulse(rows, weights, found)

@@ -120,7 +120,7 @@ def constraints_of(
             continue
         other = point_of(linkage, q, headings, joint.body_2, joint.point_2)
         violation += [one.x - other.x, one.z - other.z]
-        rows += [one.row_x | _minus(other.row_x), one.row_z | _minus(other.row_z)]
+        rows += [one.row_x | _subtract(other.row_x), one.row_z | _subtract(other.row_z)]
         bias += [other.bend_x - one.bend_x, other.bend_z - one.bend_z]
     if linkage.orientation == "euler":
         for body in range(len(linkage.bodies)):
@@ -128,10 +128,10 @@ def constraints_of(
             violation.append(q[c] * q[c] + q[s] * q[s] - 1.0)
             rows.append({c: 2.0 * q[c], s: 2.0 * q[s]})
             bias.append(-2.0 * (v[c] * v[c] + v[s] * v[s]))
-    return Constraints(violation, [along(row, v) for row in rows], rows, bias)
+    return Constraints(violation, [row_times(row, v) for row in rows], rows, bias)
 
 
-def along(row: Row, v: Sequence[Scalar]) -> Scalar:
+def row_times(row: Row, v: Sequence[Scalar]) -> Scalar:
     """A row of J times a vector."""
     terms = [entry * v[c] for c, entry in row.items()]
     return sum(terms[1:], terms[0])
@@ -174,5 +174,5 @@ def _by_euler(first: int, own: Sequence[Scalar], rates: Sequence[Scalar]) -> Hea
     )
 
 
-def _minus(row: Row) -> Row:
+def _subtract(row: Row) -> Row:
     return {c: -entry for c, entry in row.items()}

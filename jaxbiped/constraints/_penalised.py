@@ -1,8 +1,8 @@
-"""What the methods with a penalty have in common."""
+"""Penalty and augmented Lagrangian systems, shared by the methods that use them."""
 
 from jaxbiped._types import Scalar
 from jaxbiped.constraints._constraint_method import Constrained, gram, inverse_masses, stabilised
-from jaxbiped.linalg._symmetric import Factors, factorised, solved
+from jaxbiped.linalg._symmetric import Factors, factorise, solve
 
 
 def penalty_system(
@@ -14,7 +14,7 @@ def penalty_system(
     whatever the constraints say, and is well conditioned where M + A JᵀJ is not.
     """
     right = stabilised(system, 2.0 * zeta * omega, omega * omega)
-    return factorised(gram(system.rows, inverse_masses(system.masses), 1.0 / A)), right
+    return factorise(gram(system.rows, inverse_masses(system.masses), 1.0 / A)), right
 
 
 def augmented_multipliers(
@@ -22,10 +22,12 @@ def augmented_multipliers(
 ) -> list[Scalar]:
     """λ of the augmented Lagrangian: the penalty's, and again for what that leaves."""
     factors, right = penalty_system(system, A, omega, zeta)
-    return repeated(factors, gram(system.rows, inverse_masses(system.masses)), right, iterations)
+    return iterate_multipliers(
+        factors, gram(system.rows, inverse_masses(system.masses)), right, iterations
+    )
 
 
-def repeated(
+def iterate_multipliers(
     factors: Factors,
     matrix: list[list[Scalar]],
     right: list[Scalar],
@@ -36,12 +38,12 @@ def repeated(
     An error of λ that the constraints feel shrinks by 1/(1 + A s) each time, s the eigenvalue of S
     that it belongs to.
     """
-    found = solved(factors, right)
+    found = solve(factors, right)
     size = len(right)
     for _ in range(iterations - 1):
         left = []
         for i in range(size):
             row = [matrix[max(i, j)][min(i, j)] * found[j] for j in range(size)]
             left.append(right[i] - sum(row[1:], row[0]))
-        found = [x + dx for x, dx in zip(found, solved(factors, left), strict=True)]
+        found = [x + dx for x, dx in zip(found, solve(factors, left), strict=True)]
     return found

@@ -5,7 +5,7 @@ from typing import ClassVar
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
 from jaxbiped.constraints._penalised import penalty_system
-from jaxbiped.linalg._symmetric import solved
+from jaxbiped.linalg._symmetric import solve
 from jaxbiped.scene._parameter import parameter
 
 
@@ -38,4 +38,4 @@ class Penalty(AbstractConstraintMethod):
     needs_independent: ClassVar[bool] = False
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
-        return solved(*penalty_system(system, self.A, self.omega, self.zeta))
+        return solve(*penalty_system(system, self.A, self.omega, self.zeta))

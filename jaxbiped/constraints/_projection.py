@@ -1,4 +1,4 @@
-"""Taking coordinates and rates back to the constraints."""
+"""Projection of coordinates and rates onto the constraints."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,19 +10,19 @@ from jaxbiped._types import Scalar
 from jaxbiped.constraints._constraint_method import (
     AbstractProjectingMethod,
     Row,
+    applied_impulse,
     gram,
     inverse_masses,
-    moved_by,
 )
 from jaxbiped.constraints._linkage import Linkage
-from jaxbiped.constraints._linkage_constraints import along, constraints_of, masses_of
-from jaxbiped.linalg._symmetric import factorised, solved
+from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of, row_times
+from jaxbiped.linalg._symmetric import factorise, solve
 
 _ITERATIONS = 12
 """Of the search for the nearest consistent state: a tenth of a metre is taken off to rounding."""
 
 
-def stepped_back(
+def correct_step(
     linkage: Linkage,
     method: AbstractProjectingMethod,
     q: Sequence[Scalar],
@@ -35,13 +35,13 @@ def stepped_back(
     masses, q, v = masses_of(linkage), list(q), list(v)
     for _ in range(method.iterations):
         at = constraints_of(linkage, q, v)
-        q = _moved(q, method.step_back(masses, at.rows, at.violation))
+        q = _add(q, method.step_back(masses, at.rows, at.violation))
     at = constraints_of(linkage, q, v)
-    return q, _moved(v, method.step_back(masses, at.rows, at.rate))
+    return q, _add(v, method.step_back(masses, at.rows, at.rate))
 
 
 @eqx.filter_jit
-def nearest(
+def nearest_consistent(
     linkage: Linkage, q: Sequence[Scalar], v: Sequence[Scalar]
 ) -> tuple[list[Scalar], list[Scalar]]:
     """The consistent coordinates and rates nearest in the mass metric.
@@ -55,20 +55,22 @@ def nearest(
         # Shifted by nearly nothing, so that constraints that say the same twice share.
         matrix = gram(rows, weights)
         shift = 1e-14 * sum((matrix[i][i] for i in range(1, len(matrix))), matrix[0][0])
-        return moved_by(rows, weights, solved(factorised(gram(rows, weights, shift)), residual))
+        return applied_impulse(
+            rows, weights, solve(factorise(gram(rows, weights, shift)), residual)
+        )
 
     def nearer(_: Any, q: list[Scalar]) -> list[Scalar]:
         at = constraints_of(linkage, q, v)
         gone = [a - b for a, b in zip(q, origin, strict=True)]
-        left = [off - along(row, gone) for off, row in zip(at.violation, at.rows, strict=True)]
-        return _moved(origin, least(at.rows, left))
+        left = [off - row_times(row, gone) for off, row in zip(at.violation, at.rows, strict=True)]
+        return _add(origin, least(at.rows, left))
 
     if not linkage.joints:
         return origin, list(v)
     found = jax.lax.fori_loop(0, _ITERATIONS, nearer, origin)
     at = constraints_of(linkage, found, v)
-    return found, _moved(v, least(at.rows, at.rate))
+    return found, _add(v, least(at.rows, at.rate))
 
 
-def _moved(values: Sequence[Scalar], moves: Row) -> list[Scalar]:
+def _add(values: Sequence[Scalar], moves: Row) -> list[Scalar]:
     return [value + moves[i] if i in moves else value for i, value in enumerate(values)]

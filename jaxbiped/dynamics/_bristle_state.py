@@ -1,4 +1,4 @@
-"""The state of a walker whose friction remembers."""
+"""State of a walker with bristle friction."""
 
 from typing import Any, NamedTuple
 
@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._state import State, checked_state
+from jaxbiped.dynamics._state import State, check_state
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
@@ -45,7 +45,7 @@ def state_for(scene: Scene, state: Any, name: str = "state") -> Any:
     """
     kind = state_type(scene)
     if kind is BristleState and isinstance(state, State):
-        state = checked_state(state, State, name)
+        state = check_state(state, State, name)
         straight = jnp.zeros_like(state.hip_x)
         return BristleState(**state._asdict(), bristle_1=straight, bristle_2=straight)
     if kind is State and isinstance(state, BristleState):
@@ -53,4 +53,4 @@ def state_for(scene: Scene, state: Any, name: str = "state") -> Any:
             f"{name} has bristles, but friction = {type(scene.friction).__name__} has none: give a "
             "State."
         )
-    return checked_state(state, kind, name)
+    return check_state(state, kind, name)

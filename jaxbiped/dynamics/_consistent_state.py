@@ -1,4 +1,4 @@
-"""Redundant states on their constraints: after each step, and at the start."""
+"""Consistent redundant states: on their constraints after each step, and at the start."""
 
 from typing import Any, NamedTuple
 
@@ -8,7 +8,7 @@ from jaxbiped._checks import ArgumentError, holds_somewhere
 from jaxbiped._types import Scalar
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
 from jaxbiped.constraints._linkage_constraints import masses_of
-from jaxbiped.constraints._projection import nearest, stepped_back
+from jaxbiped.constraints._projection import correct_step, nearest_consistent
 from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._redundant_motion import (
     Violation,
@@ -22,7 +22,7 @@ from jaxbiped.dynamics._redundant_state import (
     is_redundant,
     redundant_state,
 )
-from jaxbiped.dynamics._state import checked_leaves
+from jaxbiped.dynamics._state import check_leaves
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
@@ -58,7 +58,7 @@ def project(scene: RedundantScene, state: Any) -> Any:
             f"method = {type(method).__name__} is not allowed here: it does not project."
         )
     q, v = coordinates_of(scene, state)
-    return with_coordinates(state, *stepped_back(scene.linkage, method, q, v))
+    return with_coordinates(state, *correct_step(scene.linkage, method, q, v))
 
 
 def consistent_state(
@@ -78,7 +78,7 @@ def consistent_state(
         ArgumentError: not a state of the scene's kind, an entry that is not finite, leaves of
             different shapes, or a start too far off. What is being traced is not refused.
     """
-    state = _of_the_scene(scene, state)
+    state = _check_state_of_scene(scene, state)
     off = violation(scene, state)
     units = {"position": "m", "rate": "m/s", "normalisation": "(no unit)"}
     for name, unit in units.items():
@@ -90,7 +90,7 @@ def consistent_state(
             )
     q, v = coordinates_of(scene, state)
     masses = masses_of(scene.linkage)
-    new_q, new_v = nearest(scene.linkage, q, v)
+    new_q, new_v = nearest_consistent(scene.linkage, q, v)
 
     def size(new: list[Scalar], old: list[Scalar]) -> Scalar:
         moved = [m * (a - b) ** 2 for m, a, b in zip(masses, new, old, strict=True)]
@@ -99,7 +99,7 @@ def consistent_state(
     return Consistent(with_coordinates(state, new_q, new_v), off, size(new_q, q), size(new_v, v))
 
 
-def _of_the_scene(scene: RedundantScene, state: Any) -> Any:
+def _check_state_of_scene(scene: RedundantScene, state: Any) -> Any:
     if not is_redundant(state):
         return redundant_state(scene, state_for(scene.scene, state))
     kind = EulerState if scene.orientation == "euler" else RedundantState
@@ -117,4 +117,4 @@ def _of_the_scene(scene: RedundantScene, state: Any) -> Any:
             f"state has bristles, but friction = {type(scene.friction).__name__} has none: leave "
             "them None."
         )
-    return checked_leaves(state, "state")
+    return check_leaves(state, "state")

@@ -38,7 +38,7 @@ class LinkageMotion(NamedTuple):
     violation: list[Scalar]
 
 
-def moved_under(
+def motion_under(
     linkage: Linkage,
     method: AbstractConstraintMethod,
     q: Sequence[Scalar],
@@ -66,7 +66,7 @@ def linkage_motion(scene: LinkageScene, state: LinkageState) -> LinkageMotion:
     for body in linkage.bodies:
         weight = [body.mass * g for g in scene.gravity]
         applied += [*weight, *[0.0 * body.mass] * (linkage.coordinates - 2)]
-    return moved_under(linkage, scene.method, state.q, state.v, applied)
+    return motion_under(linkage, scene.method, state.q, state.v, applied)
 
 
 def linkage_field(t: Any, state: LinkageState, scene: LinkageScene) -> LinkageState:

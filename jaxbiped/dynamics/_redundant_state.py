@@ -1,4 +1,4 @@
-"""The state of a walker whose legs have coordinates of their own."""
+"""State in redundant coordinates: each leg has its own."""
 
 from typing import Any, NamedTuple
 

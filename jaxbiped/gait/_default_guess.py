@@ -1,4 +1,4 @@
-"""Where a search begins that was given no guess."""
+"""Default initial guess of a search."""
 
 import functools
 from typing import Any
@@ -17,7 +17,7 @@ from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
 
 
-def seed_start(scene: Any) -> Any:
+def default_guess(scene: Any) -> Any:
     """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight."""
     seed, own = _seed()
     if isinstance(scene, RigidScene):

@@ -1,4 +1,4 @@
-"""The search for a periodic orbit: a fixed point of the return map."""
+"""Fixed points of the return map: the search for a periodic orbit."""
 
 import enum
 from collections.abc import Callable
@@ -9,8 +9,22 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._newton import Method, Progress, Stage, begun, chosen, progressed
-from jaxbiped.gait._poincare_map import Turn, Turning, recurring_of, seeded, state_with, turn
+from jaxbiped.gait._newton import (
+    Method,
+    Progress,
+    Stage,
+    initial_progress,
+    newton_iteration,
+    select,
+)
+from jaxbiped.gait._poincare_map import (
+    LinearisedReturn,
+    ReturnMapSpec,
+    linearised_return,
+    recurring_components,
+    seed_directions,
+    state_with,
+)
 from jaxbiped.gait._soundness import is_sound
 from jaxbiped.variational._solve_to_section import Precision
 
@@ -58,28 +72,28 @@ class Found(NamedTuple):
     code: Scalar
     recurring: Scalar
     residual: Scalar
-    both: Turn
+    both: LinearisedReturn
     turns: Scalar
     history: Scalar
     sound: Scalar
 
     @property
-    def last(self) -> Turn:
+    def last(self) -> LinearisedReturn:
         """The turn from the fixed point."""
         return jax.tree.map(lambda leaf: leaf[0], self.both)
 
     @property
-    def coarse(self) -> Turn:
+    def coarse(self) -> LinearisedReturn:
         """The looser one."""
         return jax.tree.map(lambda leaf: leaf[1], self.both)
 
 
-Run = Callable[[Scalar, Scalar, Scalar], Turn]
+Run = Callable[[Scalar, Scalar, Scalar], LinearisedReturn]
 """The turn from recurring components, as exactly as a stage wants, or none where idle."""
 
 
 def search(
-    turning: Turning,
+    spec: ReturnMapSpec,
     args: PyTree,
     active: tuple[int, ...],
     guess: PyTree,
@@ -91,14 +105,14 @@ def search(
 
     Not at all where not `wanted`.
     """
-    first = recurring_of(turning.system, guess)
-    off = jnp.abs(turning.section.value(args, guess))
-    run = _runner(turning, args, active, guess, precision)
-    shape: Turn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
+    first = recurring_components(spec.system, guess)
+    off = jnp.abs(spec.section.value(args, guess))
+    run = _runner(spec, args, active, guess, precision)
+    shape: LinearisedReturn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
     nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
-    begin = begun(first, off, method, nothing)
+    begin = initial_progress(first, off, method, nothing)
     stage = jnp.where(wanted, begin.stage, int(Stage.STUCK))
-    end = _advanced(run, begin._replace(stage=stage), method)
+    end = _iterate(run, begin._replace(stage=stage), method)
     ending = jnp.where(
         end.stage == Stage.FOUND,
         int(Search.FOUND),
@@ -112,41 +126,41 @@ def search(
         both=jax.tree.map(lambda *pair: jnp.stack(pair), end.base_turn, end.coarse),
         turns=end.turns,
         history=end.history,
-        sound=_sound(turning, args, guess, end),
+        sound=_with_soundness(spec, args, guess, end),
     )
 
 
-def _sound(turning: Turning, args: PyTree, guess: PyTree, end: Progress) -> Scalar:
-    state, last = state_with(turning.system, guess, end.base), end.base_turn
+def _with_soundness(spec: ReturnMapSpec, args: PyTree, guess: PyTree, end: Progress) -> Scalar:
+    state, last = state_with(spec.system, guess, end.base), end.base_turn
     # Not every system has a component that drifts.
     return is_sound(args, state, jnp.sum(last.advance), last.period)
 
 
 def _runner(
-    turning: Turning,
+    spec: ReturnMapSpec,
     args: PyTree,
     active: tuple[int, ...],
     guess: PyTree,
     precision: Precision,
 ) -> Run:
     """Turns with derivatives by the state, and once it is near by the `active` parameters."""
-    seeds, _ = seeded(args, active, len(recurring_of(turning.system, guess)))
+    seeds, _ = seed_directions(args, active, len(recurring_components(spec.system, guess)))
     coarse = Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
 
-    def run(trial: Scalar, stage: Scalar, idle: Scalar) -> Turn:
+    def run(trial: Scalar, stage: Scalar, idle: Scalar) -> LinearisedReturn:
         wanted = Precision(
             *(
                 jnp.where(stage == Stage.FINE, a, jnp.where(stage == Stage.COARSE, b, c))
                 for a, b, c in zip(precision, coarse, ROUGH, strict=True)
             )
         )
-        start = state_with(turning.system, guess, trial)
-        return turn(turning, seeds, start, wanted, idle, steered=stage >= Stage.COARSE)
+        start = state_with(spec.system, guess, trial)
+        return linearised_return(spec, seeds, start, wanted, idle, steered=stage >= Stage.COARSE)
 
     return run
 
 
-def _advanced(run: Run, begin: Progress, method: Method) -> Progress:
+def _iterate(run: Run, begin: Progress, method: Method) -> Progress:
     """Searches on until it has ended or the turns are used up."""
 
     def goes_on(now: Progress) -> Scalar:
@@ -155,6 +169,6 @@ def _advanced(run: Run, begin: Progress, method: Method) -> Progress:
     def advance(now: Progress) -> Progress:
         on = goes_on(now)
         latest = run(now.trial, now.stage, ~on)
-        return chosen(on, progressed(now, latest, method), now)
+        return select(on, newton_iteration(now, latest, method), now)
 
     return jax.lax.while_loop(goes_on, advance, begin)

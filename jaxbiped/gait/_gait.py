@@ -1,4 +1,4 @@
-"""What is known of a periodic gait, found or not."""
+"""Periodic gait: its state, measures, stability and sensitivities, found or not."""
 
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ from jaxbiped.compiler import Recording
 from jaxbiped.gait._fixed_point_search import Found, Search
 from jaxbiped.gait._orbit import Orbit, orbit_of
 from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
-from jaxbiped.gait._poincare_map import Turn, Turning
+from jaxbiped.gait._poincare_map import LinearisedReturn, ReturnMapSpec
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._parameters import parameter_quantities
 from jaxbiped.solve._ending import Ending
@@ -142,8 +142,8 @@ class Gait(eqx.Module):
 
 
 @eqx.filter_jit
-def described(
-    turning: Turning,
+def summarise_gait(
+    spec: ReturnMapSpec,
     scene: Any,
     start: Any,
     found: Found,
@@ -153,7 +153,7 @@ def described(
     origin: Origin,
 ) -> Gait:
     """The gait that a search from `start` found, with its stability and its derivatives."""
-    orbit = orbit_of(turning, scene, active, start, found, radius=radius)
+    orbit = orbit_of(spec, scene, active, start, found, radius=radius)
     stability = orbit.stability
     last, m = found.last, found.recurring.shape[0]
     lost = found.ending == int(Search.NO_RETURN)
@@ -201,12 +201,12 @@ def described(
         origin=jtu.tree_map(jnp.asarray, origin),
         orbit=_path(last, start),
         parameters=names,
-        engine=turning.engine,
+        engine=spec.engine,
         quantities=tuple(map(parameter_quantities(scene).__getitem__, names)),
     )
 
 
-def _path(last: Turn, like: Any) -> tuple[Scalar, Any]:
+def _path(last: LinearisedReturn, like: Any) -> tuple[Scalar, Any]:
     """Times and states of a cycle's nodes, leaves of shape (footsteps, nodes); NaN beyond them."""
     nodes = last.nodes
     assert nodes is not None

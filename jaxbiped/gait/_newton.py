@@ -1,4 +1,4 @@
-"""Newton's method with affine-invariant damping: a turn is judged, the next trial proposed.
+"""Newton's method with affine-invariant damping: a trial is judged, the next one proposed.
 
 A step is measured by Newton's own correction ("natural level function"), not by the residual: the
 fast directions of contact make the residual a poor guide. Deuflhard, Newton Methods for Nonlinear
@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import optax
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._poincare_map import Turn
-from jaxbiped.linalg._small_matrices import solved
+from jaxbiped.gait._poincare_map import LinearisedReturn
+from jaxbiped.linalg._small_matrices import solve
 
 _NEAR, _NEARER = 1e-3, 1e-4
 """Residuals at which rough solves give way to coarse ones, and these to fine ones."""
@@ -78,16 +78,18 @@ class Progress(NamedTuple):
     base_residual: Scalar
     slope: Scalar
     step: Scalar
-    base_turn: Turn
+    base_turn: LinearisedReturn
     damping: Scalar
-    coarse: Turn
+    coarse: LinearisedReturn
     optimiser: Any
     code: Scalar
     turns: Scalar
     history: Scalar
 
 
-def begun(first: Scalar, off: Scalar, method: Method, nothing: Turn) -> Progress:
+def initial_progress(
+    first: Scalar, off: Scalar, method: Method, nothing: LinearisedReturn
+) -> Progress:
     """Before the first turn, from components that are `off` the section by so much.
 
     `nothing` is in the place of a turn.
@@ -111,7 +113,7 @@ def begun(first: Scalar, off: Scalar, method: Method, nothing: Turn) -> Progress
     )
 
 
-def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
+def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) -> Progress:
     """One turn further: judge the trial, and propose the next."""
     returned = latest.code == 0
     change = latest.recurring - now.trial
@@ -122,14 +124,14 @@ def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
         forward = jnp.asarray(True)
         simplified = jnp.zeros_like(change)
     else:
-        simplified = -solved(now.slope, change)
+        simplified = -solve(now.slope, change)
         forward = jnp.isinf(now.base_residual) | (_size(simplified) < _size(now.step))
     better = returned & ~approaching & forward
 
     base = jnp.where(better, now.trial, now.base)
     base = jnp.where(approaching & returned, latest.recurring, base)
     m = len(base)
-    base_residual, slope, base_turn = chosen(
+    base_residual, slope, base_turn = select(
         better,
         (residual, latest.jacobian[:, :m] - jnp.eye(m), latest),
         (now.base_residual, now.slope, now.base_turn),
@@ -140,11 +142,11 @@ def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
     fine_done = (now.stage == Stage.FINE) & (base_residual <= method.residual)
     nowhere = ~returned & ~jnp.isfinite(base_residual) & (now.stage < Stage.COARSE)
     if method.optimiser is not None:
-        step, optimiser = _optimised(now, base, change, slope, better, method.optimiser)
+        step, optimiser = _descent_step(now, base, change, slope, better, method.optimiser)
         damping = jnp.asarray(1.0)
     else:
-        step = jnp.where(better, -solved(slope, change), now.step)
-        damping, optimiser = _damped(now, step, simplified, returned, better), now.optimiser
+        step = jnp.where(better, -solve(slope, change), now.step)
+        damping, optimiser = _damping_factor(now, step, simplified, returned, better), now.optimiser
     damping = jnp.where(refined | approaching, 1.0, damping)
     stuck = (damping < _SMALLEST_DAMPING) | (better & ~jnp.all(jnp.isfinite(step)))
     stage = jnp.where(approaching, int(Stage.ROUGH), now.stage)
@@ -163,7 +165,7 @@ def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
         step=step,
         base_turn=base_turn,
         damping=damping,
-        coarse=chosen(coarse_done, base_turn, now.coarse),
+        coarse=select(coarse_done, base_turn, now.coarse),
         optimiser=optimiser,
         code=jnp.where(returned, now.code, latest.code),
         turns=now.turns + 1,
@@ -171,7 +173,7 @@ def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
     )
 
 
-def _damped(
+def _damping_factor(
     now: Progress, step: Scalar, simplified: Scalar, returned: Scalar, better: Scalar
 ) -> Scalar:
     """Share of `step` to try next, from what the last trial told of the map's nonlinearity."""
@@ -194,7 +196,7 @@ def _size(step: Scalar) -> Scalar:
     return jnp.sqrt(jnp.sum(step * step))
 
 
-def _optimised(
+def _descent_step(
     now: Progress,
     base: Scalar,
     change: Scalar,
@@ -210,6 +212,6 @@ def _optimised(
     return jnp.where(better, step, 0.5 * (now.trial - base)), state
 
 
-def chosen(condition: Scalar, new: Any, old: Any) -> Any:
+def select(condition: Scalar, new: Any, old: Any) -> Any:
     """One of two trees of the same structure."""
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b), new, old)

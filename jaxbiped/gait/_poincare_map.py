@@ -1,4 +1,4 @@
-"""One turn of an orbit with its derivatives: the return map and its Jacobian."""
+"""Poincaré map: one return to the section, with its Jacobian."""
 
 from typing import Any, NamedTuple
 
@@ -13,8 +13,13 @@ from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.solve._units import recurring_inverse_units
 from jaxbiped.variational._hybrid_system import AbstractSystem
-from jaxbiped.variational._section_by_lanes import passage_by_lanes
-from jaxbiped.variational._solve_to_section import Nodes, Passage, Precision, passage
+from jaxbiped.variational._section_by_lanes import solve_to_section_by_lanes
+from jaxbiped.variational._solve_to_section import (
+    Nodes,
+    Precision,
+    SectionArrival,
+    solve_to_section,
+)
 from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
 
@@ -24,7 +29,7 @@ PARAMETER_FLOOR = 1e-4
 """The same by the logarithm of a parameter: small sensitivities are wanted to digits as well."""
 
 
-class Turning(eqx.Module):
+class ReturnMapSpec(eqx.Module):
     """How to turn: what does not change from one turn of the search to the next.
 
     Attributes:
@@ -74,11 +79,11 @@ class _Arrival(eqx.Module):
     section: AbstractSection
 
     def __call__(self, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
-        renewed = minimal_state(args, self.system.renew(args, y))
+        renewed = minimal_state(args, self.system.reset_map(args, y))
         return self.section.value(args, renewed), self.section.counts(args, renewed)
 
 
-class Turn(NamedTuple):
+class LinearisedReturn(NamedTuple):
     """One turn. With m recurring components, p parameters and n = m + p directions:
 
     Attributes:
@@ -112,27 +117,27 @@ class Turn(NamedTuple):
     nodes: Nodes | None
 
 
-def recurring_places(system: AbstractSystem, y: PyTree) -> list[int]:
+def recurring_indices(system: AbstractSystem, y: PyTree) -> list[int]:
     """Positions of the leaves that must return."""
-    return [i for i in range(len(jtu.tree_leaves(y))) if i not in system.drifting]
+    return [i for i in range(len(jtu.tree_leaves(y))) if i not in system.cyclic_coordinates]
 
 
-def recurring_of(system: AbstractSystem, y: PyTree) -> Scalar:
+def recurring_components(system: AbstractSystem, y: PyTree) -> Scalar:
     """The components that must return, shape (m,)."""
     leaves = jtu.tree_leaves(y)
-    return jnp.stack([leaves[i] for i in recurring_places(system, y)])
+    return jnp.stack([leaves[i] for i in recurring_indices(system, y)])
 
 
 def state_with(system: AbstractSystem, like: PyTree, recurring: Scalar) -> PyTree:
     """A state with these recurring components, and zero for the drifting ones."""
     leaves, structure = jtu.tree_flatten(like)
-    places = recurring_places(system, like)
+    places = recurring_indices(system, like)
     zero = jnp.zeros_like(recurring[0])
     filled = [recurring[places.index(i)] if i in places else zero for i in range(len(leaves))]
     return jtu.tree_unflatten(structure, filled)
 
 
-def seeded(args: PyTree, active: tuple[int, ...], m: int) -> tuple[Seeded, Scalar]:
+def seed_directions(args: PyTree, active: tuple[int, ...], m: int) -> tuple[Seeded, Scalar]:
     """Seeds for m directions of state and then one for each active parameter.
 
     A parameter moves by its size (its logarithm by one), by one where that is 0. Also sizes, (p,).
@@ -147,71 +152,71 @@ def seeded(args: PyTree, active: tuple[int, ...], m: int) -> tuple[Seeded, Scala
 
 
 @eqx.filter_jit  # for its trace cache
-def turn(
-    turning: Turning,
+def linearised_return(
+    spec: ReturnMapSpec,
     args: Seeded,
     y: PyTree,
     precision: Precision,
     idle: Any,
     *,
     steered: Any = True,
-) -> Turn:
+) -> LinearisedReturn:
     """Follows the orbit from `y` for one turn, with derivatives; nothing where `idle`.
 
     Where not `steered`, derivatives by parameters choose no steps, and lanes do without them.
     """
-    places = recurring_places(turning.system, y)
+    places = recurring_indices(spec.system, y)
     count, n = len(jtu.tree_leaves(y)), args.seeds.shape[1]
     start = jnp.zeros((count, n)).at[jnp.asarray(places), jnp.arange(len(places))].set(1.0)
-    watch = _watched(turning, args.args, y)
-    limit = jnp.where(idle, 0.0, turning.time_limit)
+    watch = _watch_for(spec, args.args, y)
+    limit = jnp.where(idle, 0.0, spec.time_limit)
 
     def one(
         before: tuple[Tangents, Scalar], _: None
-    ) -> tuple[tuple[Tangents, Scalar], tuple[Passage, Scalar, Scalar]]:
+    ) -> tuple[tuple[Tangents, Scalar], tuple[SectionArrival, Scalar, Scalar]]:
         y0, failed = before
-        y0 = _entered(turning, y0, args)
+        y0 = _entry_coordinates(spec, y0, args)
         within = jnp.where(failed != 0, 0.0, limit)
-        found = _passed(turning, watch, y0, args, precision, within, steered)
-        found = _left(turning, found, args)
-        state, moved = along_columns(lambda s, a: turning.system.renew(a, s), found.y, args)
+        found = _next_passage(spec, watch, y0, args, precision, within, steered)
+        found = _exit_coordinates(spec, found, args)
+        state, moved = along_columns(lambda s, a: spec.system.reset_map(a, s), found.y, args)
         on_section = as_columns(moved)
         # At a fixed time the renewal comes earlier or later, and the motion after it with it.
-        rates = turning.system.vector_field(jnp.zeros(()), state, args.args)
+        rates = spec.system.vector_field(jnp.zeros(()), state, args.args)
         velocity = jnp.stack(jtu.tree_leaves(rates))
         columns = on_section - velocity[:, None] * found.time_columns
         code = jnp.where(failed != 0, failed, found.code)
         return (Tangents(state, columns), code), (found, on_section, velocity)
 
     begin = (Tangents(y, start), jnp.asarray(0))
-    if turning.steps == 1:
+    if spec.steps == 1:
         (end, code), last = one(begin, None)
         every = jax.tree.map(lambda leaf: leaf[None], last)
     else:
-        (end, code), every = jax.lax.scan(one, begin, length=turning.steps)
+        (end, code), every = jax.lax.scan(one, begin, length=spec.steps)
     passages, on_section, velocity = every
-    return _turn(turning, y, end, code, passages, on_section[-1], velocity[-1])
+    return _chain_passages(spec, y, end, code, passages, on_section[-1], velocity[-1])
 
 
-def _watched(turning: Turning, args: PyTree, y: PyTree) -> Watch:
+def _watch_for(spec: ReturnMapSpec, args: PyTree, y: PyTree) -> Watch:
     """What the passages of a turn land on."""
-    if turning.within is None:
-        return turning.watch(args, y)
+    if spec.within is None:
+        return spec.watch(args, y)
     inside = eqx.filter_eval_shape(redundant_state, args, y)
-    return turning.watch(args, inside, of=turning.within)
+    return spec.watch(args, inside, of=spec.within)
 
 
-def _entered(turning: Turning, y: Tangents, args: Seeded) -> Tangents:
+def _entry_coordinates(spec: ReturnMapSpec, y: Tangents, args: Seeded) -> Tangents:
     """The start of a passage in the coordinates that it is solved in."""
-    if turning.within is None:
+    if spec.within is None:
         return y
     state, columns = along_columns(lambda s, a: redundant_state(a, s), y, args)
     return Tangents(state, as_columns(columns))
 
 
-def _left(turning: Turning, found: Passage, args: Seeded) -> Passage:
+def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) -> SectionArrival:
     """A passage told in the turn's own coordinates."""
-    if turning.within is None:
+    if spec.within is None:
         return found
     state, columns = along_columns(lambda s, a: minimal_state(a, s), found.y, args)
     nodes = found.nodes
@@ -227,25 +232,25 @@ def _left(turning: Turning, found: Passage, args: Seeded) -> Passage:
     return found._replace(y=Tangents(state, as_columns(columns)), nodes=nodes)
 
 
-def _passed(
-    turning: Turning,
+def _next_passage(
+    spec: ReturnMapSpec,
     watch: Watch,
     y0: Tangents,
     args: Seeded,
     precision: Precision,
     limit: Scalar,
     steered: Any,
-) -> Passage:
+) -> SectionArrival:
     """The next passage, by the engine that is asked for."""
-    most = turning.max_solver_steps
+    most = spec.max_solver_steps
     m = args.seeds.shape[1] - len(args.active)
-    if turning.engine == "xla":
+    if spec.engine == "xla":
         deaf = (jnp.arange(len(args.floors)) >= m) & ~jnp.asarray(steered)
         floors = jnp.where(deaf, jnp.inf, args.floors)
         args = Seeded(args.args, args.seeds, floors, args.active)
-        return passage(
+        return solve_to_section(
             watch,
-            turning.solver,
+            spec.solver,
             y0,
             args,
             precision=precision,
@@ -254,9 +259,9 @@ def _passed(
             save_nodes=True,
         )
     sizes = jnp.diagonal(args.seeds[:, m:])
-    return passage_by_lanes(
+    return solve_to_section_by_lanes(
         watch,
-        turning.solver,
+        spec.solver,
         y0,
         args,
         sizes,
@@ -267,28 +272,28 @@ def _passed(
     )
 
 
-def _turn(
-    turning: Turning,
+def _chain_passages(
+    spec: ReturnMapSpec,
     y: PyTree,
     end: Tangents,
     code: Scalar,
-    passages: Passage,
+    passages: SectionArrival,
     on_section: Scalar,
     velocity: Scalar,
-) -> Turn:
-    places = jnp.asarray(recurring_places(turning.system, y))
-    drifting = jnp.asarray(turning.system.drifting, dtype=int)
+) -> LinearisedReturn:
+    places = jnp.asarray(recurring_indices(spec.system, y))
+    cyclic_coordinates = jnp.asarray(spec.system.cyclic_coordinates, dtype=int)
     before, after = jnp.stack(jtu.tree_leaves(y)), jnp.stack(jtu.tree_leaves(end.state))
     highest = jnp.argmax(passages.peak)
-    return Turn(
+    return LinearisedReturn(
         recurring=after[places],
         jacobian=on_section[places],
         monodromy=end.columns[places],
         velocity=velocity[places],
         period=jnp.sum(passages.time),
         period_row=passages.time_columns[-1],
-        advance=(after - before)[drifting],
-        advance_rows=on_section[drifting],
+        advance=(after - before)[cyclic_coordinates],
+        advance_rows=on_section[cyclic_coordinates],
         peak=passages.peak[highest],
         peak_row=passages.peak_columns[highest],
         code=code,

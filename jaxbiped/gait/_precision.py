@@ -1,4 +1,4 @@
-"""How exactly gaits and return maps are solved."""
+"""Precision of gaits and return maps."""
 
 from typing import Any
 

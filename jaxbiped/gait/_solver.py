@@ -1,4 +1,4 @@
-"""Which solver follows the orbits of a search."""
+"""Choice of the solver that follows the orbits of a search."""
 
 import diffrax
 

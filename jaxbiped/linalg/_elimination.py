@@ -79,11 +79,11 @@ class BlockFactors(NamedTuple):
         """What the matrix takes to a vector (n,)."""
         found: list[Scalar] = []
         for row, part in zip(self.lower, self._parts(right), strict=True):
-            found.append(_without(part, row, found))
+            found.append(_delete_row_and_column(part, row, found))
         behind: list[Scalar] = []
         for part in reversed(found):
             k = len(found) - 1 - len(behind)
-            behind.insert(0, self.inverses[k] @ _without(part, self.upper[k], behind))
+            behind.insert(0, self.inverses[k] @ _delete_row_and_column(part, self.upper[k], behind))
         return jnp.concatenate(behind)
 
     def solve_transposed(self, right: Scalar) -> Scalar:
@@ -91,26 +91,26 @@ class BlockFactors(NamedTuple):
         found: list[Scalar] = []
         for k, part in enumerate(self._parts(right)):
             column = [row[k - 1 - i].T for i, row in enumerate(self.upper[:k])]
-            found.append(self.inverses[k].T @ _without(part, column, found))
+            found.append(self.inverses[k].T @ _delete_row_and_column(part, column, found))
         behind: list[Scalar] = []
         for part in reversed(found):
             k = len(found) - 1 - len(behind)
             column = [row[k].T for row in self.lower[k + 1 :]]
-            behind.insert(0, _without(part, column, behind))
+            behind.insert(0, _delete_row_and_column(part, column, behind))
         return jnp.concatenate(behind)
 
     def _parts(self, right: Scalar) -> list[Scalar]:
         return jnp.split(right, len(self.inverses))
 
 
-def factored(matrix: Scalar, size: int) -> BlockFactors:
+def factorise(matrix: Scalar, size: int) -> BlockFactors:
     """The factors of a matrix (n, n) of square blocks of so many rows."""
     count = len(matrix) // size
     left = [jnp.split(row, count, axis=1) for row in jnp.split(matrix, count)]
     found = BlockFactors([[] for _ in left], [], [])
     for k in range(count):
         first, *rest = left.pop(0)
-        found.inverses.append(_inverted(first))
+        found.inverses.append(_invert(first))
         found.upper.append(rest)
         for i, row in enumerate(left):
             head = row.pop(0) @ found.inverses[k]
@@ -119,14 +119,14 @@ def factored(matrix: Scalar, size: int) -> BlockFactors:
     return found
 
 
-def _without(part: Scalar, blocks: list[Scalar], known: list[Scalar]) -> Scalar:
+def _delete_row_and_column(part: Scalar, blocks: list[Scalar], known: list[Scalar]) -> Scalar:
     """What is left of a right side when known unknowns are taken out."""
     for block, each in zip(blocks, known, strict=True):
         part = part - block @ each
     return part
 
 
-def _inverted(block: Scalar) -> Scalar:
+def _invert(block: Scalar) -> Scalar:
     return jnp.stack([jnp.stack(row) for row in inverse([list(row) for row in block])])
 
 
@@ -139,7 +139,7 @@ def _largest_first(rows: list[Scalar], k: int) -> None:
         rows[i] = jnp.where(larger, above, below)
 
 
-def times(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
+def matmul(matrix: list[list[Scalar]], right: list[Scalar]) -> list[Scalar]:
     """A matrix times a vector, each a list of scalars."""
     products = [[a * b for a, b in zip(row, right, strict=True)] for row in matrix]
     return [sum(row[1:], row[0]) for row in products]

@@ -12,19 +12,19 @@ from jaxbiped._types import Scalar
 
 
 @sequential_vmap
-def solved(matrix: Scalar, right: Scalar) -> Scalar:
+def solve(matrix: Scalar, right: Scalar) -> Scalar:
     """The solution of a square system (n, n), right side (n,) or (n, k)."""
     return jnp.linalg.solve(matrix, right)
 
 
 @sequential_vmap
-def inverted(matrix: Scalar) -> Scalar:
+def invert(matrix: Scalar) -> Scalar:
     """The inverse."""
     return jnp.linalg.inv(matrix)
 
 
 @sequential_vmap
-def eigen(matrix: Scalar) -> tuple[Scalar, Scalar]:
+def eigenpairs(matrix: Scalar) -> tuple[Scalar, Scalar]:
     """Eigenvalues (n,) and right eigenvectors, its columns."""
     values, vectors = jax.lax.linalg.eig(matrix, compute_left_eigenvectors=False)
     return values, vectors

@@ -22,7 +22,7 @@ class Factors(NamedTuple):
     inverse: list[Scalar]
 
 
-def factorised(matrix: list[list[Scalar]]) -> Factors:
+def factorise(matrix: list[list[Scalar]]) -> Factors:
     """Factors of a symmetric positive matrix; not finite, or huge, where it is singular."""
     lower: list[list[Scalar]] = []
     diagonal: list[Scalar] = []
@@ -39,7 +39,7 @@ def factorised(matrix: list[list[Scalar]]) -> Factors:
     return Factors(lower, inverse)
 
 
-def solved(factors: Factors, right: list[Scalar]) -> list[Scalar]:
+def solve(factors: Factors, right: list[Scalar]) -> list[Scalar]:
     """The solution of the system with this right side."""
     lower, inverse = factors
     size = len(right)

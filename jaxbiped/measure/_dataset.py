@@ -1,4 +1,4 @@
-"""A trajectory as a labelled dataset, for files and for other programs."""
+"""Dataset of a trajectory: labelled, for files and for other programs."""
 
 import json
 from typing import TYPE_CHECKING, Any

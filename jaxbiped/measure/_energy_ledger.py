@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped.dynamics._energy import energies, powers
-from jaxbiped.measure._samples import observed, sampled
+from jaxbiped.measure._samples import evaluate_at, sample
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -45,8 +45,8 @@ def energy_ledger(
     """
     trajectory.require_dense()
     ends = np.asarray(trajectory.t)[[0, -1]] if times is None else np.asarray(times)
-    held = observed(scene, trajectory, energies, ends)
-    flows = sampled(scene, trajectory, powers, ends)
+    held = evaluate_at(scene, trajectory, energies, ends)
+    flows = sample(scene, trajectory, powers, ends)
     interval = np.searchsorted(ends, 0.5 * (flows.edges[1:] + flows.edges[:-1])) - 1
     inside = (interval >= 0) & (interval < len(ends) - 1)
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._feet import Feet, landings, standing_foot
 from jaxbiped.measure._energy_ledger import energy_ledger
-from jaxbiped.measure._samples import Samples, at_steps, moments_of_change, observed, sampled
+from jaxbiped.measure._samples import Samples, at_steps, evaluate_at, moments_of_change, sample
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -91,10 +91,10 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     if count == 0:
         return Footsteps(*[np.zeros(0)] * len(Footsteps._fields))
     time, foot = strikes
-    both = observed(scene, trajectory, contacts, time).feet
+    both = evaluate_at(scene, trajectory, contacts, time).feet
     place = np.where(foot == 1, both.foot_1.x, both.foot_2.x)
     period, length = np.diff(time), np.diff(place)
-    loads = sampled(scene, trajectory, contacts, time)
+    loads = sample(scene, trajectory, contacts, time)
     step = np.searchsorted(time, 0.5 * (loads.edges[1:] + loads.edges[:-1])) - 1
     ledger = energy_ledger(scene, trajectory, time)
     weight = float(scene.walker.total_mass * scene.ground.g)

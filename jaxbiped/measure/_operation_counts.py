@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from jaxbiped.compiler import counted_operations
+from jaxbiped.compiler import count_operations
 from jaxbiped.dynamics._bristle_state import state_type
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._rigid_state import RigidState
@@ -22,4 +22,4 @@ def operation_counts(scene: Scene | RigidScene) -> dict[str, int]:
     kind: Any = RigidState if rigid else state_type(scene)  # type: ignore[arg-type]
     field: Any = rolling_field if rigid else vector_field
     state = kind(*[0.0] * len(kind._fields))
-    return counted_operations(lambda y, args: field(0.0, y, args), state, scene)
+    return count_operations(lambda y, args: field(0.0, y, args), state, scene)

@@ -1,4 +1,4 @@
-"""Reading a trajectory between its steps: samples, integrals and moments of change."""
+"""Samples of a trajectory between its steps: values, integrals and moments of change."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -12,7 +12,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import as_float
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._dense_output import AT_ONCE, joined, parts
+from jaxbiped.solve._dense_output import AT_ONCE, join_parts, split_evenly
 from jaxbiped.solve._trajectory import Trajectory
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
@@ -36,7 +36,7 @@ class Samples(NamedTuple):
         return np.asarray(np.diff(self.edges) * (leaf @ (0.5 * _WEIGHTS)))
 
 
-def sampled(
+def sample(
     scene: Scene,
     trajectory: Trajectory,
     function: Callable[[Scene, State], PyTree],
@@ -46,17 +46,17 @@ def sampled(
     edges = np.unique(np.concatenate([np.asarray(trajectory.t), extra]))
     middles, halves = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
     times = middles[:, None] + halves[:, None] * _NODES
-    return Samples(edges, observed(scene, trajectory, function, times))
+    return Samples(edges, evaluate_at(scene, trajectory, function, times))
 
 
-def observed(
+def evaluate_at(
     scene: Scene,
     trajectory: Trajectory,
     function: Callable[[Scene, State], PyTree],
     times: np.ndarray,
 ) -> PyTree:
     """`function(scene, state)` at times of any shape, as NumPy arrays of that shape."""
-    values = applied(scene, trajectory.at(np.ravel(times)), function)
+    values = evaluate_along(scene, trajectory.at(np.ravel(times)), function)
     return jtu.tree_map(lambda leaf: leaf.reshape(times.shape), values)
 
 
@@ -64,17 +64,19 @@ def at_steps(
     scene: Scene, trajectory: Trajectory, function: Callable[[Scene, State], PyTree]
 ) -> PyTree:
     """`function(scene, state)` at the ends of the solver's steps, as NumPy arrays."""
-    return applied(scene, trajectory.state, function)
+    return evaluate_along(scene, trajectory.state, function)
 
 
-def applied(scene: Scene, state: State, function: Callable[[Scene, State], PyTree]) -> PyTree:
+def evaluate_along(
+    scene: Scene, state: State, function: Callable[[Scene, State], PyTree]
+) -> PyTree:
     """`function(scene, state)` at states with leaves of shape (n,), as NumPy arrays."""
     # With every leaf an array: a plain number would be compiled in.
     arrays = jtu.tree_map(as_float, scene)
     leaves, structure = jtu.tree_flatten(state)
-    states = zip(*[parts(np.asarray(leaf)) for leaf in leaves], strict=True)
+    states = zip(*[split_evenly(np.asarray(leaf)) for leaf in leaves], strict=True)
     found = [_apply(function, arrays, jtu.tree_unflatten(structure, part)) for part in states]
-    return joined(found, len(leaves[0]))
+    return join_parts(found, len(leaves[0]))
 
 
 def moments_of_change(
@@ -98,7 +100,7 @@ def moments_of_change(
     for _ in range(int(np.ceil(np.log(_RESOLUTION) / np.log(among - 1)))):
         times = left[:, None] + (right - left)[:, None] * shares
         times[:, -1] = right
-        holds = condition(observed(scene, trajectory, function, times))
+        holds = condition(evaluate_at(scene, trajectory, function, times))
         changed = holds != holds[:, :1]
         changed[:, -1] = True
         first = np.argmax(changed, axis=1)

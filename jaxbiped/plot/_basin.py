@@ -1,4 +1,4 @@
-"""A picture of basins of attraction in two coordinates of the start."""
+"""Basin picture in two coordinates of the start."""
 
 from typing import Any
 
@@ -86,15 +86,15 @@ def names_of(
     if period is None:
         words = np.vectorize(lambda code: str(Label(code)), otypes=[object])(grid)
     else:
-        words = label_names(grid, _fitting("period", period, grid.shape))
+        words = label_names(grid, _fitting_names("period", period, grid.shape))
     if gait is not None:
-        which = _fitting("gait", gait, grid.shape)
+        which = _fitting_names("gait", gait, grid.shape)
         walks = grid == Label.WALKING
         words[walks] += [GAIT_SUFFIX.format(gait=k) for k in which[walks]]
     return words
 
 
-def _fitting(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
+def _fitting_names(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
     array = np.asarray(value)
     try:
         return np.broadcast_to(array, shape)

@@ -48,7 +48,7 @@ def basin_fractions(
             labelled at a value.
     """
     check_choice("kind", kind, ("lines", "stacked"))
-    along = _checked(values, fractions, log)
+    along = _check(values, fractions, log)
     if kind == "stacked" and along.size == 1:
         raise ArgumentError("values has one entry: a stacked figure must have at least 2.")
     labels = in_order({label for found in fractions for label in found})
@@ -79,7 +79,7 @@ def _count(found: Mapping[str, Fraction], label: str) -> int:
     return found[label].count if label in found else 0
 
 
-def _checked(
+def _check(
     values: npt.ArrayLike, fractions: Sequence[Mapping[str, Fraction]], log: bool
 ) -> np.ndarray:
     check_finite("values", values)

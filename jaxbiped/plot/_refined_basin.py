@@ -1,4 +1,4 @@
-"""A picture of basins whose boundary was refined."""
+"""Refined basin picture: labels about a boundary, and the cells that it crosses."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""The ladder of fidelity: one walker, modelled more and more closely."""
+"""Ladder of fidelity: one walker, modelled more and more closely."""
 
 import dataclasses
 

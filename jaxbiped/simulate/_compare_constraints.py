@@ -1,4 +1,4 @@
-"""Constraint methods against each other: violation, error and time."""
+"""Comparison of constraint methods: violation, error and time."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -168,7 +168,7 @@ def _run(
 ) -> ConstraintRun:
     # Not compiled by itself: another tolerance or step size runs the same program.
     request = request_of(scene, state, duration, integrator, save="end", extremes=violation)
-    found, seconds = timed(request, repeats)
+    found, seconds = time_run(request, repeats)
     final = np.array(minimal_state(scene, found.final))
     error = float(np.max(np.abs(final - truth)))
     outcome = found.outcome
@@ -187,7 +187,7 @@ def _run(
     )
 
 
-def timed(request: Simulation, repeats: int) -> tuple[Trajectory, float]:
+def time_run(request: Simulation, repeats: int) -> tuple[Trajectory, float]:
     """What a request gives, and the time of its fastest warm run [s]."""
     found = jax.block_until_ready(request())
     seconds = []

@@ -1,4 +1,4 @@
-"""Which engine runs a simulation."""
+"""Choice of the engine that runs a simulation."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from jaxbiped.solve._engine import ENGINES, engine_for
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 
-def chosen_engine(
+def choose_engine(
     engine: str,
     *,
     solver: Any,
@@ -31,7 +31,7 @@ def chosen_engine(
         ArgumentError: an unknown name, or lanes for what they cannot do.
     """
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(leaves))
-    obstacle = _obstacle(solver, save_steps, adjoint, leaves, times, traced=traced)
+    obstacle = _hindrance(solver, save_steps, adjoint, leaves, times, traced=traced)
     if redundant or dt is not None:
         what = "redundant coordinates are" if redundant else "steps of one size (dt) are"
         obstacle = f"{what} diffrax's"
@@ -53,7 +53,7 @@ def _by_lanes_only(section: AbstractSection | None, extremes: Any) -> str | None
     return None if extremes is None else "extremes"
 
 
-def _obstacle(
+def _hindrance(
     solver: Any, save_steps: bool, adjoint: Any, leaves: Any, times: Any, *, traced: bool
 ) -> str | None:
     """Why lanes cannot do what is asked."""

@@ -1,4 +1,4 @@
-"""Trajectories from the steps that the lane engine records."""
+"""Recorded steps of a solve by lanes, as a trajectory's."""
 
 from typing import Any, NamedTuple
 

@@ -1,4 +1,4 @@
-"""The adaptive solve of a scene as a program for lanes: the same method as through diffrax.
+"""Adaptive solve of a scene as a program for lanes: the same method as through diffrax.
 
 Rounding differs, and it decides on step sizes after a few steps: the steps are not the same.
 """
@@ -20,9 +20,9 @@ from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import ending_code, ending_events
-from jaxbiped.solve._final_step import clipped
-from jaxbiped.solve._fusion_barrier import fences_down
-from jaxbiped.solve._saved_outputs import Last, Saved
+from jaxbiped.solve._final_step import clip_step
+from jaxbiped.solve._fusion_barrier import without_barriers
+from jaxbiped.solve._saved_outputs import LastStep, Saved
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
 from jaxbiped.solve.controllers._step_control import first_step, step_control
@@ -82,7 +82,7 @@ class _Now(NamedTuple):
     rejected: Scalar
     events: tuple[Scalar, ...]
     counted: Scalar
-    last: Last | None
+    last: LastStep | None
     extremes: tuple[PyTree, PyTree] | None
 
 
@@ -141,7 +141,7 @@ class AdaptiveSolve:
         return _Now(zero, next_t, solve.state, control, count, count, events, none, last, extremes)
 
     def attempt(self, solve: Solve, now: _Now) -> tuple[_Now, Scalar]:
-        with contextlib.nullcontext() if self.fenced else fences_down():
+        with contextlib.nullcontext() if self.fenced else without_barriers():
             y1, error, dense = step_of(
                 self.solver.tableau, _TERM, now.t, now.next_t, now.state, solve.scene
             )
@@ -149,7 +149,7 @@ class AdaptiveSolve:
         keep, t, next_t, _, control, result = self._controller(solve).adapt_step_size(
             now.t, now.next_t, now.state, y1, solve.scene, error, self._error_order(), now.control
         )
-        t, next_t = clipped(keep, t, next_t, solve.duration, solve.almost)
+        t, next_t = clip_step(keep, t, next_t, solve.duration, solve.almost)
         state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), y1, now.state)
         one = jnp.where(keep, 1, 0)
         events, none = [], jnp.asarray(True)

@@ -1,4 +1,4 @@
-"""How the last steps of a solve meet its end, as diffrax has it."""
+"""Final steps of a solve: how they meet its end, as diffrax has it."""
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +10,7 @@ _CLIPPED_ULPS = 100
 """A step that would end this near the end, in units in the last place, ends there."""
 
 
-def almost(duration: Scalar) -> Scalar:
+def just_before_end(duration: Scalar) -> Scalar:
     """The time from which on a step that would end there ends at `duration`, as diffrax has it.
 
     Units are counted in the bits of the 64-bit number, which are in the numbers' own order: as
@@ -24,7 +24,7 @@ def almost(duration: Scalar) -> Scalar:
     return jnp.where(duration == 0.0, nothing, earlier)
 
 
-def clipped(
+def clip_step(
     keep: Scalar, t: Scalar, next_t: Scalar, end: Scalar, almost_end: Scalar
 ) -> tuple[Scalar, Scalar]:
     """The times at which the next step begins and ends, once it comes near `end`."""

@@ -1,4 +1,4 @@
-"""Keeps XLA's CPU backend from computing the same thing many times over."""
+"""Fusion barrier: keeps XLA's CPU backend from computing the same thing many times over."""
 
 import contextlib
 import contextvars
@@ -17,8 +17,8 @@ _UP = contextvars.ContextVar("fences are up", default=True)
 
 
 @contextlib.contextmanager
-def fences_down() -> Iterator[None]:
-    """Within, `fenced` does nothing: for other compilers than XLA's."""
+def without_barriers() -> Iterator[None]:
+    """Within, `fusion_barrier` does nothing: for other compilers than XLA's."""
     token = _UP.set(False)
     try:
         yield
@@ -26,7 +26,7 @@ def fences_down() -> Iterator[None]:
         _UP.reset(token)
 
 
-def fenced(happens: Scalar, compute: Callable[[], Any]) -> Any:
+def fusion_barrier(happens: Scalar, compute: Callable[[], Any]) -> Any:
     """`compute()`, kept apart from what comes before and after it in the compiled program.
 
     XLA's CPU backend fuses every scalar operation into each of its consumers, repeating it for

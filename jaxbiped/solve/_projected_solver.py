@@ -1,4 +1,4 @@
-"""A solver whose steps end on the constraints."""
+"""Projected solver: its steps end on the constraints."""
 
 import dataclasses
 from collections.abc import Callable
@@ -100,7 +100,9 @@ class Projected(diffrax.AbstractWrappedSolver):
         return y1, error, dense | ({"y1": y1} if "y1" in dense else {}), state, result
 
 
-def wrapped(solver: Any, project: Callable[[PyTree, PyTree], PyTree], adjoint: Any = None) -> Any:
+def wrap_projected(
+    solver: Any, project: Callable[[PyTree, PyTree], PyTree], adjoint: Any = None
+) -> Any:
     """A `Projected` solver, ready for what will differentiate it."""
     kind = _SCAN_KINDS.get(type(adjoint))
     if kind is not None and getattr(solver, "scan_kind", "none") is None:
@@ -109,7 +111,7 @@ def wrapped(solver: Any, project: Callable[[PyTree, PyTree], PyTree], adjoint: A
     return Projected(solver, project)
 
 
-def projecting(scene: RedundantScene, solver: Any, adjoint: Any = None) -> Any:
+def with_projection(scene: RedundantScene, solver: Any, adjoint: Any = None) -> Any:
     """The solver, wrapped where the scene's method projects after each step."""
     projects = isinstance(scene.method, AbstractProjectingMethod)
-    return wrapped(solver, project, adjoint) if projects else solver
+    return wrap_projected(solver, project, adjoint) if projects else solver

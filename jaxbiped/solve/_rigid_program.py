@@ -1,4 +1,4 @@
-"""The rigid walker's steps as a program for lanes."""
+"""Rigid walk as a program for lanes."""
 
 import functools
 from typing import Any, NamedTuple
@@ -10,7 +10,14 @@ import jax.tree_util as jtu
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import CompiledProgram, Program, Recorded, call
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, ending_of, whole
+from jaxbiped.solve._rigid_steps import (
+    RigidProgress,
+    RigidWalk,
+    attempt_step,
+    ending_of,
+    initial_progress,
+    state_with_hip,
+)
 
 
 class RigidSolved(NamedTuple):
@@ -42,11 +49,11 @@ def _compiled(structure: Any, recording: bool, waits: bool) -> CompiledProgram:
 
     def finish(walk: RigidWalk, now: RigidProgress) -> RigidSolved:
         code = ending_of(walk, now, jnp.asarray(waits))
-        return RigidSolved(now.t, whole(walk, now), code, now.footsteps, now.attempts)
+        return RigidSolved(now.t, state_with_hip(walk, now), code, now.footsteps, now.attempts)
 
-    program = Program(begun, attempted, finish, record=_record if recording else None)
+    program = Program(initial_progress, attempt_step, finish, record=_record if recording else None)
     return CompiledProgram(program, inputs)
 
 
 def _record(walk: RigidWalk, now: RigidProgress, time: Scalar) -> tuple[Scalar, list[Scalar]]:
-    return now.struck, [now.t, *whole(walk, now)]
+    return now.struck, [now.t, *state_with_hip(walk, now)]

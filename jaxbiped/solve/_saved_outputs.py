@@ -1,4 +1,4 @@
-"""What a solve by lanes saves besides its end, and how it finds that within a step."""
+"""Saved outputs of a solve by lanes, and how they are found within a step."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, Ros
 _BISECTIONS = 50
 
 
-class Last(NamedTuple):
+class LastStep(NamedTuple):
     """The last attempt: when it began, its dense output, and whether it is of note.
 
     It is where it was accepted, or where there is a section, where it ended past an arrival there.
@@ -52,24 +52,24 @@ class Saved(NamedTuple):
         """Whether anything is saved from within the steps."""
         return self.steps or self.times or self.section is not None
 
-    def first(self, state: State, solver: AbstractRosenbrock) -> Last:
+    def first(self, state: State, solver: AbstractRosenbrock) -> LastStep:
         """What is known before the first attempt."""
         zero, none = jnp.zeros_like(state[0]), jnp.asarray(False)
         nothing = jtu.tree_map(jnp.zeros_like, state)
         rows = len(solver.tableau.dense)
-        return Last(none, jnp.asarray(True), zero, nothing, tuple([nothing] * rows))
+        return LastStep(none, jnp.asarray(True), zero, nothing, tuple([nothing] * rows))
 
     def following(
         self,
         scene: Scene,
-        last: Last,
+        last: LastStep,
         *,
         began: tuple[Scalar, State],
         ended: State,
         keep: Scalar,
         moving: Scalar,
         dense: tuple[State, ...],
-    ) -> Last:
+    ) -> LastStep:
         """What is known after an attempt.
 
         `keep` is whether it was accepted, and `moving` whether any was before.
@@ -77,18 +77,18 @@ class Saved(NamedTuple):
         t, start = began
         changed, noted = last.changed, keep
         if self.section is not None:
-            before, after = (_named(changed, y) for y in (start, ended))
+            before, after = (_with_leg_names(changed, y) for y in (start, ended))
             rises = self.section.value(scene, before) < 0.0
             rises = rises & (self.section.value(scene, after) >= 0.0)
             # The first step of a solve never counts, so it may start on its section.
             noted = keep & moving & rises & self.section.counts(scene, after)
             changed = changed ^ noted
-        return Last(noted, changed, t, start, dense)
+        return LastStep(noted, changed, t, start, dense)
 
     def record(
         self,
         scene: Scene,
-        last: Last,
+        last: LastStep,
         *,
         now: tuple[Scalar, State],
         due: Scalar,
@@ -109,13 +109,15 @@ class Saved(NamedTuple):
             last.noted, lambda: self._arrival(scene, last, dense), lambda: nothing
         )
 
-    def _arrival(self, scene: Scene, last: Last, dense: RosenbrockInterpolation) -> list[Scalar]:
+    def _arrival(
+        self, scene: Scene, last: LastStep, dense: RosenbrockInterpolation
+    ) -> list[Scalar]:
         section = self.section
         assert section is not None
 
         # The names that the arrival went by: they have been exchanged since.
         def value(state: State) -> Scalar:
-            return section.value(scene, _named(~last.changed, state))
+            return section.value(scene, _with_leg_names(~last.changed, state))
 
         def halve(_: Any, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
             middle = 0.5 * (ends[0] + ends[1])
@@ -126,6 +128,6 @@ class Saved(NamedTuple):
         return [time, *dense.evaluate(time)]
 
 
-def _named(changed: Scalar, state: State) -> State:
+def _with_leg_names(changed: Scalar, state: State) -> State:
     """The state with its legs' names exchanged, where they are."""
     return jtu.tree_map(lambda a, b: jnp.where(changed, a, b), exchange_legs(state), state)

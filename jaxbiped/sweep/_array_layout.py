@@ -1,4 +1,4 @@
-"""How the results of a sweep lie in arrays, and how these are cut into chunks."""
+"""Array layout of a sweep's results, and how it is cut into chunks."""
 
 import math
 from collections.abc import Mapping

@@ -62,10 +62,10 @@ def local_executor(workers: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(
         workers,
         mp_context=multiprocessing.get_context("spawn"),
-        initializer=_limited,
+        initializer=_limit_threads,
         initargs=(max(1, default_threads() // workers),),
     )
 
 
-def _limited(threads: int) -> None:
+def _limit_threads(threads: int) -> None:
     os.environ[THREADS_VARIABLE] = str(threads)

@@ -1,4 +1,4 @@
-"""What is remembered of a walk from arrival to arrival, and when it makes the label certain."""
+"""Convergence test: what arrivals so far tell of a walk, and when its label is certain."""
 
 import functools
 import operator
@@ -19,7 +19,7 @@ _NEARING = 0.999
 UNDECIDED = int(Label.PENDING)
 
 
-class Trace(NamedTuple):
+class ArrivalHistory(NamedTuple):
     """What is remembered; scalars, but for tuples of them.
 
     Attributes:
@@ -43,11 +43,11 @@ class Trace(NamedTuple):
     period: Scalar
 
 
-def first_trace(zero: Scalar, size: int, periods: tuple[int, ...]) -> Trace:
+def empty_history(zero: Scalar, size: int, periods: tuple[int, ...]) -> ArrivalHistory:
     """Before the first arrival; states have `size` components, the gaits' cycles these lengths."""
     none = jnp.zeros((), dtype=jnp.int64)
     far = zero + jnp.inf
-    return Trace(
+    return ArrivalHistory(
         recent=tuple([tuple([far] * size)] * DEPTH),
         distances=tuple(tuple([far] * period) for period in periods),
         closest=far,
@@ -59,9 +59,13 @@ def first_trace(zero: Scalar, size: int, periods: tuple[int, ...]) -> Trace:
     )
 
 
-def arrived(
-    trace: Trace, state: tuple[Scalar, ...], goals: Goals, periods: tuple[int, ...], gap: Scalar
-) -> Trace:
+def after_arrival(
+    trace: ArrivalHistory,
+    state: tuple[Scalar, ...],
+    goals: Goals,
+    periods: tuple[int, ...],
+    gap: Scalar,
+) -> ArrivalHistory:
     """After an arrival in this state.
 
     It converges to a known gait where it lies within that gait's radius, and nearer than a cycle
@@ -105,7 +109,7 @@ def arrived(
         # Where nothing but rounding is left of the distance it says nothing.
         left = jnp.where(distances[g][0] < trace.distances[g][-1], rates[g], jnp.nan)
         rate = jnp.where(certain[g], left, rate)
-    return Trace(
+    return ArrivalHistory(
         recent=(state, *trace.recent[:-1]),
         distances=tuple(distances),
         closest=jnp.minimum(trace.closest, nearest),
@@ -127,7 +131,7 @@ def _distance(goals: Goals, g: int, state: tuple[Scalar, ...]) -> Scalar:
 
 
 def _repeats(
-    trace: Trace, state: tuple[Scalar, ...], goals: Goals, gap: Scalar
+    trace: ArrivalHistory, state: tuple[Scalar, ...], goals: Goals, gap: Scalar
 ) -> tuple[Scalar, ...]:
     counts = []
     for old, count in zip(trace.recent, trace.repeats, strict=True):

@@ -1,4 +1,4 @@
-"""Many starts of many scenes followed until each is certain, by either engine."""
+"""Following of starts until each is certain, by either engine."""
 
 import functools
 import threading
@@ -11,18 +11,18 @@ import numpy as np
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._adaptive_program import Solve
-from jaxbiped.solve._final_step import almost
+from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._goals import Goals
-from jaxbiped.sweep._labelling_by_lanes import labelled_by_lanes
-from jaxbiped.sweep._labelling_by_xla import labelled_by_xla
+from jaxbiped.sweep._labelling_by_lanes import label_by_lanes
+from jaxbiped.sweep._labelling_by_xla import label_by_xla
 from jaxbiped.sweep._labelling_loop import (
-    AbstractCourse,
-    CompliantCourse,
+    AbstractLabellingLoop,
+    CompliantLabelling,
     Outcome,
-    RigidCourse,
+    RigidLabelling,
     Start,
 )
 
@@ -54,7 +54,7 @@ class Effort(NamedTuple):
     engine: str
 
 
-def follow(
+def follow_starts(
     scene: Scene | RigidScene, states: Any, goals: Goals, periods: tuple[int, ...], effort: Effort
 ) -> Outcome:
     """Follows n starts; leaves of scene, states and goals are NumPy's arrays (n, …)."""
@@ -75,30 +75,32 @@ def follow(
     if isinstance(scene, RigidScene):
         solve = RigidWalk(**common)
     else:
-        last = same(almost(jnp.asarray(_LONGEST)))
+        last = same(just_before_end(jnp.asarray(_LONGEST)))
         atol = same(1e-2 * effort.rtol)
         units = jtu.tree_map(same, units_of(scene, states))
         solve = Solve(**common, almost=last, atol=atol, units=units, patience=same(np.inf))
     waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
     with _MAKING:
-        course = _course(isinstance(scene, RigidScene), effort.solver, periods, effort.engine)
+        course = _labelling_loop(
+            isinstance(scene, RigidScene), effort.solver, periods, effort.engine
+        )
     if not count:
-        return _nothing(len(states) - 1)
-    run = labelled_by_lanes if effort.engine == "lanes" else labelled_by_xla
+        return _empty_outcome(len(states) - 1)
+    run = label_by_lanes if effort.engine == "lanes" else label_by_xla
     return run(course, jtu.tree_map(np.asarray, starts))
 
 
 @functools.cache  # the same object each time, so that nothing is compiled again
-def _course(
+def _labelling_loop(
     rigid: bool, solver: AbstractRosenbrock, periods: tuple[int, ...], engine: str
-) -> AbstractCourse:
+) -> AbstractLabellingLoop:
     if rigid:
-        return RigidCourse(periods)
-    return CompliantCourse(solver, periods, fenced=engine == "xla")
+        return RigidLabelling(periods)
+    return CompliantLabelling(solver, periods, fenced=engine == "xla")
 
 
-def _nothing(size: int) -> Outcome:
+def _empty_outcome(size: int) -> Outcome:
     whole, real = np.zeros(0, dtype=np.int64), np.zeros(0)
     return Outcome(
         label=whole,

@@ -71,7 +71,7 @@ def gait_sweep(
             other settings, or one that cannot be written.
     """
     check_type("scene", scene, Scene, RigidScene, RedundantScene)
-    values = _checked_values(scene, over)
+    values = _check_values(scene, over)
     if store is not None:
         check_store(Path(store))
     options = dict(
@@ -98,7 +98,7 @@ def gait_sweep(
         if again and not near:
             return None
         own = jtu.tree_map(as_float, with_parameters(scene, point))
-        return _found(own, near, options | {"engine": engine}, alone=not again)
+        return _find(own, near, options | {"engine": engine}, alone=not again)
 
     first = search(order[0], again=False)
     assert first is not None
@@ -120,7 +120,7 @@ def gait_sweep(
     return grid.dataset()
 
 
-def _found(scene: Any, near: list[Any], options: dict[str, Any], *, alone: bool) -> Gait:
+def _find(scene: Any, near: list[Any], options: dict[str, Any], *, alone: bool) -> Gait:
     """The gait that a neighbour's leads to; the search's own where that is none or not stable."""
     best: Gait | None = None
     for state in near[:2]:
@@ -136,7 +136,7 @@ def _found(scene: Any, near: list[Any], options: dict[str, Any], *, alone: bool)
     return best
 
 
-def _checked_values(scene: Any, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _check_values(scene: Any, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
     if not over:
         raise ArgumentError("over = {} is not allowed: name at least one parameter.")
     values = {}

@@ -1,4 +1,4 @@
-"""Labels as a function of coordinates, as analyses of basins ask for them."""
+"""Labels as a function of coordinates, as the analyses of basins ask for them."""
 
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -9,7 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._types import Scalar
-from jaxbiped.sweep._labelling_loop import AbstractCourse, Outcome, Progress, Start
+from jaxbiped.sweep._labelling_loop import AbstractLabellingLoop, Outcome, Progress, Start
 
 SLOTS = 1024
 """Starts that are followed at once, always as many: every other number compiles anew."""
@@ -17,7 +17,7 @@ _ROUND = 128
 """Attempted steps after which slots that are over take the next starts."""
 
 
-def labelled_by_xla(course: AbstractCourse, starts: Start, *, slots: int = SLOTS) -> Outcome:
+def label_by_xla(course: AbstractLabellingLoop, starts: Start, *, slots: int = SLOTS) -> Outcome:
     """Follows n starts until each is certain; arrays (n, …) in, NumPy's out.
 
     A start that is over waits for the end of its round, not for the longest start of the batch:
@@ -28,14 +28,14 @@ def labelled_by_xla(course: AbstractCourse, starts: Start, *, slots: int = SLOTS
     given = _rows(starts, np.minimum(owner, count - 1))
     owner[count:] = -1
     over = jnp.asarray(owner < 0)
-    now = _begun(course, given)
+    now = _begin(course, given)
     waiting = min(slots, count)
     found: list[tuple[np.ndarray, Any]] = []
     while True:
         now, over = _round(course, given, now, over)
         done = np.flatnonzero(np.asarray(over) & (owner >= 0))
         if len(done):
-            outcome = jtu.tree_map(np.asarray, _finished(course, given, now))
+            outcome = jtu.tree_map(np.asarray, _finish(course, given, now))
             found.append((owner[done], _rows(outcome, done)))
             owner[done] = -1
             fresh = np.arange(waiting, min(waiting + len(done), count))
@@ -45,7 +45,7 @@ def labelled_by_xla(course: AbstractCourse, starts: Start, *, slots: int = SLOTS
                 owner[places] = fresh
                 rows, beyond = np.resize(fresh, slots), np.full(slots, slots)
                 beyond[: len(places)] = places
-                given, now, over = _refilled(
+                given, now, over = _refill(
                     course, given, now, over, jnp.asarray(beyond), _rows(starts, rows)
                 )
         if not (owner >= 0).any():
@@ -57,18 +57,18 @@ def labelled_by_xla(course: AbstractCourse, starts: Start, *, slots: int = SLOTS
 
 
 @eqx.filter_jit
-def _begun(course: AbstractCourse, starts: Start) -> Progress:
+def _begin(course: AbstractLabellingLoop, starts: Start) -> Progress:
     return jax.vmap(course.begin)(starts)
 
 
 @eqx.filter_jit
-def _finished(course: AbstractCourse, starts: Start, now: Progress) -> Outcome:
+def _finish(course: AbstractLabellingLoop, starts: Start, now: Progress) -> Outcome:
     return jax.vmap(course.finish)(starts, now)
 
 
 @eqx.filter_jit
 def _round(
-    course: AbstractCourse, starts: Start, now: Progress, over: Scalar
+    course: AbstractLabellingLoop, starts: Start, now: Progress, over: Scalar
 ) -> tuple[Progress, Scalar]:
     """At most so many attempts further; what is over stays as it is."""
     attempt = jax.vmap(course.attempt)
@@ -88,8 +88,13 @@ def _round(
 
 
 @eqx.filter_jit
-def _refilled(
-    course: AbstractCourse, given: Start, now: Progress, over: Scalar, places: Scalar, fresh: Start
+def _refill(
+    course: AbstractLabellingLoop,
+    given: Start,
+    now: Progress,
+    over: Scalar,
+    places: Scalar,
+    fresh: Start,
 ) -> tuple[Start, Progress, Scalar]:
     """The starts at these places replaced; a place beyond the slots takes none."""
     begun = jax.vmap(course.begin)(fresh)

@@ -1,4 +1,4 @@
-"""A start followed until its label is certain: one loop's functions, for either engine."""
+"""Labelling loop: a start is followed until its label is certain, by either engine."""
 
 import abc
 from collections.abc import Callable
@@ -15,12 +15,18 @@ from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
 from jaxbiped.solve._ending import WATCHES
-from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, whole
+from jaxbiped.solve._rigid_steps import (
+    RigidProgress,
+    RigidWalk,
+    attempt_step,
+    initial_progress,
+    state_with_hip,
+)
 from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.sweep._convergence_test import UNDECIDED, Trace, arrived, first_trace
+from jaxbiped.sweep._convergence_test import UNDECIDED, ArrivalHistory, after_arrival, empty_history
 from jaxbiped.sweep._goals import Goals
-from jaxbiped.sweep._sliding import rolled, slid_since
+from jaxbiped.sweep._sliding import contact_places, slip_distances
 
 _SECANTS = 8
 """By which an arrival within a step is located, to rounding."""
@@ -32,7 +38,7 @@ class Start(NamedTuple):
     Attributes:
         solve: what to simulate: a `Solve` or a `RigidWalk`.
         goals: the gaits that it may converge to.
-        gap: see `arrived`; 0 where recurrences are not looked for.
+        gap: see `after_arrival`; 0 where recurrences are not looked for.
         patience: longest time between two footsteps [s].
     """
 
@@ -64,16 +70,16 @@ class Progress(NamedTuple):
         solve: the solver's own.
         trace: see there.
         strike: time of the last footstep [s].
-        landed: where each foot came down; see `slid_since`. None for a rigid walker.
+        landed: where each foot came down; see `slip_distances`. None for a rigid walker.
     """
 
     solve: Any
-    trace: Trace
+    trace: ArrivalHistory
     strike: Scalar
     landed: tuple[Scalar, Scalar] | None
 
 
-class AbstractCourse(abc.ABC):
+class AbstractLabellingLoop(abc.ABC):
     """The functions of a labelling loop: `begin`, `attempt` until it is over, `finish`."""
 
     @abc.abstractmethod
@@ -89,7 +95,7 @@ class AbstractCourse(abc.ABC):
         """The label and what goes with it."""
 
 
-class CompliantCourse(AbstractCourse):
+class CompliantLabelling(AbstractLabellingLoop):
     """Of the compliant walker, which arrives at mid-stance, on whichever leg.
 
     Attributes:
@@ -108,8 +114,8 @@ class CompliantCourse(AbstractCourse):
     def begin(self, start: Start) -> Progress:
         solve: Solve = start.solve
         zero = jnp.zeros_like(solve.duration)
-        trace = first_trace(zero, len(solve.state) - 1, self.periods)
-        landed = rolled(solve.scene, solve.state)
+        trace = empty_history(zero, len(solve.state) - 1, self.periods)
+        landed = contact_places(solve.scene, solve.state)
         return Progress(self.steps.start(solve), trace, zero, landed)
 
     def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
@@ -120,7 +126,7 @@ class CompliantCourse(AbstractCourse):
         strike = jnp.where(count > before_count, after.t, now.strike)
         trace = self._traced(start, now, after)
         assert now.landed is not None
-        landed, slid = slid_since(solve.scene, after.state, now.landed)
+        landed, slid = slip_distances(solve.scene, after.state, now.landed)
         late = after.t - strike > start.patience
         verdict = jnp.where(late, int(Label.OUT_OF_STEPS), trace.verdict)
         verdict = jnp.where(slid > solve.scene.walker.l, int(Label.SLID), verdict)
@@ -139,12 +145,12 @@ class CompliantCourse(AbstractCourse):
             attempts=solved.accepted + solved.rejected,
         )
 
-    def _traced(self, start: Start, now: Progress, after: Any) -> Trace:
+    def _traced(self, start: Start, now: Progress, after: Any) -> ArrivalHistory:
         """After the last step, within which it may have arrived at mid-stance."""
         scene, last, section = start.solve.scene, after.last, MidStance()
 
         def rises(change: bool) -> Scalar:
-            old, new = _named(change, last.state), _named(change, after.state)
+            old, new = _with_leg_names(change, last.state), _with_leg_names(change, after.state)
             crosses = (section.value(scene, old) < 0.0) & (section.value(scene, new) >= 0.0)
             return crosses & section.counts(scene, new)
 
@@ -156,15 +162,17 @@ class CompliantCourse(AbstractCourse):
 
         def at(time: Scalar) -> State:
             state = dense.evaluate(time)
-            pairs = zip(_named(True, state), _named(False, state), strict=True)
+            pairs = zip(_with_leg_names(True, state), _with_leg_names(False, state), strict=True)
             return type(state)(*[jnp.where(first, a, b) for a, b in pairs])
 
-        def on_section() -> Trace:
+        def on_section() -> ArrivalHistory:
             def value(time: Scalar) -> Scalar:
                 return section.value(scene, at(time))
 
             time = _root(value, last.t, after.t)
-            return arrived(now.trace, _recurring(at(time)), start.goals, self.periods, start.gap)
+            return after_arrival(
+                now.trace, _recurring_components(at(time)), start.goals, self.periods, start.gap
+            )
 
         return _trace_or(arrives, on_section, now.trace)
 
@@ -192,7 +200,7 @@ def _root(value: Callable[[Scalar], Scalar], low: Scalar, high: Scalar) -> Scala
     return jax.lax.fori_loop(0, _SECANTS, secant, start)[-1]
 
 
-class RigidCourse(AbstractCourse):
+class RigidLabelling(AbstractLabellingLoop):
     """Of the rigid walker, which arrives just after its impacts.
 
     Attributes:
@@ -205,14 +213,16 @@ class RigidCourse(AbstractCourse):
     def begin(self, start: Start) -> Progress:
         walk: RigidWalk = start.solve
         zero = jnp.zeros_like(walk.duration)
-        trace = first_trace(zero, len(walk.state) - 1, self.periods)
-        return Progress(begun(walk), trace, zero, None)
+        trace = empty_history(zero, len(walk.state) - 1, self.periods)
+        return Progress(initial_progress(walk), trace, zero, None)
 
     def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
-        after, over = attempted(start.solve, now.solve)
+        after, over = attempt_step(start.solve, now.solve)
 
-        def on_section() -> Trace:
-            return arrived(now.trace, _recurring(after.state), start.goals, self.periods, start.gap)
+        def on_section() -> ArrivalHistory:
+            return after_arrival(
+                now.trace, _recurring_components(after.state), start.goals, self.periods, start.gap
+            )
 
         trace = _trace_or(after.struck, on_section, now.trace)
         strike = jnp.where(after.struck, after.t, now.strike)
@@ -228,13 +238,13 @@ class RigidCourse(AbstractCourse):
             code=walked.code,
             footsteps=walked.footsteps,
             time=walked.t,
-            distance=whole(start.solve, walked).hip_x - start.solve.state.hip_x,
+            distance=state_with_hip(start.solve, walked).hip_x - start.solve.state.hip_x,
             attempts=walked.attempts,
         )
 
 
 def _outcome(
-    trace: Trace,
+    trace: ArrivalHistory,
     *,
     code: Scalar,
     footsteps: Scalar,
@@ -263,20 +273,22 @@ def _outcome(
     )
 
 
-def _trace_or(condition: Scalar, make: Callable[[], Trace], old: Trace) -> Trace:
+def _trace_or(
+    condition: Scalar, make: Callable[[], ArrivalHistory], old: ArrivalHistory
+) -> ArrivalHistory:
     """A new trace where the condition holds; made only if it does in any start of the batch."""
 
-    def made() -> Trace:
+    def made() -> ArrivalHistory:
         return jtu.tree_map(lambda a, b: jnp.where(condition, a, b), make(), old)
 
-    trace: Trace = jax.lax.cond(eqxi.unvmap_any(condition), made, lambda: old)
+    trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(condition), made, lambda: old)
     return trace
 
 
-def _recurring(state: Any) -> tuple[Scalar, ...]:
+def _recurring_components(state: Any) -> tuple[Scalar, ...]:
     """A state without the place along the slope, its first component."""
     return tuple(state[1:])
 
 
-def _named(exchanged: bool, state: Any) -> Any:
+def _with_leg_names(exchanged: bool, state: Any) -> Any:
     return exchange_legs(state) if exchanged else state

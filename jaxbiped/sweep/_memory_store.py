@@ -1,4 +1,4 @@
-"""Results in memory: what a `Store` is, without a disk."""
+"""Memory store: results of a sweep without a disk."""
 
 import json
 from typing import TYPE_CHECKING, Any

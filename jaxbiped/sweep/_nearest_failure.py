@@ -1,4 +1,4 @@
-"""The nearest start that does not return to the gait: how small a push is fatal."""
+"""Nearest failure: the nearest start that does not return to the gait."""
 
 from typing import Any
 

@@ -18,7 +18,7 @@ from jaxbiped.sweep._memory_store import Memory
 from jaxbiped.sweep._prepare import Guesses, guesses_among, with_gaits_met, with_guesses
 from jaxbiped.sweep._provenance import provenance
 from jaxbiped.sweep._same_store import GAITS
-from jaxbiped.sweep._workers import computed
+from jaxbiped.sweep._workers import compute_chunks
 from jaxbiped.sweep._zarr_store import Store, check_store
 from jaxbiped.sweep.starts._coordinates import coordinate_quantities
 from jaxbiped.sweep.starts._starts import AbstractStarts
@@ -102,11 +102,11 @@ def sweep(
     fresh = int(sizes[missing].sum())
     with tqdm(total=starts.size, unit="starts", disable=not progress, smoothing=0.05) as bar:
         bar.update(starts.size - fresh)
-        for number, fields in computed(known, layout, missing, executor, int(workers)):
+        for number, fields in compute_chunks(known, layout, missing, executor, int(workers)):
             sink.write(number, fields)
             bar.update(int(sizes[number]))
     if look_for_gaits:
-        known = _resolved(known, layout, sink)
+        known = _resolve(known, layout, sink)
     sink.note(
         {
             GAITS: json.dumps(known.family.described()),
@@ -119,7 +119,7 @@ def sweep(
     return dataset
 
 
-def _resolved(labelling: Labelling, layout: Layout, sink: Any) -> Labelling:
+def _resolve(labelling: Labelling, layout: Layout, sink: Any) -> Labelling:
     """Seeks gaits from starts that are unresolved but repeat a cycle; labels the unresolved anew.
 
     Where they were sought is noted first: a run that is killed here finds the same ones again,

@@ -1,4 +1,4 @@
-"""Results in a Zarr store: written a chunk at a time, continued where a killed run left off."""
+"""Zarr store: results written a chunk at a time, continued where a killed run left off."""
 
 import json
 import os
@@ -145,7 +145,7 @@ class Store:
 
     def dataset(self) -> "xarray.Dataset":
         """The results, opened lazily."""
-        return opened(self.path)
+        return open_store(self.path)
 
 
 def check_store(path: Path) -> None:
@@ -158,7 +158,7 @@ def check_store(path: Path) -> None:
         )
 
 
-def opened(path: Path) -> "xarray.Dataset":
+def open_store(path: Path) -> "xarray.Dataset":
     """The dataset of a store, read as it is needed."""
     import xarray
 

@@ -1,1 +1,1 @@
-"""Variational equations."""
+"""Variational equations: tangents, saltation, first and second variation, adjoint."""

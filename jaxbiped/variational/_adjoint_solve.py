@@ -1,4 +1,4 @@
-"""The adjoint of second tangents along a motion that is already known, by lanes."""
+"""Adjoint solve of the second variation along a known motion, by lanes."""
 
 import functools
 from collections.abc import Callable
@@ -12,17 +12,17 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import CompiledProgram, Program, Recording, call, call_recording
 from jaxbiped.variational._adjoint_step import Adjoints, adjoint_step
-from jaxbiped.variational._collocated_step import Rows, linear_about
+from jaxbiped.variational._collocated_step import Rows, linearise_about
 from jaxbiped.variational._first_variation import (
+    FirstVariation,
+    FirstVariationInputs,
+    FirstVariationSolve,
     Step,
-    Turned,
-    TurnedGiven,
-    TurnedSolve,
     field_order,
 )
 from jaxbiped.variational._flow import Arrival, Flow
 from jaxbiped.variational._hybrid_system import AbstractSystem
-from jaxbiped.variational._jets import Bent, renewed
+from jaxbiped.variational._jets import Jet, reset_jet
 from jaxbiped.variational._solve_to_section import Nodes
 from jaxbiped.variational._switch_crossings import earlier_at
 from jaxbiped.variational._tangents import Seeded
@@ -37,13 +37,13 @@ class _Given(NamedTuple):
     Attributes:
         args: parameters.
         arrival: time and state where the motion arrives.
-        turned: what `carried` gave.
+        turned: what `carry_tangents` gave.
         after: adjoints behind the arrival, of components in their own order.
     """
 
     args: PyTree
     arrival: Any
-    turned: Turned
+    turned: FirstVariation
     after: Adjoints
 
 
@@ -55,23 +55,29 @@ class _Now(NamedTuple):
     count: Any
 
 
-def carried(flow: Flow, nodes: Nodes, turned: Scalar) -> tuple[Turned, Recording]:
+def carry_tangents(flow: Flow, nodes: Nodes, turned: Scalar) -> tuple[FirstVariation, Recording]:
     """Turned tangents (v, c) carried along a motion to its arrival; and the steps of that."""
-    given = TurnedGiven(flow.args.args, nodes.start, nodes.arrival, turned, nodes.steps)
+    given = FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, turned, nodes.steps)
     compiled = _compiled(_kind(flow), None)
     room = nodes.ends.recorder.room
     return call_recording(compiled, given, room=room, quick=True, tape=nodes.ends, once=True)
 
 
-def pulled_back(
-    flow: Flow, nodes: Nodes, turned: Turned, steps: Recording, after: Adjoints, *, final: bool
+def pull_back(
+    flow: Flow,
+    nodes: Nodes,
+    turned: FirstVariation,
+    steps: Recording,
+    after: Adjoints,
+    *,
+    final: bool,
 ) -> Adjoints:
     """Adjoints where a motion starts, from those behind its arrival.
 
     Args:
         flow: what moves.
         nodes: of the motion.
-        turned, steps: from `carried` along it.
+        turned, steps: from `carry_tangents` along it.
         after: adjoints behind the arrival.
         final: whether the turn ends there: of that arrival tangents on the section are told.
     """
@@ -113,11 +119,13 @@ def _compiled(kind: _Kind, final: bool | None) -> CompiledProgram:
     args = jtu.tree_unflatten(kind.args, [numbers()] * kind.args.num_leaves)
     row, turned = numbers(1 + c), numbers(COUNT, c)
     if final is None:
-        given = TurnedGiven(args, row, row, turned, numbers())
-        return CompiledProgram(TurnedSolve(flow, 1 + c).program(), given)
+        given = FirstVariationInputs(args, row, row, turned, numbers())
+        return CompiledProgram(FirstVariationSolve(flow, 1 + c).program(), given)
     after = Adjoints(turned, numbers(c), numbers(p))
     program = _AdjointSolve(flow, Step.shape(c, COUNT), final).program()
-    return CompiledProgram(program, _Given(args, row, Turned(turned, numbers(c), numbers()), after))
+    return CompiledProgram(
+        program, _Given(args, row, FirstVariation(turned, numbers(c), numbers()), after)
+    )
 
 
 class _AdjointSolve:
@@ -143,8 +151,8 @@ class _AdjointSolve:
             first = jnp.concatenate([given.turned.turned, before.family[None]]).T
             idle = jnp.zeros((COUNT, len(parameters)))
             seeds = jnp.concatenate([idle, before.parameters[None]]).T
-            bent = Bent(first, before.second.T[:, None, :])
-            found = renewed(flow, z, bent, seeds, COUNT, final=self.final)
+            jet = Jet(first, before.second.T[:, None, :])
+            found = reset_jet(flow, z, jet, seeds, COUNT, final=self.final)
             return found.first[:, COUNT], found.second[:, 0].T
 
         _, pull = jax.vjp(behind, jax.tree.map(jnp.zeros_like, after))
@@ -162,7 +170,7 @@ class _AdjointSolve:
         step = Step.read(row, self.step)
         rows = Rows(flow.apart, order, list(parameters))
         crossed, ends = step.which > 0.0, (step.before, now.state)
-        linear = linear_about(rows, *ends, step.points, step.share, crossed)
+        linear = linearise_about(rows, *ends, step.points, step.share, crossed)
         early = jax.lax.cond(
             crossed,
             lambda: earlier_at(flow, flow.surfaces, now.state, step.which, parameters),

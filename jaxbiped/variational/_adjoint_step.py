@@ -1,4 +1,4 @@
-"""One step of the adjoint of second tangents, backwards in time, for lanes.
+"""Adjoint step of the second variation, backwards in time, for lanes.
 
 A weighted sum of the mixed second tangents C of `_curvature` at the end of a step is a sum of what
 was before it: C there, and linearly the family's tangent Q and the parameters, which enter the

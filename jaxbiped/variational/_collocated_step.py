@@ -1,4 +1,4 @@
-"""The vector field about one step by Radau IIA, for lanes.
+"""Collocated step: the vector field about one step by Radau IIA, for lanes.
 
 The method is that of `_radau`; here the components whose rate is a component are eliminated by
 hand, and the step is one, not many.
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import jacobian
-from jaxbiped.linalg._elimination import BlockFactors, factored
+from jaxbiped.linalg._elimination import BlockFactors, factorise
 from jaxbiped.solve.rosenbrock._linearisation import linearise
 from jaxbiped.variational._radau_collocation import RADAU, Path
 from jaxbiped.variational._switch_crossings import SIDES, jump_of
@@ -87,7 +87,7 @@ class Stages(NamedTuple):
             nothing = jnp.zeros((3, k, 3, k - d))
             blocks = blocks + jnp.concatenate([twice, nothing], axis=-1)
         matrix = jnp.eye(3 * k) - blocks.reshape(3 * k, 3 * k)
-        return Stages(order, weights, by_direct, factored(matrix, k))
+        return Stages(order, weights, by_direct, factorise(matrix, k))
 
     def solve(self, right: Any, forcing: Any) -> Any:
         """u of (I − A ⊗ J) u = r + (A ⊗ I) b, shape (3, c); r (3, c), b of the kept (3, k)."""
@@ -196,20 +196,20 @@ class Linear(NamedTuple):
     jump: Any
 
 
-def collocated(rows: Rows, path: Path, crossed: Any) -> tuple[Any, Any, Any]:
+def collocate_step(rows: Rows, path: Path, crossed: Any) -> tuple[Any, Any, Any]:
     """A step whose leaves have no leading axis: its collocation points, (3, c), in their own order.
 
     Also their shares of time, (3,), and the rates where it begins.
     """
     part, share = (each[0] for each in jax.tree.map(lambda x: x[None], path).clock())
     begins, ends = rows.velocity(path.before), rows.velocity(path.after)
-    points = _corrected(rows, path, part, share, begins, ends)
+    points = _correct(rows, path, part, share, begins, ends)
     # A step that ends on a switch belongs to the old side; a corrected point may lie beyond.
     short = jnp.where(crossed, path.after - MARGIN * ends, points[2])
     return jnp.concatenate([points[:2], short[None]]), share, begins
 
 
-def linear_about(
+def linearise_about(
     rows: Rows, before: Any, after: Any, points: Any, share: Any, crossed: Any
 ) -> Linear:
     """The field about a step between two states, whose `points` and shares are known."""
@@ -228,7 +228,7 @@ def linear_about(
     )
 
 
-def _corrected(rows: Rows, path: Path, part: Any, share: Any, begins: Any, ends: Any) -> Any:
+def _correct(rows: Rows, path: Path, part: Any, share: Any, begins: Any, ends: Any) -> Any:
     """The collocation points: a cubic, once corrected."""
     order = rows.order
     h, change = path.span, path.after - path.before

@@ -1,4 +1,4 @@
-"""The derivative of a Rosenbrock step, one direction at a time."""
+"""Column step: the derivative of a Rosenbrock step, one direction at a time."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import jacobian
-from jaxbiped.solve._fusion_barrier import fences_down
+from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve.rosenbrock._linearisation import Components, split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
     RosenbrockTableau,
@@ -46,7 +46,7 @@ class Differentiated(NamedTuple):
     by_parameter: Any
 
 
-def differentiated_step(
+def differentiate_step(
     tableau: RosenbrockTableau,
     field: Callable[[Any, PyTree, PyTree], PyTree],
     t0: Any,
@@ -68,7 +68,7 @@ def differentiated_step(
         return split(field(t, join(y), with_active(args, list(q))))[0]
 
     span = jnp.asarray(t1 - t0)
-    with fences_down():
+    with without_barriers():
         stages = stages_of(tableau, lambda t, y: rates(t, y, parameters), t0, start, span, span)
         order = [*stages.direct, *kept_in_order(stages)]
 
@@ -87,13 +87,13 @@ def differentiated_step(
         ),
         error=join(stages.weighted(error_weights(tableau))),
         order=order,
-        by_state=_picked(by_state, order),
-        by_curvature=_picked(by_curvature, order),
+        by_state=_pick(by_state, order),
+        by_curvature=_pick(by_curvature, order),
         by_parameter=by_parameter,
     )
 
 
-def _picked(array: Any, places: Sequence[int]) -> Any:
+def _pick(array: Any, places: Sequence[int]) -> Any:
     return jnp.stack([array[..., i] for i in places], axis=-1)
 
 
@@ -154,9 +154,9 @@ def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple
     inverse, entries = _inverse(stages)
     increments: list[Any] = []
     for i in range(len(tableau.alpha)):
-        argument = _weighted(tableau.a[i - 1] if i else (), increments, start)
+        argument = _weighted_sum(tableau.a[i - 1] if i else (), increments, start)
         coefficients = [tableau.gamma * c for c in tableau.c[i - 1]] if i else ()
-        memory = _weighted(coefficients, increments, nothing)
+        memory = _weighted_sum(coefficients, increments, nothing)
         if i == 0:
             # Its argument is the start itself: the matrices are summed once for all directions.
             right = (step.by_curvature[i] + step.by_state[i]) @ start
@@ -169,8 +169,8 @@ def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple
         followers = through + g * solved[:led]
         increments.append(jnp.concatenate([followers, solved]))
     back = [order.index(i) for i in range(len(column))]
-    end = _weighted(end_weights(tableau), increments, start)
-    error = _weighted(error_weights(tableau), increments, nothing)
+    end = _weighted_sum(end_weights(tableau), increments, start)
+    error = _weighted_sum(error_weights(tableau), increments, nothing)
     return jnp.stack([end[i] for i in back]), jnp.stack([error[i] for i in back])
 
 
@@ -192,7 +192,7 @@ def _inverse(stages: Stages) -> tuple[Any, Any]:
     return inverse, jnp.stack([jnp.stack(row) for row in entries])
 
 
-def _weighted(weights: Sequence[float], increments: Sequence[Any], start: Any) -> Any:
+def _weighted_sum(weights: Sequence[float], increments: Sequence[Any], start: Any) -> Any:
     """start + Σ weights_j increments_j, one behind the other: sums that begin alike are shared."""
     for weight, increment in zip(weights, increments, strict=False):
         if weight != 0.0:

@@ -1,4 +1,4 @@
-"""Second derivatives of a turn, with the jumps that switches give them.
+"""Curvature of a flow: second derivatives, with the jumps that switches give them.
 
 Across a switch the Jacobian J of the vector field jumps, so its derivative holds a pulse that no
 derivative taken through solver steps can see. For two tangents V and Q of the motion, and a
@@ -22,7 +22,7 @@ import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
 from jaxbiped.variational._flow import Flow
-from jaxbiped.variational._jets import Bent
+from jaxbiped.variational._jets import Jet
 from jaxbiped.variational._radau_collocation import (
     Path,
     Rates,
@@ -34,9 +34,9 @@ from jaxbiped.variational._radau_collocation import (
 )
 from jaxbiped.variational._switch_crossings import (
     Crossings,
-    bent_by,
     crossings_of,
     earlier_at,
+    jet_jump,
     jump_of,
     sides_of,
 )
@@ -51,15 +51,15 @@ CHUNK = 64
 """Steps that are solved at once."""
 
 
-def along_path(
+def jet_along_path(
     flow: Flow,
     times: Scalar,
     states: Scalar,
     parameters: Scalar,
-    bent: Bent,
+    jet: Jet,
     seeds: Scalar,
     count: int,
-) -> Bent:
+) -> Jet:
     """Carries tangents along a motion whose steps end at `times` and `states`.
 
     Args:
@@ -82,7 +82,7 @@ def along_path(
     times = jnp.where(known, times, last_time)
     states = jnp.where(known[:, None], states, last_state)
 
-    def chunk(carried: tuple[Scalar, _Reached, Bent]) -> tuple[Scalar, _Reached, Bent]:
+    def chunk(carried: tuple[Scalar, _Reached, Jet]) -> tuple[Scalar, _Reached, Jet]:
         start, reached, now = carried
         t = jax.lax.dynamic_slice_in_dim(times, start, CHUNK + 1)
         y = jax.lax.dynamic_slice_in_dim(states, start, CHUNK + 1)
@@ -93,7 +93,7 @@ def along_path(
 
     never = jnp.asarray(False)
     reached = _Reached(times[0], states[0], never, times[0] - LONG_AGO)
-    begin = (jnp.asarray(0), reached, bent)
+    begin = (jnp.asarray(0), reached, jet)
     return jax.lax.while_loop(lambda c: c[0] < steps, chunk, begin)[2]
 
 
@@ -172,10 +172,10 @@ def _chunk(
     path: Path,
     crossings: Crossings,
     parameters: Scalar,
-    bent: Bent,
+    jet: Jet,
     seeds: Scalar,
     count: int,
-) -> Bent:
+) -> Jet:
     c = path.before.shape[1]
     linear = _linear(flow, path, crossings, parameters)
     stages = collocation(path, linear.jacobians)
@@ -189,7 +189,7 @@ def _chunk(
         return end, (first, shift, begun, end)
 
     known = (step_map, linear.velocities, path.fresh)
-    last, (arrived, shifts, firsts, ends) = jax.lax.scan(follow, bent.first, known)
+    last, (arrived, shifts, firsts, ends) = jax.lax.scan(follow, jet.first, known)
     at_stages = stages.within(firsts, seeds)
     moved = with_seeds(at_stages[..., count:], seeds[:, count:])
 
@@ -202,18 +202,20 @@ def _chunk(
     early = jax.vmap(lambda y, which: earlier_at(flow, flow.surfaces, y, which, parameters))(
         crossings.landed, crossings.which
     )
-    sources = sources + bent_by(linear.jump, early, ends, seeds, count)
-    shifted = _shifted(linear, arrived, shifts, seeds, count)
+    sources = sources + jet_jump(linear.jump, early, ends, seeds, count)
+    shifted = _shift_correction(linear, arrived, shifts, seeds, count)
 
     def gather(second: Scalar, step: tuple[Scalar, ...]) -> tuple[Scalar, None]:
         matrix, shifted, source = step
         return jnp.einsum("ab,bqv->aqv", matrix, second + shifted) + source, None
 
-    second, _ = jax.lax.scan(gather, bent.second, (step_map[..., :c], shifted, sources))
-    return Bent(last, second)
+    second, _ = jax.lax.scan(gather, jet.second, (step_map[..., :c], shifted, sources))
+    return Jet(last, second)
 
 
-def _shifted(linear: _Linear, arrived: Scalar, shifts: Scalar, seeds: Scalar, count: int) -> Scalar:
+def _shift_correction(
+    linear: _Linear, arrived: Scalar, shifts: Scalar, seeds: Scalar, count: int
+) -> Scalar:
     """What C gains where V loses σ f and Q loses τ f: −σ (Q)' − τ (V)' + σ τ f'."""
     c = linear.velocities.shape[1]
     flow = jnp.einsum("sab,sb->sa", linear.at_start[..., :c], linear.velocities)

@@ -1,4 +1,4 @@
-"""Scenes solved by lanes, with derivatives of their own."""
+"""Differentiable solve: scenes solved by lanes, with derivatives of their own."""
 
 import functools
 from collections.abc import Callable, Sequence
@@ -22,8 +22,8 @@ from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import Precision
 from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents
-from jaxbiped.variational._variational_solve import cross
-from jaxbiped.variational._variational_types import Crossed
+from jaxbiped.variational._variational_solve import solve_variational
+from jaxbiped.variational._variational_types import VariationalSolution
 
 _LOOSER = 10.0
 """Tolerance of derivatives, in units of the state's."""
@@ -51,7 +51,7 @@ class Setting(NamedTuple):
     saved: Saved = Saved()
 
 
-def solved(solve: Solve, setting: Setting) -> Solved:
+def solve_scene(solve: Solve, setting: Setting) -> Solved:
     """Solves one simulation, or under `vmap` many.
 
     Its derivatives are those of the final state, and by the duration that of the time; at the time
@@ -66,10 +66,10 @@ def solved(solve: Solve, setting: Setting) -> Solved:
     if not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
         compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
         return call(compiled, solve, quick=setting.quick)[0]
-    return Solved(*_unflat(solve.state, _differentiable(setting, structure)(*leaves)))
+    return Solved(*_unflatten(solve.state, _differentiable(setting, structure)(*leaves)))
 
 
-def solved_and_saved(
+def solve_and_save(
     solve: Solve, setting: Setting, *, times: np.ndarray | None = None, room: int = 0
 ) -> tuple[Solved, Recorded | None]:
     """The same with what the setting saves: records of the time and the state's eight components.
@@ -82,7 +82,7 @@ def solved_and_saved(
     return call(compiled, solve, schedule, room=room, quick=setting.quick)
 
 
-def solved_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[Solved, np.ndarray]:
+def solve_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[Solved, np.ndarray]:
     """One simulation, not traced, and the records of its at most so many steps, (n, numbers)."""
     compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
     one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], solve)
@@ -110,7 +110,7 @@ def compiled_solve(setting: Setting, scene: Any) -> CompiledProgram:
 
 
 @functools.lru_cache(maxsize=256)
-def expressible(setting: Setting, scene: Any) -> bool:
+def is_expressible(setting: Setting, scene: Any) -> bool:
     """Whether lanes have all operations of scenes of this structure (see `jax.tree.structure`)."""
     try:
         compiled_solve(setting, scene).check()
@@ -132,7 +132,7 @@ def _differentiable(setting: Setting, structure: Any) -> Callable[..., list[Scal
         found = run(*primals)
         solve = jtu.tree_unflatten(structure, primals)
         moved = jtu.tree_unflatten(structure, tangents)
-        t, state, *counts = _unflat(solve.state, found)
+        t, state, *counts = _unflatten(solve.state, found)
         t_dot, state_dot = _tangents(setting, solve, moved, t, state)
         none = [np.zeros(jnp.shape(count), dtype=jax.dtypes.float0) for count in counts]
         return found, [t_dot, *state_dot, *none]
@@ -141,7 +141,7 @@ def _differentiable(setting: Setting, structure: Any) -> Callable[..., list[Scal
     return run
 
 
-def _unflat(like: Any, found: Sequence[Scalar]) -> tuple[Any, ...]:
+def _unflatten(like: Any, found: Sequence[Scalar]) -> tuple[Any, ...]:
     t, *rest = found
     size = len(like)
     return t, type(like)(*rest[:size]), *rest[size:]
@@ -174,7 +174,7 @@ def _is_zero(tangent: Any) -> bool:
 
 def _columns(
     setting: Setting, solve: Solve, places: list[int], active: tuple[int, ...], t: Scalar
-) -> Crossed:
+) -> VariationalSolution:
     """The final state's derivatives by components of the start and by leaves of the scene."""
     c, m, p = len(solve.state), len(places), len(active)
     start = np.zeros((c, m + p))
@@ -184,7 +184,7 @@ def _columns(
     inverse = units_of(solve.scene, solve.state).inverse
     by_state = [jnp.asarray(_FLOOR * inverse[i]) for i in places]
     floors = jnp.stack([*by_state, *(_FLOOR / size for size in sizes)])
-    return cross(
+    return solve_variational(
         _WATCH,
         setting.solver,
         Tangents(solve.state, jnp.asarray(start)),

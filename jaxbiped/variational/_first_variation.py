@@ -1,4 +1,4 @@
-"""Turned tangents along a motion that is already known, and the steps they take, by lanes."""
+"""First variation along a known motion in two directions, and the steps it takes, by lanes."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Program
-from jaxbiped.variational._collocated_step import Order, Rows, Stages, collocated, order_of
+from jaxbiped.variational._collocated_step import Order, Rows, Stages, collocate_step, order_of
 from jaxbiped.variational._curvature import LONG_AGO, SETTLED
 from jaxbiped.variational._flow import Flow
 from jaxbiped.variational._radau_collocation import Path
@@ -22,7 +22,7 @@ class Step(NamedTuple):
 
     Attributes:
         before: state where it starts, (c,).
-        points, share: as from `collocated`.
+        points, share: as from `collocate_step`.
         fresh: whether it starts on a switch.
         which: the number of the switch that it ends on, as in `Crossings`.
         turned: tangents where it starts, in order, before the flow is taken out of them, (v, c).
@@ -67,7 +67,7 @@ class Step(NamedTuple):
         )
 
 
-class TurnedGiven(NamedTuple):
+class FirstVariationInputs(NamedTuple):
     """Inputs.
 
     Attributes:
@@ -84,7 +84,7 @@ class TurnedGiven(NamedTuple):
     steps: Any
 
 
-class Turned(NamedTuple):
+class FirstVariation(NamedTuple):
     """Outputs: tangents before the arrival (v, c), the state there, and the number of steps."""
 
     turned: Any
@@ -116,7 +116,7 @@ class _Now(NamedTuple):
     ends: Any
 
 
-class TurnedSolve:
+class FirstVariationSolve:
     """The functions of the program: its tape's rows are time and state at the ends of steps.
 
     The motion ends at the arrival, not at the last node, and begins and ends before its section:
@@ -131,7 +131,7 @@ class TurnedSolve:
         """The program."""
         return Program(self.start, self.attempt, self.finish, record=self.record, tape=self.row)
 
-    def start(self, given: TurnedGiven) -> _Now:
+    def start(self, given: FirstVariationInputs) -> _Now:
         flow = self.flow(given)
         order, parameters = field_order(flow)
         known = flow.earlier(given.start, parameters)
@@ -151,7 +151,7 @@ class TurnedSolve:
             ends=none,
         )
 
-    def attempt(self, given: TurnedGiven, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
+    def attempt(self, given: FirstVariationInputs, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
         flow = self.flow(given)
         order, parameters = field_order(flow)
         read = now.read + 1.0
@@ -169,7 +169,7 @@ class TurnedSolve:
             fresh=now.fresh,
         )
         rows = Rows(flow.apart, order, list(parameters))
-        points, share, velocity = collocated(rows, path, crossing.crossed)
+        points, share, velocity = collocate_step(rows, path, crossing.crossed)
         stages = Stages.of(order, share, jax.lax.map(rows.by_state, points))
         begun, _ = without_flow(now.turned, order.sorted(velocity), now.fresh)
         after = _Now(
@@ -195,13 +195,15 @@ class TurnedSolve:
         waiting = now._replace(node=node, read=read, ends=jnp.asarray(False))
         return jax.tree.map(lambda a, b: jnp.where(soon, a, b), waiting, after), over
 
-    def record(self, given: TurnedGiven, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
+    def record(
+        self, given: FirstVariationInputs, now: _Now, time: Scalar
+    ) -> tuple[Scalar, list[Scalar]]:
         """The steps."""
         return now.ends, [now.step.row()]
 
-    def finish(self, given: TurnedGiven, now: _Now) -> Turned:
+    def finish(self, given: FirstVariationInputs, now: _Now) -> FirstVariation:
         order, _ = field_order(self.flow(given))
-        return Turned(order.restored(now.turned), now.state, now.taken)
+        return FirstVariation(order.restored(now.turned), now.state, now.taken)
 
 
 def without_flow(turned: Scalar, velocity: Scalar, fresh: Scalar) -> tuple[Scalar, Scalar]:

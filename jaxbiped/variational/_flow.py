@@ -1,4 +1,4 @@
-"""A system's rates, switches, section and renewal as functions of components and parameters."""
+"""Flow of a system: rates, switches, section and reset map of components and parameters."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -51,10 +51,10 @@ class Flow(eqx.Module):
         state, scene = self._parts(z)
         return self.system.switches(scene, state)
 
-    def renewed(self, z: Scalar) -> Scalar:
+    def reset(self, z: Scalar) -> Scalar:
         """The components after an arrival's renewal, shape (c,)."""
         state, scene = self._parts(z)
-        return jnp.stack(jtu.tree_leaves(self.system.renew(scene, state)))
+        return jnp.stack(jtu.tree_leaves(self.system.reset_map(scene, state)))
 
     def section(self, z: Scalar) -> Scalar:
         """The section's value."""

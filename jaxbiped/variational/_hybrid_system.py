@@ -1,4 +1,4 @@
-"""What a return map must know of a dynamical system."""
+"""Hybrid systems: the vector field, switches, endings and reset map that a return map needs."""
 
 import abc
 from typing import Any, ClassVar
@@ -31,14 +31,14 @@ class AbstractSystem(eqx.Module):
     system of your own: the walker is only one of them, `Walking`.
 
     Attributes:
-        drifting: positions of the state's leaves that need not return, only advance: no rate may
+        cyclic_coordinates: positions of the leaves that need not return, only advance: no rate may
             depend on them.
-        renews_by_symmetry: whether `renew` maps motions to motions, as exchanging the legs does.
+        reset_is_symmetry: whether `reset_map` maps motions to motions, as an exchange of legs does.
             Second derivatives of cycles of several arrivals need it.
     """
 
-    drifting: ClassVar[tuple[int, ...]] = ()
-    renews_by_symmetry: ClassVar[bool] = False
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = ()
+    reset_is_symmetry: ClassVar[bool] = False
 
     @abc.abstractmethod
     def vector_field(self, t: Any, y: PyTree, args: PyTree) -> PyTree:
@@ -53,7 +53,7 @@ class AbstractSystem(eqx.Module):
         """Code of the `Ending` that has come, 0 where the motion goes on."""
 
     @abc.abstractmethod
-    def renew(self, args: PyTree, y: PyTree) -> PyTree:
+    def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
         """What is done to the state at each arrival: a symmetry, an impact, or nothing."""
 
     @abc.abstractmethod
@@ -69,8 +69,8 @@ def system_of(scene: Scene | RigidScene | RedundantScene) -> AbstractSystem:
 class Walking(AbstractSystem):
     """The walker: legs exchanged at each footstep, the place along the slope left out."""
 
-    drifting: ClassVar[tuple[int, ...]] = (State._fields.index("hip_x"),)
-    renews_by_symmetry: ClassVar[bool] = True
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = (State._fields.index("hip_x"),)
+    reset_is_symmetry: ClassVar[bool] = True
 
     def vector_field(self, t: Any, y: State, args: Scene) -> State:
         return vector_field(t, y, args)
@@ -81,7 +81,7 @@ class Walking(AbstractSystem):
     def ending(self, args: Scene, y: State) -> Scalar:
         return _ending(args, y)
 
-    def renew(self, args: Scene, y: State) -> State:
+    def reset_map(self, args: Scene, y: State) -> State:
         return exchange_legs(y)
 
     def load(self, args: Scene, y: State) -> Scalar:
@@ -95,7 +95,7 @@ class RedundantWalking(AbstractSystem):
     `find_gait` tells its returns in minimal coordinates; by itself it is for `return_map`.
     """
 
-    renews_by_symmetry: ClassVar[bool] = True
+    reset_is_symmetry: ClassVar[bool] = True
 
     def vector_field(self, t: Any, y: Any, args: RedundantScene) -> Any:
         return redundant_field(t, y, args)
@@ -106,7 +106,7 @@ class RedundantWalking(AbstractSystem):
     def ending(self, args: Any, y: Any) -> Scalar:
         return _ending(args, y)
 
-    def renew(self, args: Any, y: Any) -> Any:
+    def reset_map(self, args: Any, y: Any) -> Any:
         return exchange_legs(y)
 
     def load(self, args: Any, y: Any) -> Scalar:
@@ -126,7 +126,7 @@ def _load(args: Any, y: Any) -> Scalar:
     return jnp.maximum(forces.foot_1.normal, forces.foot_2.normal)
 
 
-def checked_section(scene: Any, section: AbstractSection | None) -> AbstractSection:
+def section_of(scene: Any, section: AbstractSection | None) -> AbstractSection:
     """The section asked for, or the one that a scene's cycles begin at unless told otherwise.
 
     Raises:
@@ -145,7 +145,7 @@ def checked_section(scene: Any, section: AbstractSection | None) -> AbstractSect
 class Rolling(AbstractSystem):
     """The rigid walker: it rolls on leg 2, and exchanges support at each heel strike."""
 
-    drifting: ClassVar[tuple[int, ...]] = (RigidState._fields.index("hip_x"),)
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = (RigidState._fields.index("hip_x"),)
 
     def vector_field(self, t: Any, y: RigidState, args: RigidScene) -> RigidState:
         return rolling_field(t, y, args)
@@ -156,7 +156,7 @@ class Rolling(AbstractSystem):
     def ending(self, args: RigidScene, y: RigidState) -> Scalar:
         return rigid_ending(y)
 
-    def renew(self, args: RigidScene, y: RigidState) -> RigidState:
+    def reset_map(self, args: RigidScene, y: RigidState) -> RigidState:
         return impact(args, y).state
 
     def load(self, args: RigidScene, y: RigidState) -> Scalar:

@@ -1,4 +1,4 @@
-"""Radau IIA collocation over steps that are already known, many steps at once.
+"""Radau IIA collocation over known steps, many at once.
 
 Source: Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.5, order five.
 """
@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._types import Scalar
-from jaxbiped.solve._fusion_barrier import fenced
+from jaxbiped.solve._fusion_barrier import fusion_barrier
 
 _ROOT = 6.0**0.5
 _NODES = np.array([(4 - _ROOT) / 10, (4 + _ROOT) / 10, 1.0])
@@ -28,14 +28,14 @@ Rates = Callable[[Sequence[Scalar]], list[Scalar]]
 programs that compile for seconds."""
 
 
-def stacked(rates: Rates) -> Callable[[Scalar], Scalar]:
+def stack_rates(rates: Rates) -> Callable[[Scalar], Scalar]:
     """The same of a vector (c + p,) to a vector (c,)."""
     return lambda z: jnp.stack(rates(list(z)))
 
 
 def velocities(rates: Rates, states: Scalar, parameters: Scalar) -> Scalar:
     """The rates of many states (n, c), shape (n, c)."""
-    return jax.vmap(lambda y: stacked(rates)(jnp.concatenate([y, parameters])))(states)
+    return jax.vmap(lambda y: stack_rates(rates)(jnp.concatenate([y, parameters])))(states)
 
 
 class Path(NamedTuple):
@@ -112,7 +112,7 @@ def gradients(
     flat = points.reshape(-1, size)
     tangents = flat if along is None else along.reshape(-1, size)
     moves = jnp.isfinite(jnp.sum(flat))
-    every = fenced(moves, lambda: jax.vmap(pulls)(flat, tangents))
+    every = fusion_barrier(moves, lambda: jax.vmap(pulls)(flat, tangents))
 
     def pulled() -> Scalar:
         def one(pull: Any) -> Any:
@@ -121,7 +121,7 @@ def gradients(
         # A linear field leaves nothing to pull through: the size is said, not read off.
         return jax.vmap(one, axis_size=flat.shape[0])(every)
 
-    rows = fenced(moves, pulled)
+    rows = fusion_barrier(moves, pulled)
     return rows.reshape(*points.shape, size + parameters.shape[0])
 
 

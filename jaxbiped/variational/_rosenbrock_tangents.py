@@ -1,4 +1,4 @@
-"""The exact derivative of a Rosenbrock step along many directions at once."""
+"""Tangents of a Rosenbrock step: its exact derivative along many directions at once."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.solve._fusion_barrier import fenced
+from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.rosenbrock._linearisation import Components, split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
     RosenbrockTableau,
@@ -21,7 +21,7 @@ from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
 from jaxbiped.variational._tangents import Seeded, Tangents, active_leaves, with_active
 
 
-def rosenbrock_columns(
+def rosenbrock_tangents(
     tableau: RosenbrockTableau,
     field: Callable[[Any, PyTree, PyTree], PyTree],
     t0: Any,
@@ -75,11 +75,11 @@ def rosenbrock_columns(
         return (
             [y + u for y, u in zip(start, stages.weighted(end), strict=True)],
             stages.weighted(error),
-            _rows(columns + _weighted(end, changes), back),
-            _rows(_weighted(error, changes), back),
+            _rows(columns + _weighted_sum(end, changes), back),
+            _rows(_weighted_sum(error, changes), back),
         )
 
-    end, error, columns, column_errors = fenced(stages.step != 0.0, combined)
+    end, error, columns, column_errors = fusion_barrier(stages.step != 0.0, combined)
     return Tangents(join(end), columns), Tangents(join(error), column_errors)
 
 
@@ -117,14 +117,14 @@ def _derivatives(
     moves = stages.step != 0.0
 
     def gradients(of: Callable[..., Any]) -> Scalar:
-        pulls = fenced(moves, lambda: jax.vmap(of)(points, directions))
+        pulls = fusion_barrier(moves, lambda: jax.vmap(of)(points, directions))
 
         def pulled() -> Any:
             # A linear field leaves nothing to pull through: the size is said, not read off.
             every = jax.vmap(lambda pull: jax.vmap(lambda *e: pull(list(e)))(*unit), axis_size=size)
             return every(pulls)
 
-        state_part, parameter_part = fenced(moves, pulled)
+        state_part, parameter_part = fusion_barrier(moves, pulled)
         return jnp.stack([*(state_part[i] for i in order), *parameter_part], axis=-1)
 
     return gradients(at_point), gradients(at_start)
@@ -145,8 +145,8 @@ def _column_stages(
         argument = columns
         right = step * constant[i]
         if i:
-            argument = columns + _weighted(tableau.a[i - 1], increments)
-            memory = _weighted([tableau.gamma * c for c in tableau.c[i - 1]], increments)
+            argument = columns + _weighted_sum(tableau.a[i - 1], increments)
+            memory = _weighted_sum([tableau.gamma * c for c in tableau.c[i - 1]], increments)
             right = right + memory[led:]
         right = right + step * (at_stages[i] @ argument)
         through = step * argument[led : 2 * led]
@@ -183,6 +183,6 @@ def _inverse(stages: Stages) -> tuple[Scalar, Scalar]:
     return inverse, jnp.stack([jnp.stack(row) for row in rows])
 
 
-def _weighted(weights: Sequence[float], values: Sequence[Scalar]) -> Scalar:
+def _weighted_sum(weights: Sequence[float], values: Sequence[Scalar]) -> Scalar:
     terms = [w * v for w, v in zip(weights, values, strict=False) if w != 0.0]
     return sum(terms[1:], terms[0]) if terms else jnp.zeros_like(values[0])

@@ -1,4 +1,4 @@
-"""Passages to a section, with derivatives, by lanes."""
+"""Solves to a section by lanes, with derivatives."""
 
 from typing import Any
 
@@ -9,14 +9,14 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Recording
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._solve_to_section import Nodes, Passage, Precision
+from jaxbiped.variational._solve_to_section import Nodes, Precision, SectionArrival
 from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents
-from jaxbiped.variational._variational_solve import cross
-from jaxbiped.variational._variational_types import Crossed
+from jaxbiped.variational._variational_solve import solve_variational
+from jaxbiped.variational._variational_types import VariationalSolution
 
 
-def passage_by_lanes(
+def solve_to_section_by_lanes(
     watch: Watch,
     solver: AbstractRosenbrock,
     y0: Tangents,
@@ -27,9 +27,9 @@ def passage_by_lanes(
     time_limit: Any,
     max_solver_steps: int,
     steered: Any,
-) -> Passage:
-    """`passage` for columns as `cross` takes them; nodes are told as a `Recording`."""
-    found, recording = cross(
+) -> SectionArrival:
+    """`passage` for columns as `solve_variational` takes them; nodes are told as a `Recording`."""
+    found, recording = solve_variational(
         watch,
         solver,
         y0,
@@ -41,7 +41,7 @@ def passage_by_lanes(
         steered=steered,
         save_nodes=True,
     )
-    return Passage(
+    return SectionArrival(
         y=Tangents(found.state, found.columns.T),
         time=found.t,
         time_columns=found.time_columns,
@@ -55,7 +55,7 @@ def passage_by_lanes(
     )
 
 
-def _nodes(start: PyTree, found: Crossed, recording: Recording) -> Nodes:
+def _nodes(start: PyTree, found: VariationalSolution, recording: Recording) -> Nodes:
     first = jnp.stack([jnp.zeros(()), *jtu.tree_leaves(start)])
     last = jnp.stack([found.t, *jtu.tree_leaves(found.state)])
     return Nodes(first, recording, last, found.accepted)

@@ -1,4 +1,4 @@
-"""One passage: from a state to the next arrival at a section."""
+"""Solve to a section: from a state to the next arrival."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
@@ -14,7 +14,13 @@ from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._step_control import first_step, step_control
-from jaxbiped.variational._switch_locator import Landed, Landing, Watch, plain_args, plain_state
+from jaxbiped.variational._switch_locator import (
+    SwitchLocator,
+    SwitchLocatorState,
+    Watch,
+    plain_args,
+    plain_state,
+)
 from jaxbiped.variational._tangent_solver import (
     TangentControl,
     TangentSolver,
@@ -57,7 +63,7 @@ class Nodes(NamedTuple):
     steps: Scalar
 
 
-class Passage(NamedTuple):
+class SectionArrival(NamedTuple):
     """An arrival at a section, or what came instead.
 
     Attributes:
@@ -86,7 +92,7 @@ class Passage(NamedTuple):
     nodes: Nodes | None
 
 
-def passage(
+def solve_to_section(
     watch: Watch,
     solver: diffrax.AbstractAdaptiveSolver,
     y0: Any,
@@ -97,7 +103,7 @@ def passage(
     max_solver_steps: int,
     columns_only_steer: bool = False,
     save_nodes: bool = False,
-) -> Passage:
+) -> SectionArrival:
     """Solves from `y0` until the section of `watch`, a misfortune, or `time_limit` [s].
 
     With `y0` a `Tangents` and `args` a `Seeded` the columns are carried along under
@@ -130,7 +136,7 @@ def passage(
         y0=y0,
         args=args,
         saveat=diffrax.SaveAt(subs=subs, controller_state=True),
-        stepsize_controller=Landing.around(controller, watch),
+        stepsize_controller=SwitchLocator.around(controller, watch),
         max_steps=max_solver_steps,
         throw=False,
     )
@@ -143,8 +149,8 @@ def passage(
     if carries:
         peak, rows = peak_of(watch, landed.at_peak, args)
         # Columns that have yet to leap do not tell how a load right behind a jump changes.
-        peak_columns = jnp.where(landed.peak_leapt, jnp.nan, rows)
-    return Passage(
+        peak_columns = jnp.where(landed.peak_saltation_pending, jnp.nan, rows)
+    return SectionArrival(
         y=y,
         time=time,
         time_columns=time_columns,
@@ -152,7 +158,7 @@ def passage(
         peak=peak,
         peak_columns=peak_columns,
         jumps=landed.jumps,
-        missed=landed.leapt,
+        missed=landed.saltation_pending,
         attempted=solution.stats["num_steps"],
         nodes=_nodes(times[1], states[1], time, y) if save_nodes else None,
     )
@@ -169,7 +175,7 @@ def _plain_node(t: Any, y: Any, args: Any) -> PyTree:
     return y.state if isinstance(y, Tangents) else y
 
 
-def _code(solution: diffrax.Solution, landed: Landed) -> Scalar:
+def _code(solution: diffrax.Solution, landed: SwitchLocatorState) -> Scalar:
     results = diffrax.RESULTS
     out_of_steps = (solution.result == results.max_steps_reached) | (
         solution.result == results.successful

@@ -1,4 +1,4 @@
-"""Which switches the steps of a known motion end past, and what that does to second tangents."""
+"""Switch crossings of a known motion, and their effect on the second variation."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -8,7 +8,7 @@ import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.variational._radau_collocation import Rates, stacked, velocities, with_seeds
+from jaxbiped.variational._radau_collocation import Rates, stack_rates, velocities, with_seeds
 
 SIDES = tuple(1e-10 * side for side in (1.0, 4.0, 16.0, -1.0, -4.0, -16.0))
 """When the two sides of a switch are looked at [s]: first the new one. Nearer, penetrations are all
@@ -80,10 +80,10 @@ def crossing_of(
         return new - past * rate(new - 0.5 * past * velocity)
 
     def crossed() -> tuple[Scalar, Scalar]:
-        slope = _picked(which, slopes, 1.0)
-        first = _picked(which, beyond, 0.0) / slope
+        slope = _pick(which, slopes, 1.0)
+        first = _pick(which, beyond, 0.0) / slope
         # The switch's rate changes fast: once more from there.
-        past = first + _picked(which, values(back(first)), 0.0) / slope
+        past = first + _pick(which, values(back(first)), 0.0) / slope
         return past, back(past)
 
     past, z = jax.lax.cond(which > 0, crossed, lambda: (jnp.zeros(()), new))
@@ -106,16 +106,16 @@ def earlier_at(
     def values(z: Scalar) -> Scalar:
         return jnp.stack([jnp.zeros(()), *(surface.value for surface in surfaces(z))])
 
-    gradient = _picked(which, list(jax.jacrev(values)(z)[1:]), jnp.zeros_like(z))
+    gradient = _pick(which, list(jax.jacrev(values)(z)[1:]), jnp.zeros_like(z))
     return gradient / jnp.where(which > 0, gradient @ _rate(rates, parameters)(z), 1.0)
 
 
 def _rate(rates: Rates, parameters: Scalar) -> Callable[[Scalar], Scalar]:
     """The rate of components and parameters, which do not change."""
-    return lambda z: jnp.concatenate([stacked(rates)(z), jnp.zeros_like(parameters)])
+    return lambda z: jnp.concatenate([stack_rates(rates)(z), jnp.zeros_like(parameters)])
 
 
-def _picked(which: Scalar, each: Sequence[Scalar], value: Any) -> Scalar:
+def _pick(which: Scalar, each: Sequence[Scalar], value: Any) -> Scalar:
     """That of the switch of this number, or `value` where there is none."""
     for number, candidate in enumerate(each):
         value = jnp.where(which == 1 + number, candidate, value)
@@ -140,7 +140,7 @@ def jump_of(at_sides: Scalar) -> Scalar:
     return (new - old) / 3.0
 
 
-def bent_by(jump: Scalar, early: Scalar, firsts: Scalar, seeds: Scalar, count: int) -> Scalar:
+def jet_jump(jump: Scalar, early: Scalar, firsts: Scalar, seeds: Scalar, count: int) -> Scalar:
     """Jumps of C at the end of each step, shape (steps, c, q, v), from its `earlier_at`."""
     moved = with_seeds(firsts, seeds)
     times = jnp.einsum("sz,szq->sq", early, moved[..., count:])

@@ -1,4 +1,4 @@
-"""A step-size controller whose steps end just past every switch of the vector field."""
+"""Switch locator: a step-size controller whose steps end just past every switch."""
 
 import functools
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.solve._fusion_barrier import fenced
+from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.variational._tangents import Seeded, Tangents
 
 _OVERSHOOT = 1e-4
@@ -45,8 +45,8 @@ class Watch(eqx.Module):
     peak: Callable[[PyTree, PyTree], Any] | None = eqx.field(static=True, default=None)
 
 
-class Landed(NamedTuple):
-    """What a solve with `Landing` knows at its end, besides the state.
+class SwitchLocatorState(NamedTuple):
+    """What a solve with `SwitchLocator` knows at its end, besides the state.
 
     Attributes:
         inner: state of the wrapped controller.
@@ -65,15 +65,15 @@ class Landed(NamedTuple):
     accepted: Scalar
     landings: Scalar
     jumps: Scalar
-    leapt: Scalar
-    peak_leapt: Scalar
+    saltation_pending: Scalar
+    peak_saltation_pending: Scalar
     arrived: Scalar
     code: Scalar
     peak: Any
     at_peak: Any
 
 
-class Landing(diffrax.AbstractAdaptiveStepSizeController):
+class SwitchLocator(diffrax.AbstractAdaptiveStepSizeController):
     """Wraps a controller; a step that crosses a switch is tried again, to end just past it.
 
     So no step straddles a jump of the Jacobian, which would ruin derivatives taken through the
@@ -89,11 +89,11 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
     watch: Watch
 
     @staticmethod
-    def around(controller: Any, watch: Watch) -> "Landing":
+    def around(controller: Any, watch: Watch) -> "SwitchLocator":
         """Wraps a controller."""
-        return Landing(controller.rtol, controller.atol, controller.norm, controller, watch)
+        return SwitchLocator(controller.rtol, controller.atol, controller.norm, controller, watch)
 
-    def wrap(self, direction: Any) -> "Landing":
+    def wrap(self, direction: Any) -> "SwitchLocator":
         """As diffrax asks; direction makes no difference here."""
         return self
 
@@ -106,7 +106,7 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
             peak = jax.lax.stop_gradient(self.watch.peak(plain_args(args), plain_state(y0)))
         at_peak = None if peak is None else y0
         no = jnp.asarray(False)
-        return first, Landed(inner, zero, zero, zero, no, no, no, zero, peak, at_peak)
+        return first, SwitchLocatorState(inner, zero, zero, zero, no, no, no, zero, peak, at_peak)
 
     def adapt_step_size(
         self,
@@ -117,7 +117,7 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
         args: Any,
         y_error: Any,
         error_order: Any,
-        controller_state: Landed,
+        controller_state: SwitchLocatorState,
     ) -> Any:
         """Accepts or rejects a step, as diffrax asks."""
         keep, next_t0, next_t1, jump, inner, result = self.controller.adapt_step_size(
@@ -146,10 +146,10 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
         # A state that is no longer a number leaves no step size to go on with.
         lost = ~jnp.isfinite(next_t1)
         result = diffrax.RESULTS.where(lost, diffrax.RESULTS.dt_min_reached, result)
-        return keep, next_t0, next_t1, jump | landed.leapt, landed, result
+        return keep, next_t0, next_t1, jump | landed.saltation_pending, landed, result
 
     def _crossings(
-        self, span: Any, scene: PyTree, before: PyTree, after: PyTree, landed: Landed
+        self, span: Any, scene: PyTree, before: PyTree, after: PyTree, landed: SwitchLocatorState
     ) -> tuple["_Crossed", Scalar]:
         """Which surfaces a step crosses, and the part of it that lies before the first."""
         watch = self.watch
@@ -180,7 +180,7 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
 
         part = jnp.ones_like(span)
         if crossed:
-            part = jnp.where(any_crossed, fenced(any_crossed, locate), part)
+            part = jnp.where(any_crossed, fusion_barrier(any_crossed, locate), part)
         none = jnp.asarray(False)
         found = _Crossed(
             any_crossed,
@@ -198,26 +198,26 @@ class Landing(diffrax.AbstractAdaptiveStepSizeController):
         scene: PyTree,
         after: PyTree,
         y1: Any,
-        old: Landed,
-    ) -> Landed:
+        old: SwitchLocatorState,
+    ) -> SwitchLocatorState:
         code = old.code
         if self.watch.ending is not None:
             ending = functools.partial(self.watch.ending, scene, after)
-            code = jnp.where(keep, fenced(keep, ending), 0)
-        peak, at_peak, peak_leapt = old.peak, old.at_peak, old.peak_leapt
+            code = jnp.where(keep, fusion_barrier(keep, ending), 0)
+        peak, at_peak, peak_saltation_pending = old.peak, old.at_peak, old.peak_saltation_pending
         if self.watch.peak is not None:
-            value = fenced(keep, functools.partial(self.watch.peak, scene, after))
+            value = fusion_barrier(keep, functools.partial(self.watch.peak, scene, after))
             record = keep & (value > peak)
             peak = jnp.where(record, value, peak)
-            peak_leapt = jnp.where(record, crossed.jump, peak_leapt)
+            peak_saltation_pending = jnp.where(record, crossed.jump, peak_saltation_pending)
             at_peak = jtu.tree_map(lambda a, b: jnp.where(record, a, b), y1, at_peak)
-        return Landed(
+        return SwitchLocatorState(
             inner=inner,
             accepted=old.accepted + jnp.where(keep, 1, 0),
             landings=old.landings + jnp.where(keep & crossed.switch, 1, 0),
             jumps=old.jumps + jnp.where(keep & crossed.jump, 1, 0),
-            leapt=jnp.where(keep, crossed.jump, old.leapt),
-            peak_leapt=peak_leapt,
+            saltation_pending=jnp.where(keep, crossed.jump, old.saltation_pending),
+            peak_saltation_pending=peak_saltation_pending,
             arrived=keep & crossed.section,
             code=code,
             peak=peak,

@@ -1,4 +1,4 @@
-"""A state carried together with its derivatives, and their errors controlled together."""
+"""Tangent solver: state and derivatives stepped together, their errors controlled together."""
 
 import functools
 from collections.abc import Callable
@@ -16,8 +16,8 @@ from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._projected_solver import Projected
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._rosenbrock_tangents import rosenbrock_columns
-from jaxbiped.variational._saltation import can_leap, leap_at, leaping_values
+from jaxbiped.variational._rosenbrock_tangents import rosenbrock_tangents
+from jaxbiped.variational._saltation import has_saltation, jump_surface_values, saltation_at
 from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
 
@@ -82,7 +82,7 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
     ) -> tuple[Tangents, Tangents, dict[str, Any], None, Any]:
         """One step, as `diffrax.AbstractSolver.step` describes it."""
         del terms, solver_state
-        y0 = _leapt(self.watch, y0, args, made_jump)
+        y0 = _apply_saltation(self.watch, y0, args, made_jump)
         if self.columns_only_steer:
             y1, error = _plain_step(self, t0, t1, y0.state, args.args)
             steering, errors = jax.lax.stop_gradient(_tangent_step(self, t0, t1, y0, args))
@@ -92,23 +92,23 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
         return new, error, dict(y0=y0, y1=new), None, diffrax.RESULTS.successful
 
 
-def _leapt(watch: Watch, y: Tangents, args: Seeded, made_jump: Any) -> Tangents:
+def _apply_saltation(watch: Watch, y: Tangents, args: Seeded, made_jump: Any) -> Tangents:
     """The columns behind a jump of the field, where one has just been passed.
 
     The state stays what it is, but JAX's own derivatives of it leap as well.
     """
-    if not can_leap(watch, y.state, args.args):
+    if not has_saltation(watch, y.state, args.args):
         return y
     still, held = jax.lax.stop_gradient((y.state, args))
-    leap = leap_at(watch, still, held, jax.lax.stop_gradient(jnp.asarray(made_jump)))
-    rows = leap.by_state @ y.columns + leap.by_parameter @ args.seeds
+    saltation = saltation_at(watch, still, held, jax.lax.stop_gradient(jnp.asarray(made_jump)))
+    rows = saltation.by_state @ y.columns + saltation.by_parameter @ args.seeds
     leaves, structure = jtu.tree_flatten(y.state)
-    nothing = leaping_values(watch, y.state, args.args)
+    nothing = jump_surface_values(watch, y.state, args.args)
     nothing = nothing - jax.lax.stop_gradient(nothing)
-    shift = jnp.sum(jnp.where(leap.which, nothing, 0.0))
-    moved = [leaf + change * shift for leaf, change in zip(leaves, leap.change, strict=True)]
+    shift = jnp.sum(jnp.where(saltation.which, nothing, 0.0))
+    moved = [leaf + change * shift for leaf, change in zip(leaves, saltation.change, strict=True)]
     state = jtu.tree_unflatten(structure, moved)
-    return Tangents(state, y.columns + jnp.outer(leap.change, rows))
+    return Tangents(state, y.columns + jnp.outer(saltation.change, rows))
 
 
 def _plain_step(
@@ -130,7 +130,7 @@ def _tangent_step(
         state, columns = along_columns(lambda s, a: inner.project(a, s), stepped, args)
         return Tangents(state, as_columns(columns)), errors
     if isinstance(inner, AbstractRosenbrock):
-        found = rosenbrock_columns(inner.tableau, solver.watch.field, t0, t1, y0, args)
+        found = rosenbrock_tangents(inner.tableau, solver.watch.field, t0, t1, y0, args)
         if found is not None:
             return found
     step = functools.partial(_plain_step, solver, t0, t1)

@@ -1,4 +1,4 @@
-"""A state together with its derivatives in chosen directions."""
+"""Tangents: a state together with its derivatives in chosen directions."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple

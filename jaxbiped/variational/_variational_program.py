@@ -1,4 +1,4 @@
-"""The adaptive solve of a state with its derivatives, from a start to a section, for lanes."""
+"""Variational solve as a program for lanes: a state with its derivatives, to a section."""
 
 import dataclasses
 from collections.abc import Callable
@@ -14,16 +14,16 @@ from jaxbiped._types import Scalar
 from jaxbiped.compiler import Program
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import Ending
-from jaxbiped.solve._final_step import clipped
+from jaxbiped.solve._final_step import clip_step
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._column_step import Differentiated, column_step, differentiated_step
-from jaxbiped.variational._saltation import can_leap, leap_at
+from jaxbiped.variational._column_step import Differentiated, column_step, differentiate_step
+from jaxbiped.variational._saltation import has_saltation, saltation_at
 from jaxbiped.variational._solve_to_section import onto_section, peak_of
-from jaxbiped.variational._switch_locator import Landed, Landing, Watch
+from jaxbiped.variational._switch_locator import SwitchLocator, SwitchLocatorState, Watch
 from jaxbiped.variational._tangent_solver import SHARE
 from jaxbiped.variational._tangents import Seeded, Tangents, active_leaves, with_active
-from jaxbiped.variational._variational_types import Crossed, Crossing
+from jaxbiped.variational._variational_types import VariationalProblem, VariationalSolution
 
 
 class _Now(NamedTuple):
@@ -31,7 +31,7 @@ class _Now(NamedTuple):
     next_t: Scalar
     state: PyTree
     columns: tuple[Any, Any]
-    landed: Landed
+    landed: SwitchLocatorState
     peak_columns: tuple[Any, Any]
     attempted: Scalar
     kept: Scalar
@@ -39,7 +39,7 @@ class _Now(NamedTuple):
 
 
 class AdaptiveColumns:
-    """The functions of a `Program` that solves a `Crossing`.
+    """The functions of a `Program` that solves a `VariationalProblem`.
 
     Attributes:
         solver: its steps.
@@ -69,7 +69,7 @@ class AdaptiveColumns:
         record = self.record if self.save_nodes else None
         return Program(self.start, self.attempt, self.finish, record=record)
 
-    def start(self, given: Crossing) -> _Now:
+    def start(self, given: VariationalProblem) -> _Now:
         zero, none = jnp.zeros_like(given.time_limit), jnp.asarray(False)
         next_t, landed = self._controller(given, zero).init(
             self.term,
@@ -86,10 +86,10 @@ class AdaptiveColumns:
         landed = jtu.tree_map(jnp.asarray, landed)
         return _Now(zero, next_t, given.state, columns, landed, columns, count, none, none)
 
-    def attempt(self, given: Crossing, now: _Now) -> tuple[_Now, Scalar]:
+    def attempt(self, given: VariationalProblem, now: _Now) -> tuple[_Now, Scalar]:
         now = self._leapt(given, now)
         times = (now.t, now.next_t)
-        step = differentiated_step(
+        step = differentiate_step(
             self.solver.tableau,
             self.watch.field,
             *times,
@@ -110,11 +110,11 @@ class AdaptiveColumns:
             now.landed,
         )
         limit = given.time_limit
-        t, next_t = clipped(keep, t, next_t, limit, given.almost)
+        t, next_t = clip_step(keep, t, next_t, limit, given.almost)
         state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), step.end, now.state)
         columns, peaks = now.columns, now.peak_columns
         if self.watch.peak is None:
-            columns = tuple(_chosen(keep, a, b) for a, b in zip(moved, columns, strict=True))
+            columns = tuple(_select(keep, a, b) for a, b in zip(moved, columns, strict=True))
             peaks = columns
         else:
             highest = keep & (landed.peak > now.landed.peak)
@@ -130,7 +130,7 @@ class AdaptiveColumns:
         after = _Now(t, next_t, state, columns, landed, peaks, attempted, keep, lost)
         return after, over
 
-    def finish(self, given: Crossing, now: _Now) -> Crossed:
+    def finish(self, given: VariationalProblem, now: _Now) -> VariationalSolution:
         ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), int(Ending.OUT_OF_STEPS))
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
         by_state, by_parameter = now.columns
@@ -140,12 +140,12 @@ class AdaptiveColumns:
         time_columns, peak = jnp.zeros(columns.shape[1]), jnp.zeros(())
         peak_columns = time_columns
         if self.watch.section is not None:
-            y, t, time_columns = onto_section(self.watch, y, t, seeded, _along_rows)
+            y, t, time_columns = onto_section(self.watch, y, t, seeded, _along_columns_in_turn)
         if self.watch.peak is not None:
             highest = Tangents(now.landed.at_peak, jnp.concatenate(now.peak_columns).T)
-            peak, peak_columns = peak_of(self.watch, highest, seeded, _along_rows)
-            peak_columns = jnp.where(now.landed.peak_leapt, jnp.nan, peak_columns)
-        return Crossed(
+            peak, peak_columns = peak_of(self.watch, highest, seeded, _along_columns_in_turn)
+            peak_columns = jnp.where(now.landed.peak_saltation_pending, jnp.nan, peak_columns)
+        return VariationalSolution(
             t=t,
             state=y.state,
             columns=y.columns.T,
@@ -154,19 +154,21 @@ class AdaptiveColumns:
             attempted=now.attempted,
             accepted=now.landed.accepted,
             jumps=now.landed.jumps,
-            missed=now.landed.leapt,
+            missed=now.landed.saltation_pending,
             peak=peak,
             peak_columns=peak_columns,
         )
 
-    def _leapt(self, given: Crossing, now: _Now) -> _Now:
+    def _leapt(self, given: VariationalProblem, now: _Now) -> _Now:
         """The columns behind a jump of the field, where the last accepted step passed one."""
-        if not can_leap(self.watch, now.state, given.args):
+        if not has_saltation(self.watch, now.state, given.args):
             return now
-        leap = leap_at(self.watch, now.state, self._seeded(given), now.landed.leapt)
+        saltation = saltation_at(
+            self.watch, now.state, self._seeded(given), now.landed.saltation_pending
+        )
 
         def moved(column: Any, forcing: Any) -> Any:
-            return column + leap.change * (jnp.sum(leap.by_state * column) + forcing)
+            return column + saltation.change * (jnp.sum(saltation.by_state * column) + forcing)
 
         by_state, by_parameter = now.columns
         if by_state.shape[0]:
@@ -174,22 +176,24 @@ class AdaptiveColumns:
         if by_parameter.shape[0]:
             by_parameter = jax.lax.map(
                 lambda each: moved(each[0], each[1] * each[2]),
-                (by_parameter, leap.by_parameter, given.sizes),
+                (by_parameter, saltation.by_parameter, given.sizes),
             )
         return now._replace(columns=(by_state, by_parameter))
 
-    def _seeded(self, given: Crossing) -> Seeded:
+    def _seeded(self, given: VariationalProblem) -> Seeded:
         m, p = given.by_state.shape[0], given.by_parameter.shape[0]
         seeds = jnp.concatenate([jnp.zeros((p, m)), jnp.eye(p) * given.sizes], axis=1)
         floors = jnp.concatenate([given.state_floors, given.parameter_floors])
         return Seeded(given.args, seeds, floors, self.active)
 
-    def record(self, given: Crossing, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
+    def record(
+        self, given: VariationalProblem, now: _Now, time: Scalar
+    ) -> tuple[Scalar, list[Scalar]]:
         """The time and the state at the end of an accepted step."""
         return now.kept, [now.t, *jtu.tree_leaves(now.state)]
 
     def _columns(
-        self, given: Crossing, now: _Now, step: Differentiated
+        self, given: VariationalProblem, now: _Now, step: Differentiated
     ) -> tuple[list[Any], Scalar]:
         """The columns after the step, and the largest norm of their errors."""
 
@@ -235,15 +239,15 @@ class AdaptiveColumns:
             worst = jnp.maximum(worst, norm)
         return found, jnp.sqrt(worst)
 
-    def _controller(self, given: Crossing, columns_norm: Scalar) -> Landing:
+    def _controller(self, given: VariationalProblem, columns_norm: Scalar) -> SwitchLocator:
         def norm(error: PyTree) -> Scalar:
             return jnp.maximum(rms_norm(error), columns_norm)
 
         control = step_control(given.rtol, 1e-2 * given.rtol, norm, given.units)
-        return Landing.around(control, self.watch)
+        return SwitchLocator.around(control, self.watch)
 
 
-def _chosen(keep: Scalar, new: Any, old: Any) -> Any:
+def _select(keep: Scalar, new: Any, old: Any) -> Any:
     return jax.lax.map(lambda each: jnp.where(keep, *each), (new, old))
 
 
@@ -251,7 +255,7 @@ def _row(keep: Scalar, highest: Scalar, new: Any, old: Any, peak: Any) -> tuple[
     return jnp.where(keep, new, old), jnp.where(highest, new, peak)
 
 
-def _along_rows(
+def _along_columns_in_turn(
     function: Callable[[PyTree, PyTree], Any], y: Tangents, args: Seeded
 ) -> tuple[Any, Any]:
     """`along_columns`, one column after the other."""

@@ -1,4 +1,4 @@
-"""Solves with tangent columns, compiled and called."""
+"""Variational solves by lanes, compiled and called."""
 
 import functools
 from typing import Any
@@ -9,20 +9,20 @@ import jax.tree_util as jtu
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import CompiledProgram, Recording, call, call_recording
-from jaxbiped.solve._final_step import almost
+from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._units import Units, units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import Precision
 from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents
 from jaxbiped.variational._variational_program import AdaptiveColumns
-from jaxbiped.variational._variational_types import Crossed, Crossing
+from jaxbiped.variational._variational_types import VariationalProblem, VariationalSolution
 
 _QUICK = 50_000
 """Attempted steps that take less than a second."""
 
 
-def cross(
+def solve_variational(
     watch: Watch,
     solver: AbstractRosenbrock,
     y0: Tangents,
@@ -34,7 +34,7 @@ def cross(
     max_solver_steps: int,
     steered: Any = True,
     save_nodes: bool = False,
-) -> tuple[Crossed, Recording | None]:
+) -> tuple[VariationalSolution, Recording | None]:
     """Solves from `y0` to the section, a misfortune or `time_limit` [s].
 
     Of the columns the last p move one parameter each, by `sizes`, shape (p,), in the order of the
@@ -43,7 +43,7 @@ def cross(
     the accepted steps.
     """
     m = y0.columns.shape[1] - len(args.active)
-    inputs = Crossing(
+    inputs = VariationalProblem(
         args=args.args,
         state=y0.state,
         by_state=y0.columns[:, :m].T,
@@ -56,7 +56,7 @@ def cross(
         tangent_rtol=_number(precision.tangent_rtol),
         units=jtu.tree_map(_number, units_of(args.args, y0.state)),
         time_limit=_number(time_limit),
-        almost=almost(_number(time_limit)),
+        almost=just_before_end(_number(time_limit)),
         most_attempts=_number(max_solver_steps),
     )
     structures = (jtu.tree_structure(args.args), jtu.tree_structure(y0.state))
@@ -84,7 +84,7 @@ def _compiled(
     def numbers(*shape: int) -> Any:
         return jax.ShapeDtypeStruct(shape, jnp.float64)
 
-    shapes = Crossing(
+    shapes = VariationalProblem(
         jtu.tree_unflatten(args, [numbers()] * args.num_leaves),
         jtu.tree_unflatten(state, [numbers()] * c),
         numbers(directions, c),

@@ -1,4 +1,4 @@
-"""What a solve with derivatives takes and gives."""
+"""Variational problem and solution: what a solve with derivatives takes and gives."""
 
 from typing import Any, NamedTuple
 
@@ -7,7 +7,7 @@ from jaxtyping import PyTree
 from jaxbiped.solve._units import Units
 
 
-class Crossing(NamedTuple):
+class VariationalProblem(NamedTuple):
     """One solve's inputs. Of n directions, m are of the state and p of parameters.
 
     Attributes:
@@ -39,7 +39,7 @@ class Crossing(NamedTuple):
     most_attempts: Any
 
 
-class Crossed(NamedTuple):
+class VariationalSolution(NamedTuple):
     """What a solve found: as in `Passage`, all columns as rows of shape (m + p, …).
 
     Attributes:

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.linalg._elimination import factored, inverse, times
+from jaxbiped.linalg._elimination import factorise, inverse, matmul
 
 BATCH = 50
 
@@ -21,7 +21,7 @@ def _scalars(values, present):
 
 @jax.jit
 def _solution(matrix, right):
-    return jnp.stack(times(inverse(matrix), right), axis=-1)
+    return jnp.stack(matmul(inverse(matrix), right), axis=-1)
 
 
 def _check(values, present, seed=1):
@@ -68,7 +68,7 @@ def test_a_permutation():
 
 def test_singular_by_value_is_not_finite():
     ones = [[jnp.asarray(1.0)] * 2] * 2
-    assert not np.isfinite(times(inverse(ones), [jnp.asarray(1.0), jnp.asarray(2.0)])).any()
+    assert not np.isfinite(matmul(inverse(ones), [jnp.asarray(1.0), jnp.asarray(2.0)])).any()
 
 
 def test_derivative_of_a_solution():
@@ -77,7 +77,7 @@ def test_derivative_of_a_solution():
     A, dA, b = rng.normal(size=(3, 3)), rng.normal(size=(3, 3)), rng.normal(size=3)
 
     def mine(a):
-        return jnp.stack(times(inverse([list(row) for row in a]), list(jnp.asarray(b))))
+        return jnp.stack(matmul(inverse([list(row) for row in a]), list(jnp.asarray(b))))
 
     _, tangent = jax.jvp(mine, (jnp.asarray(A),), (jnp.asarray(dA),))
     truth = -np.linalg.solve(A, dA @ np.linalg.solve(A, b))
@@ -96,7 +96,7 @@ def test_by_blocks(size, count):
             matrix[k : k + size, k : k + size] += np.eye(size)[::-1] * 2.0
             matrix[k, k] *= 0.0 if size > 1 else 1.0
         right = rng.normal(size=n)
-        factors = factored(jnp.asarray(matrix), size)
+        factors = factorise(jnp.asarray(matrix), size)
         for found, whole in (
             (factors.solve(jnp.asarray(right)), matrix),
             (factors.solve_transposed(jnp.asarray(right)), matrix.T),

@@ -38,9 +38,9 @@ def test_parts_add_up_to_the_whole(seed_walk):
 def test_gravitys_work_is_its_potential(seed_walk):
     """Also by integrating its power along the solution."""
     from jaxbiped.dynamics._energy import powers
-    from jaxbiped.measure._samples import sampled
+    from jaxbiped.measure._samples import sample
 
     scene, walk = seed_walk
-    flows = sampled(scene, walk, powers, np.zeros(0))
+    flows = sample(scene, walk, powers, np.zeros(0))
     work = flows.integral(flows.values.gravity).sum()
     assert work == pytest.approx(jb.energy_ledger(scene, walk).gravity_work[0], rel=1e-7)

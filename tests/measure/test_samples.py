@@ -5,7 +5,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.measure._samples import moments_of_change, sampled
+from jaxbiped.measure._samples import moments_of_change, sample
 
 HEIGHTS = np.array([0.5, 0.45, 0.42])
 
@@ -33,7 +33,7 @@ def test_moments_of_change_are_those_of_free_fall(fall):
 
 def test_the_integral_of_the_speed_is_the_way(fall):
     scene, walk = fall
-    speeds = sampled(scene, walk, lambda _, state: state.hip_vx, np.zeros(1))
+    speeds = sample(scene, walk, lambda _, state: state.hip_vx, np.zeros(1))
     way = 0.5 * 9.8 * np.sin(0.02) * 0.25**2
     assert speeds.integral(speeds.values).sum() == pytest.approx(way, rel=1e-9)
 

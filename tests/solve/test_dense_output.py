@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.solve._dense_output import AT_ONCE, between_steps, joined, parts
+from jaxbiped.solve._dense_output import AT_ONCE, evaluate_dense, join_parts, split_evenly
 
 
 def _oscillation(solver):
@@ -32,7 +32,7 @@ def test_states_are_those_of_diffrax(solver):
     steps = np.asarray(dense.ts)[: int(dense.ts_size)]
     times = np.concatenate([[0.4, np.nan], np.linspace(0.5, 3.0, 37), steps, [3.1]])
     expected = jax.vmap(dense.evaluate)(jnp.asarray(times))
-    found = between_steps(dense, times)
+    found = evaluate_dense(dense, times)
     for name in ("x", "v"):
         np.testing.assert_allclose(found[name], expected[name], rtol=1e-14, atol=1e-15)
     assert np.isnan(found["x"][[0, 1, -1]]).all()
@@ -44,6 +44,6 @@ def test_states_are_those_of_diffrax(solver):
 @pytest.mark.parametrize("size", [0, 1, AT_ONCE - 1, AT_ONCE, AT_ONCE + 1, 3 * AT_ONCE])
 def test_parts_of_one_size_make_the_whole(size):
     values = np.arange(float(size))
-    cut = parts(values)
+    cut = split_evenly(values)
     assert {part.shape for part in cut} == {(AT_ONCE,)}
-    np.testing.assert_array_equal(joined(cut, size), values)
+    np.testing.assert_array_equal(join_parts(cut, size), values)

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.solve._final_step import almost
+from jaxbiped.solve._final_step import just_before_end
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -16,9 +16,9 @@ def test_almost_is_a_hundred_numbers_before(sign):
     before = jax.jit(eqxi.prevbefore)
     for _ in range(100):
         expected = before(expected)
-    np.testing.assert_array_equal(almost(jnp.asarray(ends)), expected)
+    np.testing.assert_array_equal(just_before_end(jnp.asarray(ends)), expected)
 
 
 def test_almost_of_no_number_is_none_and_of_no_end_is_finite():
-    assert np.isnan(almost(jnp.asarray(np.nan)))
-    assert np.isfinite(almost(jnp.asarray(np.inf)))
+    assert np.isnan(just_before_end(jnp.asarray(np.nan)))
+    assert np.isfinite(just_before_end(jnp.asarray(np.inf)))

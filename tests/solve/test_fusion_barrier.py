@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped.solve._fusion_barrier import fenced
+from jaxbiped.solve._fusion_barrier import fusion_barrier
 
 
 def _compute(x, y):
@@ -13,7 +13,7 @@ def _compute(x, y):
 
 def _behind_fence(x, y, happens=None):
     happens = jnp.isfinite(x) if happens is None else happens
-    return fenced(happens, lambda: _compute(x, y))
+    return fusion_barrier(happens, lambda: _compute(x, y))
 
 
 X, Y = jnp.asarray(0.7), jnp.asarray(-1.3)

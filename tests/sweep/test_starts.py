@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.sweep.starts._sequences import points
+from jaxbiped.sweep.starts._sequences import sequence_points
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same
 
@@ -74,10 +74,10 @@ def test_a_sample_is_the_same_whichever_chunk_it_is_made_in(method, seed, cuts):
 def test_low_discrepancy_samples_fill_every_slice():
     numbers = np.arange(64)
     for method in ("sobol", "latin-hypercube"):
-        drawn = points(method, 3, 64, 5, numbers)
+        drawn = sequence_points(method, 3, 64, 5, numbers)
         for column in drawn.T:
             assert sorted(np.floor(64 * column).astype(int)) == list(range(64))
-    pairs = np.floor(8 * points("sobol", 2, 64, 5, numbers)).astype(int)
+    pairs = np.floor(8 * sequence_points("sobol", 2, 64, 5, numbers)).astype(int)
     assert len({tuple(pair) for pair in pairs}) == 64
 
 

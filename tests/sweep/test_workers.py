@@ -16,7 +16,7 @@ import zarr
 import jaxbiped as jb
 from jaxbiped.compiler import THREADS_VARIABLE, default_threads
 from jaxbiped.sweep._array_layout import Layout
-from jaxbiped.sweep._workers import _AHEAD, computed
+from jaxbiped.sweep._workers import _AHEAD, compute_chunks
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same, same_results, simplest_grid, with_attractor
 
@@ -110,7 +110,7 @@ class _Counting(concurrent.futures.Executor):
 def test_chunks_in_hand_are_bounded():
     executor = _Counting()
     layout = Layout.of(jb.starts.grid(SCENE, {"theta_stance": np.linspace(0.1, 0.2, 100)}), 1)
-    for _ in computed(LABELLING, layout, np.arange(100), executor, 3):
+    for _ in compute_chunks(LABELLING, layout, np.arange(100), executor, 3):
         executor.open -= 1
     assert executor.most == 3 * _AHEAD
     assert len(executor.sizes) == 100
@@ -119,7 +119,7 @@ def test_chunks_in_hand_are_bounded():
 def test_given_starts_travel_in_parts():
     executor = _Counting()
     starts = jb.starts.GivenStarts(jb.dynamics.RigidState(*[np.zeros(10_000)] * 5))
-    list(computed(LABELLING, Layout.of(starts, 10), np.arange(1000), executor, 1))
+    list(compute_chunks(LABELLING, Layout.of(starts, 10), np.arange(1000), executor, 1))
     assert max(executor.sizes) < 4000
 
 

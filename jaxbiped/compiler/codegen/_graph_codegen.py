@@ -1,12 +1,12 @@
-"""Graphs written as LLVM's text, each value one vector over the lanes."""
+"""Graph code generation: LLVM's text, each value one vector over the lanes."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from jaxbiped.compiler.codegen._instruction_selection import fused, written
-from jaxbiped.compiler.codegen._llvm_function import Text, literal, vector
+from jaxbiped.compiler.codegen._instruction_selection import select_fused, select_instruction
+from jaxbiped.compiler.codegen._llvm_function import FunctionBuilder, literal, vector
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
-from jaxbiped.compiler.passes._liveness import Needed
+from jaxbiped.compiler.passes._liveness import Liveness
 
 
 class Place(NamedTuple):
@@ -16,7 +16,7 @@ class Place(NamedTuple):
     offset: int
 
 
-class Writer:
+class GraphWriter:
     """Writes one function.
 
     Attributes:
@@ -29,9 +29,9 @@ class Writer:
         needed: what is to be computed.
     """
 
-    def __init__(self, width: int, inner: int, scales: bool, needed: Needed) -> None:
+    def __init__(self, width: int, inner: int, scales: bool, needed: Liveness) -> None:
         self.width, self.inner, self.scales, self.needed = width, inner, scales, needed
-        self.text = Text()
+        self.text = FunctionBuilder()
         self.homes: dict[int, Place] = {}
         self.padded_rooms: set[str] = set()
         self._names: dict[int, tuple[str, int]] = {}
@@ -90,11 +90,11 @@ class Writer:
         if place is not None:
             factors = [self.use(factor, width) for factor in value.args[place].args]
             other = self.use(value.args[1 - place], width)
-            return fused(self.text, value.op, value.kind, factors, other, place, width)
+            return select_fused(self.text, value.op, value.kind, factors, other, place, width)
         values = [arg for arg in value.args if isinstance(arg, Value)]
         kinds = [value.kind, *(arg.kind for arg in values)]
         operands = [self.use(arg, width) for arg in values]
-        return written(self.text, value.op, kinds, operands, width, scales=self.scales)
+        return select_instruction(self.text, value.op, kinds, operands, width, scales=self.scales)
 
     def _named(self, value: Value) -> tuple[str, int]:
         place = self.homes.get(id(value))

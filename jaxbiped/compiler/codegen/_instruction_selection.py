@@ -1,8 +1,8 @@
-"""Each operation of a graph as LLVM's instructions."""
+"""Instruction selection: each operation of a graph as LLVM's instructions."""
 
 from collections.abc import Sequence
 
-from jaxbiped.compiler.codegen._llvm_function import BYTES, Text, vector
+from jaxbiped.compiler.codegen._llvm_function import BYTES, FunctionBuilder, vector
 from jaxbiped.compiler.ir._graph import Kind
 
 _PLAIN = {
@@ -23,8 +23,14 @@ _PLAIN = {
 _INTRINSICS = {"fabs", "sqrt", "rint", "floor", "ceil", "fma"}
 
 
-def written(
-    text: Text, op: str, kinds: Sequence[Kind], operands: Sequence[str], width: int, *, scales: bool
+def select_instruction(
+    text: FunctionBuilder,
+    op: str,
+    kinds: Sequence[Kind],
+    operands: Sequence[str],
+    width: int,
+    *,
+    scales: bool,
 ) -> str:
     """Writes an operation; the name of its result.
 
@@ -55,12 +61,18 @@ def written(
     if op.startswith("libm "):
         return _per_lane(text, op.removeprefix("libm "), operands, width)
     if op == "ldexp":
-        return (_scaled if scales else _scaled_by_halves)(text, operands[0], operands[1], width)
-    return _converted(text, op, kinds[1], kind, operands[0], width)
+        return (_scale if scales else _scale_by_halves)(text, operands[0], operands[1], width)
+    return _convert(text, op, kinds[1], kind, operands[0], width)
 
 
-def fused(
-    text: Text, op: str, kind: Kind, factors: Sequence[str], other: str, place: int, width: int
+def select_fused(
+    text: FunctionBuilder,
+    op: str,
+    kind: Kind,
+    factors: Sequence[str],
+    other: str,
+    place: int,
+    width: int,
 ) -> str:
     """Writes a sum or difference whose argument at `place` is a product: rounded once."""
     (a, b), c, of = factors, other, vector(kind, width)
@@ -71,7 +83,7 @@ def fused(
     return text.intrinsic("fma", [kind] * 4, [a, b, c], width)
 
 
-def _converted(text: Text, op: str, old: Kind, new: Kind, operand: str, width: int) -> str:
+def _convert(text: FunctionBuilder, op: str, old: Kind, new: Kind, operand: str, width: int) -> str:
     wider = BYTES[new] > BYTES[old]
     word = {
         "bitcast": "bitcast",
@@ -85,20 +97,20 @@ def _converted(text: Text, op: str, old: Kind, new: Kind, operand: str, width: i
     return text.assign(f"freeze {vector(new, width)} {found}") if op == "to_int" else found
 
 
-def _scaled(text: Text, x: str, exponent: str, width: int) -> str:
+def _scale(text: FunctionBuilder, x: str, exponent: str, width: int) -> str:
     """x 2ⁿ by one instruction."""
     of, short = vector(Kind.F64, width), vector(Kind.I32, width)
-    n = _converted(text, "to_int", Kind.F64, Kind.I32, exponent, width)
+    n = _convert(text, "to_int", Kind.F64, Kind.I32, exponent, width)
     name = f"llvm.ldexp.{'f64.i32' if width == 1 else f'v{width}f64.v{width}i32'}"
     text.declarations.add(f"declare {of} @{name}({of}, {short})")
     return text.assign(f"call {of} @{name}({of} {x}, {short} {n})")
 
 
-def _scaled_by_halves(text: Text, x: str, exponent: str, width: int) -> str:
+def _scale_by_halves(text: FunctionBuilder, x: str, exponent: str, width: int) -> str:
     """x 2ⁿ by two powers of two, for the smallest results."""
     of, whole = vector(Kind.F64, width), vector(Kind.I64, width)
     one, bias, shift = (text.splat_constant(c, Kind.I64, width) for c in ("1", "1023", "52"))
-    n = _converted(text, "to_int", Kind.F64, Kind.I64, exponent, width)
+    n = _convert(text, "to_int", Kind.F64, Kind.I64, exponent, width)
     half = text.assign(f"ashr {whole} {n}, {one}")
     for part in (half, text.assign(f"sub {whole} {n}, {half}")):
         biased = text.assign(f"add {whole} {part}, {bias}")
@@ -108,7 +120,7 @@ def _scaled_by_halves(text: Text, x: str, exponent: str, width: int) -> str:
     return x
 
 
-def _per_lane(text: Text, name: str, operands: Sequence[str], width: int) -> str:
+def _per_lane(text: FunctionBuilder, name: str, operands: Sequence[str], width: int) -> str:
     """A function of the C library, in the lanes that the last operand names."""
     *args, _ = operands
     of = vector(Kind.F64, width)

@@ -1,15 +1,15 @@
-"""The loop that keeps every lane busy, as LLVM's text."""
+"""Lane kernel: the loop that keeps every lane busy, as LLVM's text."""
 
 from collections.abc import Iterable
 
 import numpy as np
 
-from jaxbiped.compiler.codegen._graph_codegen import Place, Writer
-from jaxbiped.compiler.codegen._lane_scheduler import Lanes, Sizes
+from jaxbiped.compiler.codegen._graph_codegen import GraphWriter, Place
+from jaxbiped.compiler.codegen._lane_scheduler import LaneScheduler, Sizes
 from jaxbiped.compiler.codegen._llvm_function import BYTES, vector
 from jaxbiped.compiler.ir._elementwise_primitives import Array
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
-from jaxbiped.compiler.passes._liveness import Needed
+from jaxbiped.compiler.passes._liveness import Liveness
 from jaxbiped.compiler.runtime._host_cpu import Host
 from jaxbiped.compiler.runtime._program import Graph
 
@@ -28,11 +28,11 @@ def kernel_text(graph: Graph, width: int, host: Host) -> str:
 class _Kernel:
     def __init__(self, graph: Graph, width: int, host: Host) -> None:
         self.graph, self.width = graph, width
-        self.needed = Needed(graph.results())
-        self.writer = Writer(width, host.width, host.scales, self.needed)
+        self.needed = Liveness(graph.results())
+        self.writer = GraphWriter(width, host.width, host.scales, self.needed)
         self.t = self.writer.text
         sizes = Sizes(len(graph.inputs), len(graph.outputs), len(graph.recorded), len(graph.row))
-        self.lanes = Lanes(self.t, width, sizes, scheduled=graph.scheduled)
+        self.lanes = LaneScheduler(self.t, width, sizes, scheduled=graph.scheduled)
         self.kept: list[tuple[Value, Place]] = []
 
     def text(self) -> str:
@@ -56,7 +56,7 @@ class _Kernel:
         for offset, value in enumerate(graph.row):
             w.homes[id(value)] = Place(rooms.row, offset)
         w.homes[id(graph.next_time)] = Place(rooms.next_time, 0)
-        for value in _computed(graph.prepare, self.needed):
+        for value in _values_to_compute(graph.prepare, self.needed):
             self.kept.append((value, Place(w.room(value.kind, 1), 0)))
         for array in graph.carried:
             self._carry_room(array)
@@ -181,7 +181,7 @@ class _Kernel:
         self.t.store(text, at, kind, self.width)
 
 
-def _computed(block: Block, needed: Needed) -> Iterable[Value]:
+def _values_to_compute(block: Block, needed: Liveness) -> Iterable[Value]:
     for value in block.values:
         stored = value in needed and id(value) not in needed.absorbed
         if stored and value.op not in ("const", "input", "if"):

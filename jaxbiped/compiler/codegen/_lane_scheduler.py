@@ -1,9 +1,9 @@
-"""What lanes do one by one: taking simulations, reading rows, giving outputs, recording."""
+"""Lane scheduler: lanes take simulations, read rows, give outputs and record one by one."""
 
 from collections.abc import Callable
 from typing import NamedTuple
 
-from jaxbiped.compiler.codegen._llvm_function import Text
+from jaxbiped.compiler.codegen._llvm_function import FunctionBuilder
 from jaxbiped.compiler.ir._graph import Kind
 
 FIELDS = (
@@ -48,7 +48,7 @@ _MARKS = {"done": 1, "live": 1, "fresh": 0, "wants": 0}
 """Marks of each lane, and what they are at first."""
 
 
-class Lanes:
+class LaneScheduler:
     """Writes what is done for one lane at a time.
 
     Attributes:
@@ -61,7 +61,7 @@ class Lanes:
             rows that it has read (`rows`) and its marks (`done`, `live`, `fresh`, `wants`) are.
     """
 
-    def __init__(self, text: Text, width: int, sizes: Sizes, *, scheduled: bool) -> None:
+    def __init__(self, text: FunctionBuilder, width: int, sizes: Sizes, *, scheduled: bool) -> None:
         self.text, self.width, self.sizes, self.scheduled = text, width, sizes, scheduled
         self.field: dict[str, str] = {}
         for place, name in enumerate(FIELDS):

@@ -1,4 +1,4 @@
-"""LLVM's text of one function: instructions, memory and vectors."""
+"""LLVM function builder: instructions, memory and vectors as text."""
 
 import struct
 from collections.abc import Callable, Iterator, Sequence
@@ -23,7 +23,7 @@ def vector(kind: Kind, width: int) -> str:
     return kind.value if width == 1 else f"<{width} x {kind.value}>"
 
 
-class Text:
+class FunctionBuilder:
     """One function as it is written.
 
     Attributes:

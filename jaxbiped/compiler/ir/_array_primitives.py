@@ -1,4 +1,4 @@
-"""JAX primitives that move, combine and sum the elements of small arrays."""
+"""Array primitives of JAX: those that move, combine and sum the elements of small arrays."""
 
 import functools
 import math
@@ -24,7 +24,7 @@ def _slice(a: Array, *, start_indices: Any, limit_indices: Any, strides: Any, **
     return a[tuple(slice(*part) for part in parts)]
 
 
-def _padded(a: Array, filler: Array, *, padding_config: Any, **_: Any) -> Array:
+def _pad(a: Array, filler: Array, *, padding_config: Any, **_: Any) -> Array:
     """Filled up before, behind and between the entries; cut off where the filling is negative."""
     for axis, (before, behind, between) in enumerate(padding_config):
         size = (a.shape[axis] - 1) * (between + 1) + 1 if a.shape[axis] else 0
@@ -50,7 +50,7 @@ MOVES: dict[str, Callable[..., Array]] = {
     "transpose": lambda a, *, permutation, **_: np.transpose(a, permutation),
     "slice": _slice,
     "concatenate": _concatenate,
-    "pad": _padded,
+    "pad": _pad,
     "stack": lambda *arrays, axis=0, **_: np.stack(arrays, axis=axis),
     "rev": lambda a, *, dimensions, **_: np.flip(a, tuple(dimensions)),
 }
@@ -66,7 +66,7 @@ REDUCTIONS = {
 }
 
 
-def reduced(block: Block, name: str, a: Array, axes: Sequence[int]) -> Array:
+def reduce(block: Block, name: str, a: Array, axes: Sequence[int]) -> Array:
     """An array reduced over axes."""
     combine = functools.partial(ELEMENTWISE[REDUCTIONS[name]], block)
     rest = [size for axis, size in enumerate(a.shape) if axis not in axes]

@@ -96,8 +96,8 @@ class Arithmetic:
         """`value`, but in the lanes that are `rare` another, computed only where there are any."""
         inside = Block(self.block)
         found = other(Arithmetic(inside))
-        parts = self.block.region("if", (rare, inside, (found,), (value,)), [found.kind])
-        return parts[0]
+        results = self.block.region("if", (rare, inside, (found,), (value,)), [found.kind])
+        return results[0]
 
     def per_lane(self, name: str, *args: Value) -> Value:
         """The C library's function of all but the last; lane by lane, where the last holds."""
@@ -146,7 +146,7 @@ def exponential(m: Arithmetic, x: Value, low: Value | float = 0.0) -> Value:
     return m.scaled(value, n)
 
 
-def parts(m: Arithmetic, x: Value) -> tuple[Value, Value]:
+def split_exponent(m: Arithmetic, x: Value) -> tuple[Value, Value]:
     """k and f with x = 2^k (1 + f), 1 + f in [√½, √2); for x above zero, normal and finite."""
     moved = m.integer("add", m.bits(x), _ONE_BITS - _SQRT_HALF_BITS)
     exponent = m.integer("sub", m.integer("lshr", moved, 52), 1023)
@@ -156,7 +156,7 @@ def parts(m: Arithmetic, x: Value) -> tuple[Value, Value]:
 
 def logarithm(m: Arithmetic, x: Value) -> Value:
     """The natural logarithm (FreeBSD's msun, e_log.c)."""
-    k, f = parts(m, x)
+    k, f = split_exponent(m, x)
     s = m.div(f, m.add(f, 2.0))
     z = m.mul(s, s)
     series = m.mul(z, m.series(z, _LOG_SERIES))

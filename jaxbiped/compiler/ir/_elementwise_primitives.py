@@ -1,4 +1,4 @@
-"""JAX primitives that work element by element, as operations of a graph."""
+"""Elementwise primitives of JAX, as operations of a graph."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -43,7 +43,7 @@ def _arithmetic(float_op: str, int_op: str) -> Rule:
     return lambda block, a, b, **_: block.add(float_op if a.kind.is_float else int_op, a, b)
 
 
-def _compared(float_name: str, int_name: str) -> Rule:
+def _comparison(float_name: str, int_name: str) -> Rule:
     def rule(block: Block, a: Value, b: Value, **_: Any) -> Value:
         if a.kind is Kind.BOOL:
             different = block.add("xor", a, b)
@@ -140,7 +140,7 @@ def _square(block: Block, a: Value, **_: Any) -> Value:
     return block.add("fmul" if a.kind.is_float else "mul", a, a)
 
 
-def converted(block: Block, a: Value, kind: Kind) -> Value:
+def convert(block: Block, a: Value, kind: Kind) -> Value:
     """A value as another kind of number."""
     if a.kind is kind:
         return a
@@ -168,14 +168,14 @@ def _divide(block: Block, a: Value, b: Value, **_: Any) -> Value:
 
 
 def _convert(block: Block, a: Value, *, new_dtype: Any, **_: Any) -> Value:
-    return converted(block, a, KINDS[np.dtype(new_dtype)])
+    return convert(block, a, KINDS[np.dtype(new_dtype)])
 
 
 def _select(block: Block, which: Value, *cases: Value, **_: Any) -> Value:
     if len(cases) != 2:
         raise NotImplementedError
     return block.add(
-        "select", converted(block, which, Kind.BOOL), cases[1], cases[0], kind=cases[0].kind
+        "select", convert(block, which, Kind.BOOL), cases[1], cases[0], kind=cases[0].kind
     )
 
 
@@ -187,12 +187,12 @@ def _clamp(block: Block, low: Value, a: Value, high: Value, **_: Any) -> Value:
 def _elementary(function: Callable[..., Value]) -> Rule:
     def rule(block: Block, *args: Value, **_: Any) -> Value:
         kind = args[0].kind
-        wide = [converted(block, a, Kind.F64) for a in args]
+        wide = [convert(block, a, Kind.F64) for a in args]
 
         def make(home: Block) -> Value:
             return function(elementary.Arithmetic(home), *wide)
 
-        return converted(
+        return convert(
             block, block.shared(function.__qualname__ + str(id(function)), wide, make), kind
         )
 
@@ -242,12 +242,12 @@ ELEMENTWISE: dict[str, Rule] = {
     "pow": _elementary(powers.power),
     "integer_pow": _whole_power,
     "square": _square,
-    "eq": _compared("oeq", "eq"),
-    "ne": _compared("une", "ne"),
-    "lt": _compared("olt", "slt"),
-    "le": _compared("ole", "sle"),
-    "gt": _compared("ogt", "sgt"),
-    "ge": _compared("oge", "sge"),
+    "eq": _comparison("oeq", "eq"),
+    "ne": _comparison("une", "ne"),
+    "lt": _comparison("olt", "slt"),
+    "le": _comparison("ole", "sle"),
+    "gt": _comparison("ogt", "sgt"),
+    "ge": _comparison("oge", "sge"),
     "and": _logical("and"),
     "or": _logical("or"),
     "xor": _logical("xor"),

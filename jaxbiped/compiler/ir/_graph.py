@@ -1,4 +1,4 @@
-"""Scalar operations as a graph: each computed once, what is constant folded away."""
+"""Graph of scalar operations: each computed once, what is constant folded away."""
 
 import enum
 import itertools
@@ -92,7 +92,7 @@ class Block:
     def add(self, op: str, *args: Any, kind: Kind | None = None) -> Value:
         """The value of an operation: an equal one that is known already, or a new one."""
         result = kind if kind is not None else args[0].kind
-        folded = _folded(self, op, args, result)
+        folded = _fold(self, op, args, result)
         if folded is not None:
             return folded
         if op in _COMMUTATIVE and args[0].number > args[1].number:
@@ -169,19 +169,19 @@ _NUMBERS: dict[str, Callable[..., Any]] = {
 }
 
 
-def _folded(block: Block, op: str, args: tuple[Any, ...], kind: Kind) -> Value | None:
+def _fold(block: Block, op: str, args: tuple[Any, ...], kind: Kind) -> Value | None:
     """What an operation comes to where its arguments are numbers, or do nothing."""
     constants = [a.constant if isinstance(a, Value) else None for a in args]
     known = bool(constants) and all(c is not None for c in constants)
     if known and op in _NUMBERS and kind is not Kind.F32:
         return block.const(_NUMBERS[op](*constants), kind)
     if op in ("fadd", "fsub", "fmul", "fdiv"):
-        found = _folded_float(block, op, args, constants, kind)
-        return _without_signs(block, op, args) if found is None else found
+        found = _fold_float(block, op, args, constants, kind)
+        return _strip_signs(block, op, args) if found is None else found
     if op == "fneg" and args[0].op == "fneg":
         return args[0].args[0]
     if op in ("and", "or") and kind is Kind.BOOL:
-        return _folded_boolean(op, args, constants)
+        return _fold_boolean(op, args, constants)
     if op == "select":
         if constants[0] is not None:
             return args[1] if constants[0] else args[2]
@@ -190,7 +190,7 @@ def _folded(block: Block, op: str, args: tuple[Any, ...], kind: Kind) -> Value |
     return None
 
 
-def _folded_float(
+def _fold_float(
     block: Block, op: str, args: tuple[Any, ...], constants: list[Any], kind: Kind
 ) -> Value | None:
     first, second = constants
@@ -217,7 +217,7 @@ def _folded_float(
     return None
 
 
-def _without_signs(block: Block, op: str, args: tuple[Any, ...]) -> Value | None:
+def _strip_signs(block: Block, op: str, args: tuple[Any, ...]) -> Value | None:
     """Changes of sign moved out of an operation, where a sum or difference absorbs them."""
     a, b = args
     turned = [value.op == "fneg" for value in args]
@@ -236,7 +236,7 @@ def _without_signs(block: Block, op: str, args: tuple[Any, ...]) -> Value | None
     return block.add("fneg", block.add("fadd", x, b))
 
 
-def _folded_boolean(op: str, args: tuple[Any, ...], constants: list[Any]) -> Value | None:
+def _fold_boolean(op: str, args: tuple[Any, ...], constants: list[Any]) -> Value | None:
     if args[0] is args[1]:
         return args[0]
     for constant, other in zip(constants, reversed(args), strict=True):

@@ -1,4 +1,4 @@
-"""A jaxpr of small static shapes as a graph of scalar operations."""
+"""Lowering of a jaxpr of small static shapes to a graph of scalar operations."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 from jax.extend.core import Literal
 
-from jaxbiped.compiler.ir._array_primitives import MOVES, REDUCTIONS, product, reduced
+from jaxbiped.compiler.ir._array_primitives import MOVES, REDUCTIONS, product, reduce
 from jaxbiped.compiler.ir._elementwise_primitives import (
     ELEMENTWISE,
     KINDS,
     Array,
     array_of,
-    converted,
+    convert,
     elementwise,
 )
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
@@ -36,7 +36,9 @@ class UnknownPrimitiveError(NotImplementedError):
     """A JAX operation that the lane engine cannot express."""
 
 
-def emit(block: Block, jaxpr: Any, consts: Sequence[Any], args: Sequence[Array]) -> list[Array]:
+def lower_jaxpr(
+    block: Block, jaxpr: Any, consts: Sequence[Any], args: Sequence[Array]
+) -> list[Array]:
     """Adds a jaxpr's operations to a block; the arrays of its results.
 
     Raises:
@@ -86,7 +88,7 @@ def _constant(block: Block, value: Any) -> Array:
     return array_of([block.const(x, kind) for x in numbers.ravel()], numbers.shape)
 
 
-def called(equation: Any) -> tuple[Any, Sequence[Any]] | None:
+def inner_jaxpr(equation: Any) -> tuple[Any, Sequence[Any]] | None:
     """The jaxpr and the constants of what an equation only calls; None for any other."""
     name = _INLINED.get(equation.primitive.name)
     if name is None:
@@ -97,9 +99,9 @@ def called(equation: Any) -> tuple[Any, Sequence[Any]] | None:
 
 def _apply(block: Block, equation: Any, inputs: list[Array]) -> list[Array]:
     name, params = equation.primitive.name, equation.params
-    inner = called(equation)
+    inner = inner_jaxpr(equation)
     if inner is not None:
-        return emit(block, *inner, inputs)
+        return lower_jaxpr(block, *inner, inputs)
     if name in ELEMENTWISE:
         rule = ELEMENTWISE[name]
         if name == "select_n" and inputs[0].ndim == 0 and inputs[1].ndim > 0:
@@ -108,7 +110,7 @@ def _apply(block: Block, equation: Any, inputs: list[Array]) -> list[Array]:
     if name in MOVES:
         return [MOVES[name](*inputs, **params)]
     if name in REDUCTIONS:
-        return [reduced(block, name, inputs[0], params["axes"])]
+        return [reduce(block, name, inputs[0], params["axes"])]
     if name == "dot_general":
         return [product(block, *inputs, **params)]
     if name == "iota":
@@ -135,12 +137,12 @@ def _branches(block: Block, branches: Any, inputs: list[Array]) -> list[Array]:
     which, operands = inputs[0].item(), inputs[1:]
     if which.constant is not None:
         chosen = branches[min(max(int(which.constant), 0), len(branches) - 1)]
-        return emit(block, chosen.jaxpr, chosen.consts, operands)
+        return lower_jaxpr(block, chosen.jaxpr, chosen.consts, operands)
     results: list[Array] | None = None
     for number, branch in enumerate(branches):
         if results is None:
             # The first one needs no condition of its own: the rest replace what it gives.
-            results = emit(block, branch.jaxpr, branch.consts, operands)
+            results = lower_jaxpr(block, branch.jaxpr, branch.consts, operands)
             continue
         here = _is(block, which, number, len(branches))
         results = _conditional(block, here, branch, operands, results)
@@ -162,15 +164,15 @@ def _conditional(
     block: Block, here: Value, branch: Any, operands: list[Array], otherwise: list[Array]
 ) -> list[Array]:
     inside = Block(block)
-    found = emit(inside, branch.jaxpr, branch.consts, operands)
+    found = lower_jaxpr(inside, branch.jaxpr, branch.consts, operands)
     values = [v for array in found for v in array.ravel()]
     defaults = [v for array in otherwise for v in array.ravel()]
     kinds = [v.kind for v in values]
     results = block.region("if", (here, inside, tuple(values), tuple(defaults)), kinds)
-    return _shaped(results, found)
+    return _reshape(results, found)
 
 
-def _shaped(values: Sequence[Value], like: list[Array]) -> list[Array]:
+def _reshape(values: Sequence[Value], like: list[Array]) -> list[Array]:
     arrays, place = [], 0
     for array in like:
         arrays.append(array_of(values[place : place + array.size], array.shape))
@@ -194,7 +196,7 @@ def _scan(block: Block, params: Any, inputs: list[Array]) -> list[Array]:
     for step in range(length):
         place = length - 1 - step if params["reverse"] else step
         chosen = [np.asarray(item[place], dtype=object) for item in items]
-        results = emit(block, body, jaxpr.consts, [*fixed, *carry, *chosen])
+        results = lower_jaxpr(block, body, jaxpr.consts, [*fixed, *carry, *chosen])
         carry = results[:carried]
         for column, value in zip(collected, results[carried:], strict=True):
             column.append(value)
@@ -208,7 +210,7 @@ def _scan(block: Block, params: Any, inputs: list[Array]) -> list[Array]:
 
 def _size(jaxpr: Any) -> int:
     """How many equations a jaxpr has, with those inside of calls."""
-    inner = [called(equation) for equation in jaxpr.eqns]
+    inner = [inner_jaxpr(equation) for equation in jaxpr.eqns]
     return sum(1 if each is None else _size(each[0]) for each in inner)
 
 
@@ -218,13 +220,13 @@ def _repeat(
     inside = Block(block, loop=True)
     starts = [v for array in carry for v in array.ravel()]
     held = inside.region("held", (), [v.kind for v in starts])
-    found = emit(inside, jaxpr.jaxpr, jaxpr.consts, [*fixed, *_shaped(held, carry)])
+    found = lower_jaxpr(inside, jaxpr.jaxpr, jaxpr.consts, [*fixed, *_reshape(held, carry)])
     ends = [
-        converted(inside, v, start.kind)
+        convert(inside, v, start.kind)
         for v, start in zip([v for a in found for v in a.ravel()], starts, strict=True)
     ]
     args = (length, inside, tuple(starts), tuple(held), tuple(ends))
-    return _shaped(block.region("repeat", args, [v.kind for v in starts]), carry)
+    return _reshape(block.region("repeat", args, [v.kind for v in starts]), carry)
 
 
 def _map(
@@ -241,7 +243,7 @@ def _map(
     left = iter(taken)
     given = [row[0] if alike else next(left) for row, alike in zip(every, same, strict=True)]
     shapes = [np.empty(item.shape[1:], dtype=object) for item in items]
-    found = emit(inside, jaxpr.jaxpr, jaxpr.consts, [*fixed, *_shaped(given, shapes)])
+    found = lower_jaxpr(inside, jaxpr.jaxpr, jaxpr.consts, [*fixed, *_reshape(given, shapes)])
     values = tuple(v for array in found for v in array.ravel())
     args = (length, inside, tuple(taken), values)
     kinds = [v.kind for v in values for _ in range(length)]

@@ -9,7 +9,7 @@ from jaxbiped.compiler.ir._elementary_functions import (
     Arithmetic,
     exponential,
     logarithm,
-    parts,
+    split_exponent,
 )
 from jaxbiped.compiler.ir._graph import Value
 
@@ -43,7 +43,7 @@ _TWO_THIRDS = (0.6666666666666666, 3.700743415417188e-17)
 
 def _precise_logarithm(m: Arithmetic, x: Value) -> tuple[Value, Value]:
     """log x in two parts, to about 2⁻⁶⁴ of itself, for x above zero and finite."""
-    k, f = parts(m, x)
+    k, f = split_exponent(m, x)
     total = m.add(f, 2.0)
     lost = m.sub(f, m.sub(total, 2.0))
     s = m.div(f, total)

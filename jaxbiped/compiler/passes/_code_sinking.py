@@ -1,4 +1,4 @@
-"""What only one branch of a conditional needs is computed in that branch."""
+"""Code sinking into conditionals: what only one branch needs is computed in that branch."""
 
 from collections import defaultdict
 from collections.abc import Iterable
@@ -9,7 +9,7 @@ from jaxbiped.compiler.passes._liveness import sources_of
 _STAYS = ("const", "input", "part", "if", "map", "repeat", "held", "taken")
 
 
-def sink(results: Iterable[Value]) -> None:
+def sink_code(results: Iterable[Value]) -> None:
     """Moves operations into the branches that alone need them, for these results of a graph."""
     uses, heads = _uses(results)
     # From outside in: what moves into a branch may move on into one inside of it.

@@ -1,4 +1,4 @@
-"""Which operations of a graph are wanted, and which products join the sums that use them."""
+"""Liveness of a graph's operations, and the products that join the sums that use them."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -7,7 +7,7 @@ from typing import Any
 from jaxbiped.compiler.ir._graph import Value
 
 
-class Needed:
+class Liveness:
     """What must be computed for chosen results.
 
     Attributes:

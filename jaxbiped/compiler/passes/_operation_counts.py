@@ -10,13 +10,13 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped.compiler.ir._graph import Block, Value
-from jaxbiped.compiler.passes._liveness import Needed
-from jaxbiped.compiler.runtime._program import emitted, inputs_of
+from jaxbiped.compiler.passes._liveness import Liveness
+from jaxbiped.compiler.runtime._program import inputs_of, lower_function
 
 _NO_WORK = ("input", "const", "part", "held", "taken")
 
 
-def counted_operations(
+def count_operations(
     function: Callable[[PyTree, PyTree], Any], varying: PyTree, invariant: PyTree
 ) -> dict[str, int]:
     """Operations of `function(varying, invariant)` by name, most frequent first.
@@ -29,19 +29,19 @@ def counted_operations(
     every = Block(once)
     arrays = [inputs_of(every, number) for _ in jtu.tree_leaves(varying)]
     parameters = [inputs_of(once, number) for _ in jtu.tree_leaves(invariant)]
-    results = emitted(every, function, shapes, [*arrays, *parameters])
-    needed = Needed([value for array in results for value in array.ravel()])
+    results = lower_function(every, function, shapes, [*arrays, *parameters])
+    needed = Liveness([value for array in results for value in array.ravel()])
     counts: Counter[str] = Counter()
     _add(counts, every, needed)
     return dict(counts.most_common())
 
 
-def _add(counts: Counter[str], block: Block, needed: Needed) -> None:
+def _add(counts: Counter[str], block: Block, needed: Liveness) -> None:
     for value in block.values:
         if value in needed and value.op not in _NO_WORK:
             counts[value.op] += 1
         for inner in (arg for arg in value.args if isinstance(arg, Block)):
-            _add(counts, inner, Needed(_results(value)))
+            _add(counts, inner, Liveness(_results(value)))
 
 
 def _results(value: Value) -> list[Value]:

@@ -1,4 +1,4 @@
-"""Jacobians of functions of scalars by eliminating what lies between inputs and outputs.
+"""Vertex elimination: Jacobians of functions of scalars from their own program.
 
 Linearised, a program is a graph whose edges are partial derivatives; an entry of the Jacobian is
 the sum over all paths of the products along them. Forward mode multiplies these out from the
@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jax.extend.core import Literal
 
 from jaxbiped._types import Scalar
-from jaxbiped.compiler.ir._lower_jaxpr import called
+from jaxbiped.compiler.ir._lower_jaxpr import inner_jaxpr
 
 Weight = Any
 """Of an edge: a traced scalar, or a plain number."""
@@ -27,7 +27,7 @@ def jacobian(function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[
     inputs = list(inputs)
     outputs, pushed = jax.linearize(function, inputs)
     try:
-        rows = _eliminated(pushed, inputs)
+        rows = _eliminate_all(pushed, inputs)
     except _NoRuleError:
         pull = jax.linear_transpose(pushed, inputs)
         unit = jnp.eye(len(outputs))
@@ -35,7 +35,7 @@ def jacobian(function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[
     return jnp.stack([jnp.stack([jnp.asarray(w, dtype=float) for w in row]) for row in rows])
 
 
-def _eliminated(pushed: Callable[..., Any], inputs: list[Scalar]) -> list[list[Weight]]:
+def _eliminate_all(pushed: Callable[..., Any], inputs: list[Scalar]) -> list[list[Weight]]:
     closed = jax.make_jaxpr(pushed)(inputs)
     graph = _Graph(len(inputs))
     ends = _linear(graph, closed.jaxpr, closed.consts, list(range(len(inputs))))
@@ -151,7 +151,7 @@ def _linear(graph: _Graph, jaxpr: Any, consts: Sequence[Any], args: Sequence[Any
 
     for equation in jaxpr.eqns:
         given = [read(atom) for atom in equation.invars]
-        inner = called(equation)
+        inner = inner_jaxpr(equation)
         if all(isinstance(g, _Known) for g in given):
             found = equation.primitive.bind(*[g.value for g in given], **equation.params)
             found = found if equation.primitive.multiple_results else [found]
@@ -180,7 +180,7 @@ def _vertex(graph: _Graph, name: str, given: list[Any]) -> Any:
     if name == "mul":
         (factor,) = (g.value for g in given if isinstance(g, _Known))
         (other,) = (g for g in given if not isinstance(g, _Known))
-        return graph.vertex(scaled(other, _plain(factor)))
+        return graph.vertex(scaled(other, _as_number(factor)))
     if name == "div":
         return graph.vertex(scaled(given[0], 1.0 / given[1].value))
     if name == "select_n":
@@ -192,7 +192,7 @@ def _vertex(graph: _Graph, name: str, given: list[Any]) -> Any:
     raise _NoRuleError(name)
 
 
-def _plain(value: Any) -> Weight:
+def _as_number(value: Any) -> Weight:
     """A constant as a plain number."""
     return value if isinstance(value, jax.core.Tracer) else float(value)
 

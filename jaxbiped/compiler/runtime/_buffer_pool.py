@@ -1,4 +1,4 @@
-"""Memory that is used again: the first touch of a page takes longer than what is written there."""
+"""Buffer pool: the first touch of a page takes longer than what is written there."""
 
 import math
 import weakref
@@ -6,7 +6,7 @@ import weakref
 import numpy as np
 
 
-class Memory:
+class BufferPool:
     """Gives arrays, and takes their memory back when nobody refers to them or to views of them."""
 
     def __init__(self, most: int) -> None:

@@ -1,4 +1,4 @@
-"""Programs run over many simulations at once: queues, threads and arrays."""
+"""Compiled programs, run over many simulations at once: queues, threads and arrays."""
 
 import contextlib
 import ctypes
@@ -14,9 +14,9 @@ from jaxtyping import PyTree
 
 from jaxbiped.compiler.codegen._lane_kernel import ENTRY, kernel_text
 from jaxbiped.compiler.codegen._lane_scheduler import FIELDS
-from jaxbiped.compiler.runtime._buffer_pool import Memory
+from jaxbiped.compiler.runtime._buffer_pool import BufferPool
 from jaxbiped.compiler.runtime._host_cpu import host
-from jaxbiped.compiler.runtime._input_streams import tapes_of
+from jaxbiped.compiler.runtime._input_streams import input_streams_of
 from jaxbiped.compiler.runtime._machine_code import MachineCode, assembly, machine_code
 from jaxbiped.compiler.runtime._program import (
     Graph,
@@ -203,7 +203,7 @@ class CompiledProgram:
         schedule: np.ndarray | None = None,
         tape: Sequence[np.ndarray] | None = None,
         room: int = 0,
-        memory: Memory | None = None,
+        memory: BufferPool | None = None,
         threads: int | None = None,
         width: int | None = None,
         quick: bool = False,
@@ -216,7 +216,7 @@ class CompiledProgram:
         count = table.shape[1]
         outputs = np.full((len(self.graph.outputs), count), np.nan)
         times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
-        tapes = tapes_of(tape, count, len(self.graph.row), backwards=self.backwards)
+        tapes = input_streams_of(tape, count, len(self.graph.row), backwards=self.backwards)
         shape = (count, room, len(self.graph.recorded))
         records = np.zeros(shape) if memory is None else memory.array(shape)
         if schedule is not None:

@@ -1,4 +1,4 @@
-"""What this machine's CPU can do."""
+"""Host CPU: the features that code is generated for."""
 
 import functools
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Where in memory the rows are that simulations read."""
+"""Input streams: where in memory the rows are that simulations read."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Tapes(NamedTuple):
+class InputStreams(NamedTuple):
     """Of n simulations.
 
     Attributes:
@@ -22,9 +22,9 @@ class Tapes(NamedTuple):
     rows: list[np.ndarray]
 
 
-def tapes_of(
+def input_streams_of(
     tape: Sequence[np.ndarray] | None, count: int, numbers: int, *, backwards: bool
-) -> Tapes:
+) -> InputStreams:
     """Of `count` simulations that read rows of so many numbers, of none where these are 0."""
     rows = [np.ascontiguousarray(each, dtype=np.float64) for each in ([] if tape is None else tape)]
     assert len(rows) == (count if numbers else 0)
@@ -32,6 +32,6 @@ def tapes_of(
     lengths = np.array([len(each) for each in rows], dtype=np.int64)
     starts = np.array([each.ctypes.data for each in rows], dtype=np.int64)
     if not backwards:
-        return Tapes(starts, lengths, numbers, rows)
+        return InputStreams(starts, lengths, numbers, rows)
     size = numbers * np.dtype(np.float64).itemsize
-    return Tapes(starts + (lengths - 1) * size, lengths, -numbers, rows)
+    return InputStreams(starts + (lengths - 1) * size, lengths, -numbers, rows)

@@ -1,4 +1,4 @@
-"""LLVM's text made into machine code, kept in the process and on disk."""
+"""Machine code from LLVM's text, kept in the process and on disk."""
 
 import hashlib
 import os
@@ -44,7 +44,7 @@ def machine_code(text: str, entry: str, host: Host, *, as_written: bool) -> Mach
     name = hashlib.sha256("\n".join(parts).encode()).hexdigest()
     with _LOCK:
         if name not in _LOADED:
-            _LOADED[name] = _loaded(text, entry, host, as_written, _folder(), name)
+            _LOADED[name] = _load(text, entry, host, as_written, _folder(), name)
         return _LOADED[name]
 
 
@@ -77,7 +77,7 @@ def _module(text: str, machine: Any, as_written: bool) -> Any:
     return module
 
 
-def _loaded(
+def _load(
     text: str, entry: str, host: Host, as_written: bool, folder: Path | None, name: str
 ) -> MachineCode:
     machine = _target_machine(host, as_written)

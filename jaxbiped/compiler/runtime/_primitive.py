@@ -1,4 +1,4 @@
-"""Compiled programs as operations of JAX: they run under `jit` and `vmap`."""
+"""Compiled programs as a primitive of JAX: they run under `jit` and `vmap`."""
 
 import contextlib
 import contextvars
@@ -26,7 +26,7 @@ _UNTRACED: contextvars.ContextVar[list[CompiledProgram] | None] = contextvars.Co
 )
 
 
-class _Wanted(enum.Enum):
+class _Part(enum.Enum):
     """Which part of what simulations give is wanted."""
 
     ALL = "outputs and records"
@@ -35,7 +35,7 @@ class _Wanted(enum.Enum):
 
 
 @contextlib.contextmanager
-def lowered_ahead() -> Iterator[list[CompiledProgram]]:
+def deferred_checks() -> Iterator[list[CompiledProgram]]:
     """Within, nothing that is lowered waits until its programs are traced.
 
     They are listed: whoever goes on to run them first has to `check` each.
@@ -71,8 +71,8 @@ class Recording(eqx.Module):
 
         `first` has shape (k,), the arrays (1 + room,).
         """
-        params = _params(self.recorder.compiled, recorder=self.recorder, wants=_Wanted.COLUMNS)
-        return _bound([self.numbers, first], params)
+        params = _params(self.recorder.compiled, recorder=self.recorder, wants=_Part.COLUMNS)
+        return _bind([self.numbers, first], params)
 
 
 def call(
@@ -97,7 +97,7 @@ def call(
     if isinstance(tape, Recording):
         recorder, rows = tape.recorder, [tape.numbers]
     params = _params(compiled, schedule=schedule, room=room, quick=quick, recorder=recorder)
-    table, *rest = _bound([_numbers(inputs), *rows], params)
+    table, *rest = _bind([_numbers(inputs), *rows], params)
     return _outputs(compiled, table), Recorded(*rest) if rest else None
 
 
@@ -114,7 +114,7 @@ def call_recording(
     reads = None if tape is None else tape.recorder
     recorder = Recorder(compiled, room, quick, once, reads)
     numbers = _numbers(inputs if tape is None else (inputs, tape.numbers))
-    (table,) = _bound([numbers], _params(compiled, recorder=recorder, wants=_Wanted.OUTPUTS))
+    (table,) = _bind([numbers], _params(compiled, recorder=recorder, wants=_Part.OUTPUTS))
     return _outputs(compiled, table), Recording(numbers, recorder)
 
 
@@ -124,7 +124,7 @@ def _params(
     room: int = 0,
     quick: bool = False,
     schedule: Schedule | None = None,
-    wants: _Wanted = _Wanted.ALL,
+    wants: _Part = _Part.ALL,
     recorder: Recorder | None = None,
 ) -> dict[str, Any]:
     """Of the operation: what is run and how, and which part of what that gives is wanted."""
@@ -146,7 +146,7 @@ def _numbers(inputs: PyTree) -> Any:
     return np.concatenate([np.ravel(np.asarray(leaf, dtype=np.float64)) for leaf in leaves])
 
 
-def _bound(given: list[Any], params: dict[str, Any]) -> list[Any]:
+def _bind(given: list[Any], params: dict[str, Any]) -> list[Any]:
     """The operation's results for one simulation."""
     if any(isinstance(leaf, jax.core.Tracer) for leaf in given):
         return [leaf[0] for leaf in _RUN.bind(*[x[None] for x in given], **params)]
@@ -169,14 +169,14 @@ def _run(
     schedule: Schedule | None,
     room: int,
     quick: bool,
-    wants: _Wanted,
+    wants: _Part,
     recorder: Recorder | None,
 ) -> list[np.ndarray]:
     """Of inputs (n, k) and their tapes: outputs (n, o), and what was recorded."""
     given = np.asarray(numbers)
-    if recorder is not None and wants is _Wanted.OUTPUTS:
+    if recorder is not None and wants is _Part.OUTPUTS:
         return [recorder.outputs(given).T]
-    if recorder is not None and wants is _Wanted.COLUMNS:
+    if recorder is not None and wants is _Part.COLUMNS:
         return recorder.columns(given, np.asarray(tape))
     times = None if schedule is None else schedule.times
     alone = quick and len(given) == 1
@@ -206,12 +206,12 @@ def _shapes(
     compiled: CompiledProgram,
     schedule: Schedule | None,
     room: int,
-    wants: _Wanted,
+    wants: _Part,
     recorder: Recorder | None,
     **_: Any,
 ) -> list[Any]:
     count = leaves[0].shape[0]
-    if wants is _Wanted.COLUMNS:
+    if wants is _Part.COLUMNS:
         assert recorder is not None
         column = jax.ShapeDtypeStruct((count, 1 + recorder.room), jnp.float64)
         return [column] * leaves[1].shape[1]
@@ -219,23 +219,23 @@ def _shapes(
     outputs = jtu.tree_leaves(compiled.outline.outputs)
     size = sum(int(np.prod(leaf.shape)) for leaf in outputs)
     found = [jax.ShapeDtypeStruct((count, size), jnp.float64)]
-    if numbers is not None and wants is _Wanted.ALL:
+    if numbers is not None and wants is _Part.ALL:
         room = room if schedule is None else len(schedule.times)
         found.append(jax.ShapeDtypeStruct((count, room, numbers), jnp.float64))
         found.append(jax.ShapeDtypeStruct((count,), jnp.int64))
     return found
 
 
-def _implemented(*leaves: Any, **params: Any) -> list[Array]:
+def _implementation(*leaves: Any, **params: Any) -> list[Array]:
     return [jnp.asarray(leaf) for leaf in _run(*leaves, **params)]
 
 
-def _abstract(*leaves: Any, **params: Any) -> list[Any]:
+def _abstract_evaluation(*leaves: Any, **params: Any) -> list[Any]:
     shapes = _shapes(leaves, **params)
     return [jax.core.ShapedArray(shape.shape, shape.dtype) for shape in shapes]
 
 
-def _lowered(context: Any, *operands: Any, **params: Any) -> Any:
+def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
     """A call back from the compiled program, with arrays of NumPy.
 
     `jax.pure_callback` would make arrays of JAX of them, which copies, and where they are large
@@ -245,7 +245,7 @@ def _lowered(context: Any, *operands: Any, **params: Any) -> Any:
     def run(*given: np.ndarray) -> tuple[np.ndarray, ...]:
         return tuple(_run(*given, **params))
 
-    if params["wants"] is not _Wanted.COLUMNS:
+    if params["wants"] is not _Part.COLUMNS:
         # While XLA compiles the rest, this compiles as well.
         compiled, waiting = params["compiled"], _UNTRACED.get()
         compiled.make_ready(context.avals_in[0].shape[0])
@@ -266,14 +266,14 @@ def _lowered(context: Any, *operands: Any, **params: Any) -> Any:
     return results
 
 
-def _differentiated(primals: Any, tangents: Any, **params: Any) -> Any:
+def _refuse_derivative(primals: Any, tangents: Any, **params: Any) -> Any:
     raise TypeError(
         'JAX cannot differentiate what the lane engine computes here: use engine="xla", or a '
         "function that brings its own derivatives, such as gait_measures."
     )
 
 
-def _batched(leaves: Any, axes: Any, **params: Any) -> tuple[list[Array], list[int]]:
+def _batching(leaves: Any, axes: Any, **params: Any) -> tuple[list[Array], list[int]]:
     size = next(
         leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None
     )
@@ -289,8 +289,8 @@ def _batched(leaves: Any, axes: Any, **params: Any) -> tuple[list[Array], list[i
 
 _RUN = Primitive("lanes")
 _RUN.multiple_results = True
-_RUN.def_impl(_implemented)
-_RUN.def_abstract_eval(_abstract)
-ad.primitive_jvps[_RUN] = _differentiated
-batching.primitive_batchers[_RUN] = _batched
-mlir.register_lowering(_RUN, _lowered)
+_RUN.def_impl(_implementation)
+_RUN.def_abstract_eval(_abstract_evaluation)
+ad.primitive_jvps[_RUN] = _refuse_derivative
+batching.primitive_batchers[_RUN] = _batching
+mlir.register_lowering(_RUN, _lowering)

@@ -1,4 +1,4 @@
-"""A simulation as four functions of JAX, and their graph."""
+"""Program of a simulation: four functions of JAX, and their graph."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.compiler.ir._elementwise_primitives import KINDS, Array, array_of, converted
+from jaxbiped.compiler.ir._elementwise_primitives import KINDS, Array, array_of, convert
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
-from jaxbiped.compiler.ir._lower_jaxpr import emit
-from jaxbiped.compiler.passes._code_sinking import sink
+from jaxbiped.compiler.ir._lower_jaxpr import lower_jaxpr
+from jaxbiped.compiler.passes._code_sinking import sink_code
 
 
 class Program(NamedTuple):
@@ -115,7 +115,7 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
     given = [inputs_of(prepare, leaf) for leaf in jtu.tree_leaves(inputs)]
     carried_shape = jax.eval_shape(program.start, inputs)
     carried = [inputs_of(body, leaf) for leaf in jtu.tree_leaves(carried_shape)]
-    first = emitted(begin, program.start, (inputs,), given)
+    first = lower_function(begin, program.start, (inputs,), given)
     shapes: tuple[Any, ...] = (inputs, carried_shape)
     arguments = [*given, *carried]
     row: list[Value] = []
@@ -123,18 +123,20 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
         shape = jax.ShapeDtypeStruct((program.tape,), jnp.float64)
         shapes, arguments = (*shapes, shape), [*arguments, inputs_of(body, shape)]
         row = list(arguments[-1])
-    following = emitted(body, program.attempt, shapes, arguments)
-    finals = emitted(end, program.finish, (inputs, carried_shape), [*given, *carried])
+    following = lower_function(body, program.attempt, shapes, arguments)
+    finals = lower_function(end, program.finish, (inputs, carried_shape), [*given, *carried])
     next_time = Value("input", (), Kind.F64, notes)
     recording, recorded = None, []
     if program.record is not None:
         time = jax.ShapeDtypeStruct((), jnp.float64)
         arguments = [*given, *carried, array_of([next_time], ())]
-        mask, *values = emitted(notes, program.record, (inputs, carried_shape, time), arguments)
+        mask, *values = lower_function(
+            notes, program.record, (inputs, carried_shape, time), arguments
+        )
         recording = mask.item()
-        recorded = [converted(notes, v, Kind.F64) for a in values for v in a.ravel()]
+        recorded = [convert(notes, v, Kind.F64) for a in values for v in a.ravel()]
     *following, done = following
-    outputs = [converted(end, v, Kind.F64) for array in finals for v in array.ravel()]
+    outputs = [convert(end, v, Kind.F64) for array in finals for v in array.ravel()]
     graph = Graph(
         prepare=prepare,
         begin=begin,
@@ -143,8 +145,8 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
         notes=notes,
         inputs=[v for array in given for v in array.ravel()],
         carried=carried,
-        first=_matched(begin, first, carried),
-        following=_matched(body, following, carried),
+        first=_match_kinds(begin, first, carried),
+        following=_match_kinds(body, following, carried),
         row=row,
         done=done.item(),
         outputs=[v for v in outputs if v.constant is None],
@@ -154,7 +156,7 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
         recorded=recorded,
         scheduled=program.scheduled,
     )
-    sink(graph.results())
+    sink_code(graph.results())
     return graph
 
 
@@ -175,19 +177,19 @@ def inputs_of(block: Block, leaf: Any) -> Array:
     return array_of([Value("input", (), kind, block) for _ in range(int(np.prod(shape)))], shape)
 
 
-def emitted(
+def lower_function(
     block: Block, function: Callable[..., Any], shapes: tuple[Any, ...], arrays: list[Array]
 ) -> list[Array]:
     """A function's operations added to a block: its results."""
     closed = jax.make_jaxpr(function)(*shapes)
-    return emit(block, closed.jaxpr, closed.consts, arrays)
+    return lower_jaxpr(block, closed.jaxpr, closed.consts, arrays)
 
 
-def _matched(block: Block, arrays: list[Array], like: list[Array]) -> list[Array]:
+def _match_kinds(block: Block, arrays: list[Array], like: list[Array]) -> list[Array]:
     """The same values, each as the kind that is carried."""
     return [
         array_of(
-            [converted(block, v, w.kind) for v, w in zip(a.ravel(), b.ravel(), strict=True)],
+            [convert(block, v, w.kind) for v, w in zip(a.ravel(), b.ravel(), strict=True)],
             b.shape,
         )
         for a, b in zip(arrays, like, strict=True)

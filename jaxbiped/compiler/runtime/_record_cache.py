@@ -1,4 +1,4 @@
-"""What simulations recorded waits on the host until somebody asks for it."""
+"""Record cache: what simulations recorded waits on the host until somebody asks for it."""
 
 import collections
 import threading
@@ -14,7 +14,7 @@ BLOCK = 512
 """Simulations that record, or read records, at once: all together would take much memory."""
 
 
-class HeldBack:
+class RecordCache:
     """What simulations recorded, by program and inputs, as long as there is room for it.
 
     A search makes many turns and needs the records of two of them, known only at its end: they

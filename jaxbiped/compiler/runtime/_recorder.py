@@ -1,17 +1,17 @@
-"""Programs whose records are held back on the host, and may be what another one reads."""
+"""Recorders: programs whose records stay on the host, where another one may read them."""
 
 from collections.abc import Callable
 from typing import NamedTuple, Optional
 
 import numpy as np
 
-from jaxbiped.compiler.runtime._buffer_pool import Memory
+from jaxbiped.compiler.runtime._buffer_pool import BufferPool
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._record_cache import HeldBack, Tables
+from jaxbiped.compiler.runtime._record_cache import RecordCache, Tables
 from jaxbiped.compiler.runtime._threads import default_threads
 
-_HELD_BACK = HeldBack(most=1 << 29)
-_MEMORY = Memory(most=1 << 29)
+_HELD_BACK = RecordCache(most=1 << 29)
+_MEMORY = BufferPool(most=1 << 29)
 
 
 class Recorder(NamedTuple):
@@ -37,12 +37,12 @@ class Recorder(NamedTuple):
         return _HELD_BACK.ran(self, numbers.T, self._run_for(len(numbers)))
 
     def rows(self, numbers: np.ndarray) -> list[np.ndarray]:
-        """Their records, as `HeldBack.rows`."""
+        """Their records, as `RecordCache.rows`."""
         run = self._run_for(len(numbers))
         return _HELD_BACK.rows(self, numbers.T, run, once=self.once)
 
     def columns(self, numbers: np.ndarray, first: np.ndarray) -> list[np.ndarray]:
-        """Each number in their records, as `HeldBack.columns`."""
+        """Each number in their records, as `RecordCache.columns`."""
         run = self._run_for(len(numbers))
         return _HELD_BACK.columns(self, numbers.T, first, self.room, run)
 

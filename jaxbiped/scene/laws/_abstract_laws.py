@@ -1,4 +1,4 @@
-"""The two interfaces that every law of contact answers."""
+"""Interfaces of the laws of contact: normal force and friction."""
 
 import abc
 from typing import ClassVar

@@ -1,4 +1,4 @@
-"""All laws of contact by name, and each of them made to resemble the seed's."""
+"""Catalogue of the laws of contact by name, each made to resemble the seed's."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType

@@ -1,4 +1,4 @@
-"""A step-size controller that also keeps the extremes of something watched."""
+"""Extremes: a step-size controller that keeps those of something watched."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,4 +1,4 @@
-"""A step-size controller that also counts footsteps and ends the solve after enough of them."""
+"""Footstep limit: a step-size controller that ends the solve after enough footsteps."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,4 +1,4 @@
-"""How steps are chosen: what every solve of the project has in common."""
+"""Step control: how steps are chosen, the same for every solve of the project."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,4 +1,4 @@
-"""A vector field at a point: its value, its exact Jacobian, and (I − g J)⁻¹ applied to vectors."""
+"""Linearisation of a vector field: value, exact Jacobian, and (I − g J)⁻¹ on vectors."""
 
 import abc
 import math
@@ -14,7 +14,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.linalg._elimination import Entry, Matrix, inverse, times
+from jaxbiped.linalg._elimination import Entry, Matrix, inverse, matmul
 from jaxbiped.solve.rosenbrock._sparsity import Structure, structure_of
 
 Components: TypeAlias = list[Any]
@@ -166,7 +166,7 @@ class _ScalarLinearisation(AbstractLinearisation):
         return [list(row) for row in zip(*columns, strict=True)]
 
     def factorise(self, jacobian: Matrix, step: Scalar) -> list[list[Scalar]]:
-        return inverse(_reduced(jacobian, self.direct(), self.kept(), step))
+        return inverse(_reduced_matrix(jacobian, self.direct(), self.kept(), step))
 
     def solve_kept(
         self,
@@ -181,7 +181,7 @@ class _ScalarLinearisation(AbstractLinearisation):
             entries = [(jacobian[i][p], value) for p, value in direct_right.items()]
             terms = [entry * value for entry, value in entries if entry is not None]
             reduced.append(own + step * sum(terms[1:], terms[0]) if terms else own)
-        return times(factors, reduced)
+        return matmul(factors, reduced)
 
     def direct(self) -> dict[int, int]:
         direct: dict[int, int] = {}
@@ -213,7 +213,9 @@ class _ScalarLinearisation(AbstractLinearisation):
         ]
 
 
-def _reduced(jacobian: Matrix, direct: dict[int, int], kept: list[int], step: Scalar) -> Matrix:
+def _reduced_matrix(
+    jacobian: Matrix, direct: dict[int, int], kept: list[int], step: Scalar
+) -> Matrix:
     """I − g J with the direct components eliminated."""
     matrix: Matrix = []
     for i in kept:

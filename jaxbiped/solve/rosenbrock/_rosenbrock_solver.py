@@ -14,7 +14,7 @@ from equinox.internal import ω
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.solve._fusion_barrier import fenced
+from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.rosenbrock._linearisation import (
     AbstractLinearisation,
     Components,
@@ -233,11 +233,11 @@ def stages_of(
     def picked(components: Components) -> Components:
         return [components[i] for i in kept]
 
-    slope, drift, jacobian = fenced(
+    slope, drift, jacobian = fusion_barrier(
         moves,
         lambda: (picked(lin.evaluate(t, start)), picked(lin.time_derivative()), lin.jacobian()),
     )
-    factors = fenced(moves, lambda: lin.factorise(jacobian, step))
+    factors = fusion_barrier(moves, lambda: lin.factorise(jacobian, step))
     recurrence = _recurrence(tableau)
     stages = Stages(
         start, step, lin, jacobian, factors, lin.direct(), kept, *recurrence, increments=[]
@@ -265,7 +265,7 @@ def stages_of(
         return lin.solve_kept(factors, jacobian, step, right, stages.direct_right(i)), kept_rate
 
     for i in range(len(tableau.alpha)):
-        increment, last_rate = fenced(moves, functools.partial(stage, i))
+        increment, last_rate = fusion_barrier(moves, functools.partial(stage, i))
         stages.increments.append(increment)
     return stages
 

@@ -1,4 +1,4 @@
-"""Which entries of a Jacobian can differ from zero, read off a function's own program."""
+"""Sparsity of a Jacobian, read off a function's own program."""
 
 from typing import Any, NamedTuple
 

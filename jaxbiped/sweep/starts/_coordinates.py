@@ -63,7 +63,7 @@ def state_at(base: Any, columns: Mapping[str, np.ndarray]) -> Any:
     return base._replace(**changed)
 
 
-def placed(scene: Any, base: Any, states: Any, named: Any) -> Any:
+def place_states(scene: Any, base: Any, states: Any, named: Any) -> Any:
     """States whose stance foot is as deep, and rolls and slips, as the base's does.
 
     The hip's height and velocity follow from the stance leg where they are not `named`. A rigid

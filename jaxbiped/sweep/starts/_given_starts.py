@@ -1,4 +1,4 @@
-"""Starts as they are given."""
+"""Given starts."""
 
 import hashlib
 from typing import Any

@@ -1,4 +1,4 @@
-"""Points drawn in the unit cube, each a function of its number alone."""
+"""Sequences of points in the unit cube, each a function of its number alone."""
 
 import functools
 import warnings
@@ -10,7 +10,9 @@ SAMPLINGS = ("uniform", "latin-hypercube", "sobol", "halton")
 """Ways to draw samples."""
 
 
-def points(method: str, dimensions: int, count: int, seed: int, numbers: np.ndarray) -> np.ndarray:
+def sequence_points(
+    method: str, dimensions: int, count: int, seed: int, numbers: np.ndarray
+) -> np.ndarray:
     """The points with these numbers of a sample of `count`, whatever else is drawn.
 
     Args:

@@ -1,4 +1,4 @@
-"""Where starts lie: on grids and in samples."""
+"""Starts on grids and in samples."""
 
 import abc
 import math
@@ -15,8 +15,13 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._identity import identity
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep.starts._coordinates import check_coordinates, parameters_among, placed, state_at
-from jaxbiped.sweep.starts._sequences import SAMPLINGS, points
+from jaxbiped.sweep.starts._coordinates import (
+    check_coordinates,
+    parameters_among,
+    place_states,
+    state_at,
+)
+from jaxbiped.sweep.starts._sequences import SAMPLINGS, sequence_points
 
 
 class Batch(NamedTuple):
@@ -141,7 +146,7 @@ class Sample(AbstractStarts):
         return tuple(self.lower)
 
     def at(self, labelling: Labelling, numbers: np.ndarray) -> Batch:
-        drawn = points(self.method, len(self.lower), self.count, self.seed, numbers)
+        drawn = sequence_points(self.method, len(self.lower), self.count, self.seed, numbers)
         columns = {
             name: self.lower[name] + drawn[:, i] * (self.upper[name] - self.lower[name])
             for i, name in enumerate(self.lower)
@@ -245,7 +250,7 @@ def batch_at(
     scene = with_parameters(labelling.scene, parameters)
     states = state_at(base, columns)
     if place:
-        states = placed(scene, base, states, columns)
+        states = place_states(scene, base, states, columns)
     if follow is not None:
         states = follow(scene, states)
     leaves = [np.broadcast_to(np.asarray(leaf, dtype=np.float64), (count,)) for leaf in states]

@@ -8,9 +8,9 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.compiler.ir._graph import Block
 from jaxbiped.compiler.passes import _vertex_elimination
-from jaxbiped.compiler.passes._liveness import Needed
+from jaxbiped.compiler.passes._liveness import Liveness
 from jaxbiped.compiler.passes._vertex_elimination import jacobian
-from jaxbiped.compiler.runtime._program import emitted, inputs_of
+from jaxbiped.compiler.runtime._program import inputs_of, lower_function
 
 POINT = [0.7, -1.3, 2.1]
 
@@ -92,6 +92,8 @@ def _operations(function, numbers):
     """Of the graph that lanes make of it."""
     block = Block()
     shape = jax.ShapeDtypeStruct((), jnp.float64)
-    found = emitted(block, function, tuple(numbers), [inputs_of(block, shape) for _ in numbers])
-    needed = Needed([value for array in found for value in array.ravel()])
+    found = lower_function(
+        block, function, tuple(numbers), [inputs_of(block, shape) for _ in numbers]
+    )
+    needed = Liveness([value for array in found for value in array.ravel()])
     return sum(value in needed and value.op != "const" for value in block.values)

@@ -22,7 +22,7 @@ from jaxbiped.compiler.runtime._host_cpu import host
 from jaxbiped.compiler.runtime._program import Program
 from jaxbiped.compiler.runtime._threads import default_threads
 from jaxbiped.solve._adaptive_program import Solve
-from jaxbiped.solve._final_step import almost
+from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._units import units_of
 from jaxbiped.variational._differentiable_solve import Setting, compiled_solve
 
@@ -46,7 +46,7 @@ def _inputs(starts, duration=0.3, most=20000.0, scene=SCENE):
         scene=jtu.tree_map(each, scene),
         state=jb.State(*np.asarray(starts, dtype=float).T),
         duration=each(duration),
-        almost=each(almost(jnp.asarray(duration))),
+        almost=each(just_before_end(jnp.asarray(duration))),
         rtol=each(1e-6),
         atol=each(1e-8),
         units=jtu.tree_map(each, units_of(SCENE, jb.seed_state())),

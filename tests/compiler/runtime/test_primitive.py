@@ -7,7 +7,7 @@ import pytest
 
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.compiler.runtime import _compiled_program
-from jaxbiped.compiler.runtime._primitive import call, lowered_ahead
+from jaxbiped.compiler.runtime._primitive import call, deferred_checks
 from jaxbiped.compiler.runtime._program import graph_of
 from tests.compiler.one_shot import compiled
 
@@ -56,7 +56,7 @@ def test_who_runs_what_cannot_be_expressed_is_told(way):
 
 def test_lowered_ahead_whoever_checks_is_told():
     run = jax.jit(_called(jax.scipy.special.erf))
-    with lowered_ahead() as programs:
+    with deferred_checks() as programs:
         run.lower(0.0).compile()
     (program,) = programs
     with pytest.raises(UnknownPrimitiveError, match="'erf'"):
@@ -65,7 +65,7 @@ def test_lowered_ahead_whoever_checks_is_told():
 
 def test_what_was_lowered_ahead_runs():
     run = jax.jit(_called(jnp.log))
-    with lowered_ahead() as programs:
+    with deferred_checks() as programs:
         run.lower(1.0).compile()
     for program in programs:
         program.check()

@@ -8,7 +8,7 @@ import pytest
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._primitive import Recording, call, call_recording
 from jaxbiped.compiler.runtime._program import Program
-from jaxbiped.compiler.runtime._record_cache import HeldBack
+from jaxbiped.compiler.runtime._record_cache import RecordCache
 
 ROOM = 8
 NUMBER = jax.ShapeDtypeStruct((), jnp.float64)
@@ -94,7 +94,7 @@ def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
 
 
 def test_what_is_no_longer_held_is_run_again(powers, runs, monkeypatch):
-    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._HELD_BACK", HeldBack(most=0))
+    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._HELD_BACK", RecordCache(most=0))
     _, recording = _recording(powers, 1.5, 2.0)
     _, values = recording.columns(np.array([0.0, 1.0]))
     np.testing.assert_array_equal(values[:3], [1.0, 1.5, 2.25])
@@ -140,7 +140,7 @@ def test_a_recording_can_be_read_backwards(powers):
 
 @pytest.mark.parametrize("most", [0, 1 << 20])
 def test_what_reads_a_recording_may_record_as_well(powers, monkeypatch, most):
-    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._HELD_BACK", HeldBack(most=most))
+    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._HELD_BACK", RecordCache(most=most))
     doubled, reader = _doubled(), _last_sum()
 
     def total(factor, steps):
@@ -182,7 +182,7 @@ def test_what_came_first_goes_first():
         return table.copy(), np.ones((table.shape[1], 3, 1)), np.full(table.shape[1], 2)
 
     # Two records of one number each: 16 bytes a simulation.
-    held = HeldBack(most=40)
+    held = RecordCache(most=40)
     for number in (1.0, 2.0, 3.0):
         np.testing.assert_array_equal(held.ran("program", np.array([[number]]), run), [[number]])
     held.rows("program", np.array([[3.0, 2.0]]), run)

@@ -1,4 +1,4 @@
-"""The interface of friction laws with a memory: bristles that bend before they slip."""
+"""Interface of bristle laws: friction with a state, bristles that bend before they slip."""
 
 import abc
 

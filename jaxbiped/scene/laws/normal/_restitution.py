@@ -1,4 +1,4 @@
-"""The damping factor χ of K δⁿ (1 + χ δ̇/v⁻) from a coefficient of restitution, eight times.
+"""Restitution formulas: the damping factor χ of K δⁿ (1 + χ δ̇/v⁻), eight of them.
 
 None realises its e exactly over the whole range: the two oldest and Lankarani and Nikravesh's hold
 near e = 1, the later ones also for soft impacts. tests/scene/test_restitution.py tells what each

@@ -1,4 +1,4 @@
-"""Parameters of a normal law from how a mass stands on it."""
+"""Weight on a normal law: its parameters from how a mass stands on it."""
 
 from typing import Any
 
