@@ -5,13 +5,12 @@ from pathlib import Path
 from typing import Any
 
 from jaxbiped._checks import check_writable_file
+from jaxbiped._parameter import parameter_infos
 from jaxbiped._progress import stage
 from jaxbiped.cli._report import Report, table
-from jaxbiped.dynamics._bristle_state import state_type
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.measure._operation_counts import operation_counts
 from jaxbiped.scene._ladder import ladder
-from jaxbiped.scene._parameter import parameter_infos
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
@@ -73,10 +72,9 @@ def _law(name: str, scene: Scene, law: Any) -> dict[str, Any]:
 
 
 def _rung(name: str, scene: Scene | RigidScene) -> dict[str, Any]:
-    kind = RigidState if isinstance(scene, RigidScene) else state_type(scene)
     return {
         "name": name,
-        "states": len(kind._fields),
+        "states": len(state_type(scene)._fields),
         "operations": sum(operation_counts(scene).values()),
     }
 

@@ -5,10 +5,10 @@ from typing import ClassVar
 import equinox as eqx
 
 from jaxbiped._checks import check_at_least
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
 from jaxbiped.constraints._penalised import augmented_multipliers
-from jaxbiped.scene._parameter import parameter
 
 
 class Augmented(AbstractConstraintMethod):

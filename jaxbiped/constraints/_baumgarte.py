@@ -2,6 +2,7 @@
 
 from typing import ClassVar
 
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.constraints._constraint_method import (
     AbstractConstraintMethod,
@@ -9,7 +10,6 @@ from jaxbiped.constraints._constraint_method import (
     exact_multipliers,
     stabilised,
 )
-from jaxbiped.scene._parameter import parameter
 
 
 class Baumgarte(AbstractConstraintMethod):

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import equinox as eqx
 
+from jaxbiped._parameter import check_parameters
 from jaxbiped._types import Scalar
 from jaxbiped.linalg._symmetric import factorise, solve
-from jaxbiped.scene._parameter import check_parameters
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar

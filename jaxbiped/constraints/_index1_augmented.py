@@ -5,6 +5,7 @@ from typing import ClassVar
 import equinox as eqx
 
 from jaxbiped._checks import check_at_least
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.constraints._constraint_method import (
     AbstractProjectingMethod,
@@ -19,7 +20,6 @@ from jaxbiped.constraints._penalised import (
     iterate_multipliers,
 )
 from jaxbiped.linalg._symmetric import factorise
-from jaxbiped.scene._parameter import parameter
 
 
 class Index1Augmented(AbstractProjectingMethod):

@@ -7,8 +7,8 @@ from jaxbiped._checks import (
     check_choice,
     check_type,
 )
+from jaxbiped._parameter import check_parameters, parameter
 from jaxbiped._types import Parameter
-from jaxbiped.scene._parameter import check_parameters, parameter
 
 ORIENTATIONS = ("angle", "euler")
 """How a body's orientation is written.

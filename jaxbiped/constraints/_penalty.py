@@ -2,11 +2,11 @@
 
 from typing import ClassVar
 
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
 from jaxbiped.constraints._penalised import penalty_system
 from jaxbiped.linalg._symmetric import solve
-from jaxbiped.scene._parameter import parameter
 
 
 class Penalty(AbstractConstraintMethod):

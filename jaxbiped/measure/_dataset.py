@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jaxbiped._parameter import parameter_infos
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import feet, touches
 from jaxbiped.dynamics._forces import foot_forces
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
-from jaxbiped.scene._parameter import parameter_infos
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory

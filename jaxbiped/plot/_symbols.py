@@ -5,14 +5,14 @@ Symbols are the paper's; those of laws that it does not have are the ones of the
 
 from typing import Any
 
+from jaxbiped._parameter import parameter_infos
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
-from jaxbiped.scene._bengisu_akay import BengisuAkay
-from jaxbiped.scene._catalogue import FRICTION_LAWS, NORMAL_LAWS
 from jaxbiped.scene._ground import Ground
-from jaxbiped.scene._parameter import parameter_infos
-from jaxbiped.scene._ristow_schafer import RistowSchafer
 from jaxbiped.scene._walker import Walker
+from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
 from jaxbiped.sweep.starts._coordinates import START_QUANTITIES
 
 TIME = Quantity("time", r"$t$", "s")

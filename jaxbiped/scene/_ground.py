@@ -4,8 +4,8 @@ import math
 
 import equinox as eqx
 
+from jaxbiped._parameter import check_parameters, parameter
 from jaxbiped._types import Parameter
-from jaxbiped.scene._parameter import check_parameters, parameter
 
 
 class Ground(eqx.Module):

@@ -3,10 +3,10 @@
 import equinox as eqx
 
 from jaxbiped._checks import check_type
+from jaxbiped._parameter import check_parameters, parameter
 from jaxbiped._types import Parameter
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
 from jaxbiped.constraints._linkage import Linkage
-from jaxbiped.scene._parameter import check_parameters, parameter
 
 
 class LinkageScene(eqx.Module):

@@ -7,8 +7,8 @@ from jaxbiped._checks import (
     check_at_least,
     holds_somewhere,
 )
+from jaxbiped._parameter import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene._parameter import check_parameters, parameter
 
 
 class Walker(eqx.Module):

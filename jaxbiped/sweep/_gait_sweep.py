@@ -80,16 +80,15 @@ def gait_sweep(
         accuracy=accuracy,
         radius_sensitivities=radius_sensitivities,
     )
-    modelled = scene.scene if isinstance(scene, RedundantScene) else scene
     settings = {
-        "scene": {k: float(v) for k, v in parameter_values(modelled).items()},
+        "scene": {k: float(v) for k, v in parameter_values(scene).items()},
         "models": identity(scene),
         "over": {name: column.tolist() for name, column in values.items()},
         "options": {**options, "parameters": None if parameters is None else list(parameters)},
     }
     shape = tuple(map(len, values.values()))
     known: dict[tuple[int, ...], Any] = {}
-    order = list(_outwards(shape, _nearest(modelled, values)))
+    order = list(_outwards(shape, _nearest(scene, values)))
 
     def search(place: tuple[int, ...], *, again: bool) -> Gait | None:
         """The gait there; none again where no neighbour has one."""

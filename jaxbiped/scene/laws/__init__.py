@@ -3,12 +3,12 @@
 `parameter` declares what laws have for parameters, a `Quantity` is what is known of one.
 """
 
+from jaxbiped._parameter import parameter as parameter
 from jaxbiped._quantity import Quantity as Quantity
 from jaxbiped.scene._clearance import AbstractClearance as AbstractClearance
 from jaxbiped.scene._clearance import AlwaysTouching as AlwaysTouching
 from jaxbiped.scene._clearance import OneFoot as OneFoot
 from jaxbiped.scene._clearance import StanceRotation as StanceRotation
-from jaxbiped.scene._parameter import parameter as parameter
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw as AbstractFrictionLaw
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw as AbstractNormalLaw
 from jaxbiped.scene.laws._catalogue import FRICTION_LAWS as FRICTION_LAWS

@@ -6,8 +6,8 @@ from typing import ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
+from jaxbiped._parameter import check_parameters
 from jaxbiped._types import Scalar
-from jaxbiped.scene._parameter import check_parameters
 
 
 class AbstractNormalLaw(eqx.Module):

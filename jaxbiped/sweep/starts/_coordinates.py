@@ -7,6 +7,7 @@ import numpy as np
 
 from jaxbiped._checks import check_choice
 from jaxbiped._quantity import Quantity
+from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.scene._parameters import parameter_names, parameter_quantities
@@ -35,8 +36,8 @@ START_QUANTITIES = {name: _QUANTITIES.get(name) or STATE_QUANTITIES[name] for na
 
 def coordinate_names(scene: Scene | RigidScene) -> tuple[str, ...]:
     """All coordinates that starts of a scene can differ in."""
-    leaves = RigidState._fields if isinstance(scene, RigidScene) else None
-    own = [name for name, leaf in COORDINATES.items() if leaves is None or leaf in leaves]
+    leaves = state_type(scene)._fields
+    own = [name for name, leaf in COORDINATES.items() if leaf in leaves]
     return (*own, *parameter_names(scene))
 
 

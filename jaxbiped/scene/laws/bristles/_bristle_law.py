@@ -4,8 +4,8 @@ import abc
 
 import equinox as eqx
 
+from jaxbiped._parameter import check_parameters
 from jaxbiped._types import Scalar
-from jaxbiped.scene._parameter import check_parameters
 
 
 class AbstractBristleLaw(eqx.Module):

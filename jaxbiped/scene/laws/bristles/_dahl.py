@@ -2,8 +2,8 @@
 
 import jax.numpy as jnp
 
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene._parameter import parameter
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 

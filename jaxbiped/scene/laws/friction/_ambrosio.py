@@ -5,8 +5,8 @@ from typing import ClassVar
 import jax.numpy as jnp
 
 from jaxbiped._checks import check_positive
+from jaxbiped._parameter import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene._parameter import check_parameters, parameter
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 
 

@@ -2,8 +2,8 @@
 
 import jax.numpy as jnp
 
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene._parameter import parameter
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 from jaxbiped.scene.laws.friction._stribeck_curve import stribeck_coefficient, stribeck_switches
 

@@ -4,8 +4,8 @@ from typing import ClassVar
 
 import jax.numpy as jnp
 
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene._parameter import parameter
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 
 

@@ -1,7 +1,7 @@
 """Viscous friction."""
 
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene._parameter import parameter
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 
 

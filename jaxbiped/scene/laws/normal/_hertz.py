@@ -5,8 +5,8 @@ from typing import Self
 import jax.numpy as jnp
 
 from jaxbiped._checks import check_positive, check_within
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
-from jaxbiped.scene._parameter import parameter
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, hertz_energy, hertz_force
 from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
 

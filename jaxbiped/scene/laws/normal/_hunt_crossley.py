@@ -3,8 +3,8 @@
 from typing import Self
 
 from jaxbiped._checks import check_choice, check_positive
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
-from jaxbiped.scene._parameter import parameter
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractNormalLaw,
     depth_in_contact,

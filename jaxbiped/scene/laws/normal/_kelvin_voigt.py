@@ -4,8 +4,8 @@ from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene._parameter import parameter
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, pushing
 from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
 

@@ -2,8 +2,8 @@
 
 from typing import Self
 
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
-from jaxbiped.scene._parameter import parameter
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractNormalLaw,
     depth_in_contact,

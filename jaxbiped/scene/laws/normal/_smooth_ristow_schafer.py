@@ -3,8 +3,8 @@
 import jax.numpy as jnp
 import numpy as np
 
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene._parameter import parameter
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractNormalLaw,
     hertz_energy,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped._parameter import parameter_infos
 from jaxbiped._quantity import Quantity
-from jaxbiped.scene._parameter import parameter_infos
 
 SEED = jb.seed_scene()
 NORMALS = {
