@@ -80,10 +80,14 @@ def with_parameters(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
     paths = [path for path, _ in jtu.tree_flatten_with_path(changed)[0]]
     for name, value in values.items():
         check_choice("parameter", name, names)
-        part, field = (key.name for key in paths[names.index(name)])
-        new = dataclasses.replace(getattr(changed, part), **{field: value})
-        changed = dataclasses.replace(changed, **{part: new})
+        changed = _replace(changed, paths[names.index(name)], value)
     return scene.with_minimal(changed)
+
+
+def _replace(part: Any, path: tuple[Any, ...], value: Any) -> Any:
+    name, rest = path[0].name, path[1:]
+    new = _replace(getattr(part, name), rest, value) if rest else value
+    return dataclasses.replace(part, **{name: new})
 
 
 def _names_by_leaf(scene: AbstractScene) -> list[str]:
