@@ -17,12 +17,12 @@ import jaxbiped as jb
 from jaxbiped.gait._orbit import slopes_of
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
-    ReturnMapSpec,
     linearised_return,
     recurring_components,
     seed_directions,
     state_with,
 )
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._stability import stability_of
 from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.variational._solve_to_section import Precision

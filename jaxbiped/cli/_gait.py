@@ -202,7 +202,7 @@ def _assumption_line(known: dict[str, float]) -> str:
 
 def _failure(numbers: dict[str, Any], gait: Gait) -> str:
     """One sentence on a search that found no gait."""
-    residual, turns = numbers["residual"], int(gait.turns)
+    residual, turns = numbers["residual"], int(gait.evaluations)
     returned = "no trial returned" if residual is None else f"residual {residual:.2e}"
     lost = "every trial walked on"
     if int(gait.walk_ending) != 0:
@@ -217,7 +217,7 @@ def _failure(numbers: dict[str, Any], gait: Gait) -> str:
 
 
 def _print(report: Report, numbers: dict[str, Any], gait: Gait) -> None:
-    report.say(_gait_table(numbers, int(gait.turns)))
+    report.say(_gait_table(numbers, int(gait.evaluations)))
     report.say()
     report.say(_multiplier_table(numbers))
     report.say(

@@ -30,8 +30,8 @@ from jaxbiped.gait._fixed_point_search import Found, Search, search
 from jaxbiped.gait._gait import Gait, summarise_gait
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._origin import FoundBy, Origin, single_stage_origin
-from jaxbiped.gait._poincare_map import ReturnMapSpec
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
@@ -58,7 +58,7 @@ def find_gait(
     accuracy: str = "balanced",
     method: Literal["newton", "optax"] = "newton",
     optimiser: optax.GradientTransformation | None = None,
-    most_turns: int | None = None,
+    max_evaluations: int | None = None,
     radius_sensitivities: bool = True,
     solver: str | diffrax.AbstractSolver | None = None,
     engine: str = "auto",
@@ -90,7 +90,7 @@ def find_gait(
         accuracy: "balanced" or "tight".
         method: "newton", or "optax" to minimise the squared residual by gradient.
         optimiser: for "optax"; Adam with a rate of 1e-2 unless given.
-        most_turns: cycles allowed, and no stages beyond the first; unless given, 40 in each
+        max_evaluations: cycles allowed, and no stages beyond the first; unless given, 40 in each
             search by "newton", 400 by "optax".
         radius_sensitivities: whether to differentiate the spectral radius, which takes second
             derivatives of the motion.
@@ -112,8 +112,8 @@ def find_gait(
     check_unbatched("scene", scene)
     start = _check_start(scene, default_guess(scene) if guess is None else guess)
     check_unbatched("guess", start, "one state")
-    most = (40 if method == "newton" else 400) if most_turns is None else most_turns
-    check_count("most_turns", most)
+    most = (40 if method == "newton" else 400) if max_evaluations is None else max_evaluations
+    check_count("max_evaluations", most)
     scene = jtu.tree_map(as_float, scene)
     # A redundant scene's leaves begin with those of what it models.
     modelled = scene.minimal
@@ -133,7 +133,7 @@ def find_gait(
     )
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
-        most_turns=int(most),
+        max_evaluations=int(most),
         residual=_RESIDUAL_SHARE * precision.rtol,
         patience=np.asarray(int(most)),
     )
@@ -141,7 +141,7 @@ def find_gait(
     describing = (names, active, radius_sensitivities)
     by = FoundBy.GUESS if guess is not None else FoundBy.START
     origin = single_stage_origin(modelled, start, by)
-    staged = guess is None and most_turns is None and method == "newton"
+    staged = guess is None and max_evaluations is None and method == "newton"
     if _is_traced(searching):
         if staged:
             found, origin = search_along(*searching, origin)
@@ -192,8 +192,8 @@ def _search_on(
         modelled, section, solver, scout_engine, steps=1, most=MOST_SOLVER_STEPS["balanced"]
     )
 
-    def search_from(spec: ReturnMapSpec, scene: Any, start: Any, most_turns: int) -> Found:
-        hasty = dataclasses.replace(how, patience=np.asarray(min(most_turns, how.most_turns)))
+    def search_from(spec: ReturnMapSpec, scene: Any, start: Any, patience: int) -> Found:
+        hasty = dataclasses.replace(how, patience=np.asarray(min(patience, how.max_evaluations)))
         return _search(spec, scene, active, start, precision, hasty)
 
     staged = search_in_stages(search_from, spec, scout, scene, modelled, first)

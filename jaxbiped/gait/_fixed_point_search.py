@@ -19,17 +19,17 @@ from jaxbiped.gait._newton import (
 )
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
-    ReturnMapSpec,
     linearised_return,
     recurring_components,
     seed_directions,
     state_with,
 )
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._soundness import is_sound
 from jaxbiped.variational._solve_to_section import Precision
 
 LOOSER = 10.0
-"""How much looser the search is solved before its last turns, and the witness of their error."""
+"""How much looser the search is solved before its end, and the witness of its error."""
 ROUGH = Precision(3e-6, 3e-4)
 """How exactly the search is solved until it is near."""
 
@@ -38,8 +38,8 @@ class Search(enum.IntEnum):
     """How a search ended. `str(search)` is its name in words.
 
     - found: the orbit returns to within the residual asked for.
-    - no return: the first turn already ended in a misfortune (its `Ending` tells which).
-    - not converged: no step reduced the residual any more, or the turns allowed were used up.
+    - no return: the first return already ended in a misfortune (its `Ending` tells which).
+    - not converged: no step reduced the residual any more, or the evaluations allowed were used up.
     - no walk: an orbit returns, but with a foot deep underground or a step uphill, and no other
       was found. A search from a guess does not tell.
     """
@@ -58,13 +58,13 @@ class Found(NamedTuple):
 
     Attributes:
         ending: code of a `Search`.
-        code: that of the `Ending` of the last turn that did not return, 0 for none.
+        code: that of the `Ending` of the last return that did not return, 0 for none.
         recurring: the m recurring components.
-        residual: largest of their changes over a turn; infinite where nothing returned.
-        both: the turn from there, and a looser one near there that is the witness of its error, one
-            behind the other.
-        turns: number of turns taken.
-        history: residual of each turn, shape (most_turns,), NaN beyond the last.
+        residual: largest of their changes over a cycle; infinite where nothing returned.
+        both: the return from there, and a looser one near there that is the witness of its error,
+            one behind the other.
+        evaluations: how often the return map was evaluated.
+        history: residual of each evaluation, shape (max_evaluations,), NaN beyond the last.
         sound: whether the orbit is a walk (see `is_sound`).
     """
 
@@ -73,13 +73,13 @@ class Found(NamedTuple):
     recurring: Scalar
     residual: Scalar
     both: LinearisedReturn
-    turns: Scalar
+    evaluations: Scalar
     history: Scalar
     sound: Scalar
 
     @property
     def last(self) -> LinearisedReturn:
-        """The turn from the fixed point."""
+        """The return from the fixed point."""
         return jax.tree.map(lambda leaf: leaf[0], self.both)
 
     @property
@@ -89,7 +89,7 @@ class Found(NamedTuple):
 
 
 Run = Callable[[Scalar, Scalar, Scalar], LinearisedReturn]
-"""The turn from recurring components, as exactly as a stage wants, or none where idle."""
+"""The return from recurring components, as exactly as a stage wants, or none where idle."""
 
 
 def search(
@@ -123,15 +123,15 @@ def search(
         code=end.code,
         recurring=end.base,
         residual=end.base_residual,
-        both=jax.tree.map(lambda *pair: jnp.stack(pair), end.base_turn, end.coarse),
-        turns=end.turns,
+        both=jax.tree.map(lambda *pair: jnp.stack(pair), end.base_return, end.coarse),
+        evaluations=end.evaluations,
         history=end.history,
         sound=_with_soundness(spec, args, guess, end),
     )
 
 
 def _with_soundness(spec: ReturnMapSpec, args: PyTree, guess: PyTree, end: Progress) -> Scalar:
-    state, last = state_with(spec.system, guess, end.base), end.base_turn
+    state, last = state_with(spec.system, guess, end.base), end.base_return
     # Not every system has a component that drifts.
     return is_sound(args, state, jnp.sum(last.advance), last.period)
 
@@ -161,10 +161,10 @@ def _runner(
 
 
 def _iterate(run: Run, begin: Progress, method: Method) -> Progress:
-    """Searches on until it has ended or the turns are used up."""
+    """Searches on until it has ended or the evaluations are used up."""
 
     def goes_on(now: Progress) -> Scalar:
-        return (now.stage < Stage.FOUND) & (now.turns < method.turns_allowed)
+        return (now.stage < Stage.FOUND) & (now.evaluations < method.evaluations_allowed)
 
     def advance(now: Progress) -> Progress:
         on = goes_on(now)

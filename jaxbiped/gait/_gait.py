@@ -15,7 +15,8 @@ from jaxbiped.compiler import Recording
 from jaxbiped.gait._fixed_point_search import Found, Search
 from jaxbiped.gait._orbit import Orbit, orbit_of
 from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
-from jaxbiped.gait._poincare_map import LinearisedReturn, ReturnMapSpec
+from jaxbiped.gait._poincare_map import LinearisedReturn
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._parameters import parameter_quantities
 from jaxbiped.solve._ending import Ending
@@ -72,7 +73,7 @@ class Gait(eqx.Module):
         sensitivity_errors: their estimated errors: what a ten times looser solve changes.
         elasticities: d log |measure| / d log parameter, leaves of shape (p,); zero for a parameter
             that is zero, NaN for a measure that is.
-        turns: cycles that the search took.
+        evaluations: evaluations of the return map that the search took.
         history: residual of each of them, NaN beyond the last.
         solver_steps: solver steps attempted in the last cycle.
         sound: whether the orbit is a walk: no foot deep underground, and a step downhill (boolean).
@@ -98,7 +99,7 @@ class Gait(eqx.Module):
     sensitivities: Measures
     sensitivity_errors: Measures
     elasticities: Measures
-    turns: Scalar
+    evaluations: Scalar
     history: Scalar
     solver_steps: Scalar
     sound: Scalar
@@ -194,7 +195,7 @@ def summarise_gait(
         sensitivities=known(jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes)),
         sensitivity_errors=known(jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), errors)),
         elasticities=known(_elasticities(scene, active, measures, slopes)),
-        turns=found.turns,
+        evaluations=found.evaluations,
         history=found.history,
         solver_steps=last.attempted,
         sound=found.sound,

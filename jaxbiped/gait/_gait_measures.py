@@ -73,7 +73,7 @@ def gait_measures(
     if implicit:
         return _by_theorem(scene, gait)
 
-    def turn(state: State | RigidState) -> Return:
+    def once_from(state: State | RigidState) -> Return:
         return return_map(
             scene,
             state,
@@ -84,7 +84,7 @@ def gait_measures(
             engine=engine,
         )
 
-    return _by_correction(gait, turn)
+    return _by_correction(gait, once_from)
 
 
 def _by_theorem(scene: Scene | RigidScene | RedundantScene, gait: Gait) -> Measures:
@@ -115,10 +115,10 @@ def _attach_derivatives_jvp(primals: tuple, tangents: tuple) -> tuple[Measures, 
 _SECOND = "gait_measures by Implicit(), which has first derivatives only; a second"
 
 
-def _by_correction(gait: Gait, turn: Callable[[Any], Return]) -> Measures:
+def _by_correction(gait: Gait, once_from: Callable[[Any], Return]) -> Measures:
     """Newton's correction at the gait changes nothing but has the gait's derivatives."""
     state = gait.measures.state
-    once = turn(state)
+    once = once_from(state)
     recurring = state._fields[1:]
     change = jnp.stack([getattr(once.state, n) - getattr(state, n) for n in recurring])
     size = len(recurring)

@@ -9,7 +9,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._fixed_point_search import Found
-from jaxbiped.gait._poincare_map import LinearisedReturn, ReturnMapSpec, seed_directions, state_with
+from jaxbiped.gait._poincare_map import LinearisedReturn, seed_directions, state_with
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.gait._stability import Stability, stability_of
 from jaxbiped.linalg._small_matrices import eigenpairs, invert, solve
@@ -24,7 +25,7 @@ class Slopes(NamedTuple):
     Attributes:
         recurring: of the m recurring components on the section, shape (m, p).
         period: of the period, shape (p,).
-        advance: of what the drifting components gain in a turn, shape (d, p).
+        advance: of what the cyclic coordinates gain in a cycle, shape (d, p).
         peak: of the largest load, shape (p,).
     """
 
@@ -38,7 +39,7 @@ class Orbit(NamedTuple):
     """A periodic orbit of a system with m recurring components and d drifting ones.
 
     Attributes:
-        found: how the search went, and the last turn.
+        found: how the search went, and the last return.
         state: the state on the section, its drifting components zero.
         stability: its Floquet multipliers.
         slopes: its derivatives by the parameters; `slope_errors` their estimated errors.
@@ -134,7 +135,7 @@ def _radius_slopes(
 def _map_over_rows(
     function: Callable[[LinearisedReturn], Scalar],
 ) -> Callable[[LinearisedReturn], Scalar]:
-    return lambda turns: jax.lax.map(function, turns)
+    return lambda returns: jax.lax.map(function, returns)
 
 
 def _leading_eigenvectors(jacobian: Scalar) -> tuple[Scalar, Scalar]:

@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
-from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._units import recurring_inverse_units
 from jaxbiped.variational._hybrid_system import AbstractSystem
 from jaxbiped.variational._section_by_lanes import solve_to_section_by_lanes
@@ -29,70 +29,16 @@ PARAMETER_FLOOR = 1e-4
 """The same by the logarithm of a parameter: small sensitivities are wanted to digits as well."""
 
 
-class ReturnMapSpec(eqx.Module):
-    """How to turn: what does not change from one turn of the search to the next.
-
-    Attributes:
-        system, section: whose return map.
-        solver: one-step solver.
-        steps: arrivals that make one turn.
-        time_limit: longest time to the next arrival [s].
-        max_solver_steps: cap on the attempted steps to the next arrival.
-        engine: "xla" or "lanes".
-        within: the system that is solved, where its coordinates are redundant: every passage
-            enters them and leaves them again, so that a turn knows nothing of constraints.
-    """
-
-    system: AbstractSystem
-    section: AbstractSection
-    solver: Any
-    time_limit: Any
-    steps: int = eqx.field(static=True)
-    max_solver_steps: int = eqx.field(static=True)
-    engine: str = eqx.field(static=True)
-    within: AbstractSystem | None = None
-
-    def watch(
-        self,
-        args: PyTree,
-        y: PyTree,
-        *,
-        peak: bool = True,
-        of: AbstractSystem | None = None,
-    ) -> Watch:
-        """What the solves land on: a section is looked at after the arrival's renewal."""
-        system = self.system if of is None else of
-        loaded = eqx.filter_eval_shape(system.load, args, y) is not None
-        return Watch(
-            field=system.vector_field,
-            switches=system.switches,
-            section=_Arrival(system, self.section),
-            ending=system.ending,
-            peak=system.load if peak and loaded else None,
-        )
-
-
-class _Arrival(eqx.Module):
-    """The section's value and whether a crossing counts, looked at after the renewal."""
-
-    system: AbstractSystem
-    section: AbstractSection
-
-    def __call__(self, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
-        renewed = minimal_state(args, self.system.reset_map(args, y))
-        return self.section.value(args, renewed), self.section.counts(args, renewed)
-
-
 class LinearisedReturn(NamedTuple):
-    """One turn. With m recurring components, p parameters and n = m + p directions:
+    """One return. With m recurring components, p parameters and n = m + p directions:
 
     Attributes:
         recurring: the m components that must return.
         jacobian: their derivatives on the section, shape (m, n).
         monodromy: their derivatives at a fixed time, shape (m, n).
-        velocity: their rates where the turn ends, shape (m,).
+        velocity: their rates where the cycle ends, shape (m,).
         period: duration [s]; `period_row` its derivatives, shape (n,).
-        advance: what the drifting components gained, shape (d,); `advance_rows` (d, n).
+        advance: what the cyclic coordinates gained, shape (d,); `advance_rows` (d, n).
         peak: largest load; `peak_row` (n,). Zeros where the system has none.
         code: 0 or that of an `Ending`.
         attempted: solver steps attempted.
@@ -161,7 +107,7 @@ def linearised_return(
     *,
     steered: Any = True,
 ) -> LinearisedReturn:
-    """Follows the orbit from `y` for one turn, with derivatives; nothing where `idle`.
+    """Follows the orbit from `y` for one cycle, with derivatives; nothing where `idle`.
 
     Where not `steered`, derivatives by parameters choose no steps, and lanes do without them.
     """
@@ -199,7 +145,7 @@ def linearised_return(
 
 
 def _watch_for(spec: ReturnMapSpec, args: PyTree, y: PyTree) -> Watch:
-    """What the passages of a turn land on."""
+    """What the passages of a cycle land on."""
     if spec.within is None:
         return spec.watch(args, y)
     inside = eqx.filter_eval_shape(redundant_state, args, y)
@@ -215,7 +161,7 @@ def _entry_coordinates(spec: ReturnMapSpec, y: Tangents, args: Seeded) -> Tangen
 
 
 def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) -> SectionArrival:
-    """A passage told in the turn's own coordinates."""
+    """A passage told in its own coordinates."""
     if spec.within is None:
         return found
     state, columns = along_columns(lambda s, a: minimal_state(a, s), found.y, args)

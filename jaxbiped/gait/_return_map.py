@@ -14,10 +14,10 @@ from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redu
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._gradient_modes import AbstractGradient, Forward, Reverse, check_anywhere
-from jaxbiped.gait._poincare_map import ReturnMapSpec
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._return_by_lanes import forward_by_lanes, reverse_by_lanes
 from jaxbiped.gait._return_by_xla import forward_by_xla, reverse_by_xla, select
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.scene._abstract_scene import is_rigid
 from jaxbiped.scene._redundant_scene import RedundantScene

@@ -16,7 +16,8 @@ from jaxbiped.gait._fixed_point_search import Found, Search, search
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
 from jaxbiped.gait._newton import Method, select
 from jaxbiped.gait._origin import FoundBy, Origin
-from jaxbiped.gait._poincare_map import ReturnMapSpec, recurring_components, state_with
+from jaxbiped.gait._poincare_map import recurring_components, state_with
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.linalg._small_matrices import eigenpairs
 from jaxbiped.variational._solve_to_section import Precision
 

@@ -6,7 +6,8 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._poincare_map import LinearisedReturn, ReturnMapSpec, recurring_indices
+from jaxbiped.gait._poincare_map import LinearisedReturn, recurring_indices
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.variational._adjoint_solve import carry_tangents, pull_back
 from jaxbiped.variational._adjoint_step import Adjoints
 from jaxbiped.variational._curvature import jet_along_path
@@ -28,10 +29,10 @@ def second_variation(
     """Second derivatives of the return map along two sets of directions, as weighted sums.
 
     Args:
-        turning: how the turn was made.
+        spec: of the return map.
         args: parameters.
         like: a state, for its structure.
-        last: the turn, with its nodes.
+        last: the return, with its nodes.
         turned: v directions of the m recurring components, which move no parameter; (v, m).
         weights: of the recurring components of each one's second derivatives, (v, m).
         tangents: p other directions, each of which moves one active parameter, shape (m, p).
@@ -57,7 +58,7 @@ def _pull_back(
     turned: Scalar,
     weights: Scalar,
 ) -> Adjoints:
-    """Derivatives of the weighted sum by what is at the start of the turn."""
+    """Derivatives of the weighted sum by what is at the start of the cycle."""
     c, p = flow.structure.num_leaves, len(flow.args.active)
     parameters = jnp.stack([jnp.asarray(leaf) for leaf in active_leaves(flow.args)])
     along, known = jnp.zeros((len(turned), c)).at[:, places].set(turned), []

@@ -56,7 +56,7 @@ def stability_of(
     """Multipliers of a monodromy matrix.
 
     Args:
-        monodromy: derivative of one turn at a fixed time, shape (m, m).
+        monodromy: derivative of one cycle at a fixed time, shape (m, m).
         witness: the same from a looser solve.
         velocity: rates of the recurring components at the orbit, shape (m,).
         closeness: distance from the unit circle that counts as on it, at least.

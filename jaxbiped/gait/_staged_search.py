@@ -23,11 +23,11 @@ from jaxbiped.gait._origin import (
     single_stage_origin,
 )
 from jaxbiped.gait._poincare_map import (
-    ReturnMapSpec,
     linearised_return,
     seed_directions,
     state_with,
 )
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._rolling_starts import rolling_starts
 from jaxbiped.gait._settled_walks import component_sizes, settle_walks
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -48,7 +48,7 @@ _SAME = 1e-5
 
 
 Searching = Callable[[ReturnMapSpec, Any, Any, int], Found]
-"""Newton's method on the return map of a scene, from a start, in at most so many turns."""
+"""Newton's method on the return map of a scene, from a start, in at most so many evaluations."""
 
 
 class Seen(NamedTuple):
@@ -240,7 +240,7 @@ def _follow_from_seed(search: Searching, scout: ReturnMapSpec, line: Homotopy, l
 def _scene_along(
     scout: ReturnMapSpec, line: Homotopy, like: Any, point: Scalar, s: Scalar
 ) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """What a turn changes in a point, and how that depends on the point and on s."""
+    """What a return changes in a point, and how that depends on the point and on s."""
     m, scene = point.shape[0], line.at(s)
     seeds, sizes = seed_directions(scene, tuple(range(len(jtu.tree_leaves(scene)))), m)
     start = state_with(scout.system, like, point)

@@ -79,7 +79,7 @@ def pull_back(
         nodes: of the motion.
         turned, steps: from `carry_tangents` along it.
         after: adjoints behind the arrival.
-        final: whether the turn ends there: of that arrival tangents on the section are told.
+        final: whether the cycle ends there: of that arrival tangents on the section are told.
     """
     given = _Given(flow.args.args, nodes.arrival, turned, after)
     return call(_compiled(_kind(flow), final), given, tape=steps, quick=True)[0]

@@ -36,14 +36,14 @@ def test_no_turn_is_solved_twice(found, monkeypatch):
     monkeypatch.setattr(CompiledProgram, "run_table", counted)
     again = jb.find_gait(jb.seed_scene())
     # A run for each turn; the second derivatives' runs there, recorded, and back, which is not.
-    assert len(most) == int(again.turns) + 2
+    assert len(most) == int(again.evaluations) + 2
     assert [room > 0 for room in most] == [True] * (len(most) - 1) + [False]
     np.testing.assert_array_equal(again.orbit[0], found.orbit[0])
 
 
 def test_far_from_a_gait_only_the_state_is_differentiated_by(found):
     """By lanes: the return map's slopes are right there, of parameters nothing is claimed."""
-    gait = jb.find_gait(jb.seed_scene(), most_turns=2)
+    gait = jb.find_gait(jb.seed_scene(), max_evaluations=2)
     assert gait.outcome == jb.gait.Search.NOT_CONVERGED
     assert np.isnan(gait.sensitivities.period).all()
     start, h = gait.measures.state, 1e-6
@@ -97,7 +97,7 @@ def test_vmap_over_scenes_changes_nothing(found):
         (dict(period=1.5), "period"),
         (dict(parameters=("K", "stiffness")), "parameters"),
         (dict(method="secant"), "method"),
-        (dict(most_turns=0), "most_turns"),
+        (dict(max_evaluations=0), "max_evaluations"),
         (dict(solver="euler"), "solver"),
     ],
 )

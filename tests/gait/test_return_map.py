@@ -15,8 +15,8 @@ from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._fixed_point_search import search
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._orbit import orbit_of
-from jaxbiped.gait._poincare_map import ReturnMapSpec
 from jaxbiped.gait._precision import precision_of
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 
 
 class Smooth(jb.gait.AbstractSystem):

@@ -119,7 +119,7 @@ def test_the_simplest_walker_is_found_with_its_cycles():
 
 
 def test_a_search_that_may_take_few_cycles_stays_at_its_start():
-    gait = jb.find_gait(jb.seed_scene(slope=0.03), most_turns=3, **PLAIN)
+    gait = jb.find_gait(jb.seed_scene(slope=0.03), max_evaluations=3, **PLAIN)
     assert gait.outcome is jb.gait.Search.NOT_CONVERGED
     assert gait.found_by is jb.gait.FoundBy.START
 

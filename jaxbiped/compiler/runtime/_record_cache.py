@@ -17,8 +17,8 @@ BLOCK = 512
 class RecordCache:
     """What simulations recorded, by program and inputs, as long as there is room for it.
 
-    A search makes many turns and needs the records of two of them, known only at its end: they
-    need not travel through it. Nothing depends on what is held: what is missing is run again.
+    A search runs many simulations and needs the records of two of them, known only at its end:
+    they need not travel through it. Nothing depends on what is held: what is missing is run again.
     """
 
     def __init__(self, most: int) -> None:
