@@ -1,12 +1,13 @@
 """The seed's friction law with its corner at v0 and its kink at rest rounded."""
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, smooth_ramp
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
 
 class SmoothBengisuAkay(AbstractFrictionLaw):
@@ -30,6 +31,7 @@ class SmoothBengisuAkay(AbstractFrictionLaw):
         ArgumentError: a coefficient or xi below 0, or v0 not above 0.
     """
 
+    name: ClassVar[str] = "smooth-bengisu-akay"
     builds_up_over: ClassVar[str | None] = "v0"
     mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
     mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
@@ -46,3 +48,8 @@ class SmoothBengisuAkay(AbstractFrictionLaw):
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         return ()
+
+    @classmethod
+    def like_seed(cls, seed: BengisuAkay) -> Self:
+        """The seed's own parameters."""
+        return cls(seed.mu_static, seed.mu_kinetic, seed.v0, seed.xi)

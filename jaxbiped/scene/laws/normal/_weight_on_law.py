@@ -1,11 +1,27 @@
 """Weight on a normal law: its parameters from how a mass stands on it."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
+
+
+class Standing(NamedTuple):
+    """How a mass stands on a law: the arguments of `from_weight`.
+
+    Attributes:
+        mass: what stands there [kg].
+        penetration: how deep [m].
+        damping_ratio: of small oscillations about that [–].
+        g: gravitational acceleration [m/s²].
+    """
+
+    mass: Scalar
+    penetration: Scalar
+    damping_ratio: Scalar
+    g: Scalar
 
 
 def matched_to_weight(
