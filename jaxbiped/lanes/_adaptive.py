@@ -187,14 +187,17 @@ class AdaptiveSolve:
 
     def finish(self, solve: Solve, now: _Now) -> Solved:
         done = (now.t >= solve.duration) | now.counted
+        timed_out = jnp.asarray(False)
         if self.counting:
             _, _, count = now.control
             few = count.astype(solve.footsteps.dtype) < solve.footsteps
-            done = done & ~(few & (solve.duration >= solve.patience))
+            timed_out = done & few & (solve.duration >= solve.patience)
+            done = done & ~timed_out
         code = ending_code(
             dict(zip(self.events, now.events, strict=True)),
             done=done,
             out_of_steps=jnp.asarray(True),
+            timed_out=timed_out,
         )
         low, high = (None, None) if now.extremes is None else now.extremes
         return Solved(now.t, now.state, code, now.accepted, now.rejected, low, high)

@@ -131,7 +131,9 @@ class AdaptiveColumns:
         return after, over
 
     def finish(self, given: Crossing, now: _Now) -> Crossed:
-        ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), int(Ending.OUT_OF_STEPS))
+        late = now.t >= given.time_limit
+        ended = jnp.where(late, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
+        ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), ended)
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
         by_state, by_parameter = now.columns
         by_parameter = jnp.where(given.steered > 0.0, by_parameter, jnp.nan)

@@ -166,11 +166,10 @@ def _plain_node(t: Any, y: Any, args: Any) -> PyTree:
 
 def _code(solution: diffrax.Solution, landed: Landed) -> Scalar:
     results = diffrax.RESULTS
-    out_of_steps = (solution.result == results.max_steps_reached) | (
-        solution.result == results.successful
-    )
-    failed = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), int(Ending.SOLVER_FAILED))
-    ended = jnp.where(landed.code != 0, landed.code, failed)
+    out_of_steps = solution.result == results.max_steps_reached
+    ended = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), int(Ending.SOLVER_FAILED))
+    ended = jnp.where(solution.result == results.successful, int(Ending.TIMED_OUT), ended)
+    ended = jnp.where(landed.code != 0, landed.code, ended)
     return jnp.where(landed.arrived, 0, ended)
 
 

@@ -122,7 +122,7 @@ class CompliantCourse(AbstractCourse):
         assert now.landed is not None
         landed, slid = slid_since(solve.scene, after.state, now.landed)
         late = after.t - strike > start.patience
-        verdict = jnp.where(late, int(Label.OUT_OF_STEPS), trace.verdict)
+        verdict = jnp.where(late, int(Label.TIMED_OUT), trace.verdict)
         verdict = jnp.where(slid > solve.scene.walker.l, int(Label.SLID), verdict)
         trace = trace._replace(verdict=verdict)
         return Progress(after, trace, strike, landed), over | (verdict != UNDECIDED)
@@ -217,7 +217,7 @@ class RigidCourse(AbstractCourse):
         trace = _trace_or(after.struck, on_section, now.trace)
         strike = jnp.where(after.struck, after.t, now.strike)
         late = after.t - strike > start.patience
-        verdict = jnp.where(late, int(Label.OUT_OF_STEPS), trace.verdict)
+        verdict = jnp.where(late, int(Label.TIMED_OUT), trace.verdict)
         trace = trace._replace(verdict=verdict)
         return Progress(after, trace, strike, None), over | (verdict != UNDECIDED)
 

@@ -14,7 +14,7 @@ import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._orbit import orbit_of
-from jaxbiped.gait._precision import precision_of
+from jaxbiped.gait._precision import MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._search import search
 from jaxbiped.gait._turn import Turning
 
@@ -250,12 +250,16 @@ def test_modes_that_do_not_fit_are_refused():
             jax.jvp(reversible, (state[1],), (state[1],))
 
 
-def test_what_does_not_return_says_so():
+def test_what_does_not_return_says_so(monkeypatch):
     up = jb.Section(lambda args, y: y[0] - 100.0)
     args = (0.3, 0.8, 1.0)
     state = (jnp.asarray(0.0), jnp.asarray(3.0))
-    found = jb.return_map(args, state, section=up, system=Ball(), time_limit=1.0)
-    assert jb.Ending(int(found.code)) == jb.Ending.OUT_OF_STEPS
+    for most, ending in ((4096, jb.Ending.TIMED_OUT), (2, jb.Ending.OUT_OF_STEPS)):
+        monkeypatch.setitem(MOST_SOLVER_STEPS, "balanced", most)
+        for engine in ("lanes", "xla"):
+            options = dict(section=up, system=Ball(), time_limit=1.0, engine=engine)
+            found = jb.return_map(args, state, **options)
+            assert jb.Ending(int(found.code)) is ending
 
 
 class Step(Flowing):
