@@ -13,6 +13,7 @@ import jax as _jax
 _jax.config.update("jax_enable_x64", True)
 
 from jaxbiped._checks import ArgumentError as ArgumentError
+from jaxbiped._checks import ResourceError as ResourceError
 from jaxbiped.dynamics._bristles import BristleState as BristleState
 from jaxbiped.dynamics._energy import Energies as Energies
 from jaxbiped.dynamics._energy import Powers as Powers

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, ResourceError, failure_kind
 from jaxbiped.sweep._layout import Layout, empty_dataset
 from jaxbiped.sweep._same_store import ALSO, GAITS, SETTINGS, check_same, check_writers
 
@@ -58,7 +58,8 @@ class Store:
 
         Raises:
             ArgumentError: the directory holds something else, or a store made with other settings
-                or by another version, or cannot be written.
+                or by another version, or may not be written.
+            ResourceError: its disk is full or fails.
         """
         check_store(path)
         path = path.absolute()
@@ -104,7 +105,7 @@ class Store:
         """Writes a chunk, then marks it as complete; `settled` where all gaits are known by now.
 
         Raises:
-            ArgumentError: it cannot be written; what was written before stays.
+            ResourceError: it cannot be written; what was written before stays.
         """
         region = self.layout.region(chunk)
         shape = self.layout.shape_of(chunk)
@@ -131,7 +132,7 @@ class Store:
         """Sets attributes.
 
         Raises:
-            ArgumentError: they cannot be written.
+            ResourceError: they cannot be written.
         """
         try:
             self._group.attrs.update(dict(attributes))
@@ -165,10 +166,10 @@ def opened(path: Path) -> "xarray.Dataset":
     return xarray.open_zarr(path, chunks=None)
 
 
-def unwritable(path: Path, error: OSError) -> ArgumentError:
+def unwritable(path: Path, error: OSError) -> ArgumentError | ResourceError:
     """The sentence for a store that cannot be written."""
     why = (error.strerror or str(error)).lower()
-    return ArgumentError(
+    return failure_kind(error)(
         f"store = {str(path)!r} cannot be written ({why}): it must be a directory on a disk with "
         "room; the chunks that are complete stay."
     )

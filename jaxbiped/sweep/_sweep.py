@@ -70,8 +70,8 @@ def sweep(
 
     Raises:
         ArgumentError: an argument that is not allowed; a store of other settings or another
-            version, or one that cannot be written; workers that were lost. What is in the store
-            stays.
+            version, or one that may not be written.
+        ResourceError: a full disk, or workers that were lost. What is in the store stays.
     """
     check_type("labelling", labelling, Labelling)
     check_type("starts", starts, AbstractStarts)

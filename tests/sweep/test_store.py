@@ -170,7 +170,7 @@ def test_a_full_disk_is_told_and_what_is_complete_stays(tmp_path, monkeypatch):
 
     with monkeypatch.context() as patched:
         patched.setattr(Store, "_mark", filling)
-        with pytest.raises(jb.ArgumentError) as raised:
+        with pytest.raises(jb.ResourceError) as raised:
             _swept(path)
     sentence = str(raised.value)
     assert f"store = {str(path)!r} cannot be written (no space left on device)" in sentence
@@ -184,7 +184,7 @@ def test_a_full_disk_is_told_and_what_is_complete_stays(tmp_path, monkeypatch):
 def test_a_disk_too_full_to_begin_leaves_nothing(tmp_path, monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr(zarr.Group, "create_array", _full)
-        with pytest.raises(jb.ArgumentError, match=r"cannot be written \(no space left"):
+        with pytest.raises(jb.ResourceError, match=r"cannot be written \(no space left"):
             _swept(tmp_path / "store")
     assert list(tmp_path.iterdir()) == []
 
