@@ -33,7 +33,7 @@ def main(arguments: list[str] | None = None) -> None:
     With one sentence and 2 for an argument that is not allowed, 1 for a full disk or lost workers.
     """
     given = sys.argv[1:] if arguments is None else list(arguments)
-    command = None if given == ["--version"] else _parsed(given)
+    command = None if given == ["--version"] else _parse(given)
     if command is None:
         from importlib.metadata import version
 
@@ -47,7 +47,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(2 if isinstance(error, ArgumentError) else 1)
 
 
-def _parsed(arguments: list[str]) -> Any:
+def _parse(arguments: list[str]) -> Any:
     """The command; exits with 2 and one sentence where there is none."""
     refusal = io.StringIO()
     try:

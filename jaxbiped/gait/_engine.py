@@ -1,4 +1,4 @@
-"""Which engine follows the orbits of a search."""
+"""Choice of the engine that follows the orbits of a search."""
 
 from typing import Any
 
@@ -8,10 +8,10 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.gait._gradient import AbstractGradient, Reverse
-from jaxbiped.gait._system import AbstractSystem
+from jaxbiped.gait._gradient_modes import AbstractGradient, Reverse
 from jaxbiped.solve._engine import engine_for
-from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._hybrid_system import AbstractSystem
 
 
 def orbit_engine(
@@ -35,7 +35,7 @@ def orbit_engine(
     Raises:
         ArgumentError: an unknown name, or lanes for what they cannot do.
     """
-    obstacle = _obstacle(solver, section, leaves)
+    obstacle = _hindrance(solver, section, leaves)
     if redundant:
         obstacle = "redundant coordinates are diffrax's"
     elif holds_arrays(system):
@@ -58,7 +58,7 @@ def holds_arrays(tree: Any) -> bool:
     return any(isinstance(leaf, jax.Array | np.ndarray) for leaf in jtu.tree_leaves(tree))
 
 
-def _obstacle(solver: Any, section: Any, leaves: Any) -> str | None:
+def _hindrance(solver: Any, section: Any, leaves: Any) -> str | None:
     if not isinstance(solver, AbstractRosenbrock):
         return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
     if jtu.tree_leaves(section):

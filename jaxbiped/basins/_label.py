@@ -1,0 +1,49 @@
+"""Labels: what became of a start."""
+
+import enum
+
+import numpy as np
+import numpy.typing as npt
+
+from jaxbiped.solve._ending import Ending
+
+WALKING_NAME = "walking period-{period}"
+"""What a start that walks is called, by the footsteps in a cycle of its gait."""
+
+
+class Label(enum.IntEnum):
+    """What became of a start. `str(label)` is its name in words; every `Ending` is a label.
+
+    - walking: it converges to a periodic gait; see the gait for its period.
+    - fell forward, fell back, stopped, stumbled, out of steps, solver failed, timed out: as in
+      `Ending`.
+    - slid: a foot slid along the ground by more than a leg's length between two footsteps.
+    - unresolved: all the footsteps asked for were walked, and nothing was certain yet.
+    - pending: not labelled yet.
+    """
+
+    WALKING = Ending.WALKING.value
+    FELL_FORWARD = Ending.FELL_FORWARD.value
+    FELL_BACK = Ending.FELL_BACK.value
+    STOPPED = Ending.STOPPED.value
+    STUMBLED = Ending.STUMBLED.value
+    OUT_OF_STEPS = Ending.OUT_OF_STEPS.value
+    SOLVER_FAILED = Ending.SOLVER_FAILED.value
+    SLID = 7
+    UNRESOLVED = 8
+    TIMED_OUT = Ending.TIMED_OUT.value
+    PENDING = -1
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+
+def label_name(label: int, period: int = 0) -> str:
+    """A label in words, with the period [footsteps] of the gait where it walks."""
+    walks = label == Label.WALKING
+    return WALKING_NAME.format(period=period) if walks else str(Label(label))
+
+
+def label_names(label: npt.ArrayLike, period: npt.ArrayLike) -> np.ndarray:
+    """`label_name` of every entry; arrays of one shape."""
+    return np.asarray(np.vectorize(label_name, otypes=[object])(label, period))
