@@ -29,9 +29,9 @@ def by_xla(run: "Simulation") -> Trajectory:
     if run.dt is not None:
         controller = diffrax.ConstantStepSize()
     if run.steps is not None:
-        controller = FootstepLimit.around(controller, run.steps)
+        controller = FootstepLimit(controller, run.steps)
     if run.extremes is not None:
-        controller = Extremes.around(controller, run.extremes)
+        controller = Extremes(controller, run.extremes)
     events = ending_events(run.watch)
     zero = jnp.zeros_like(run.duration)
     field: Any = vector_field

@@ -227,7 +227,7 @@ class AdaptiveSolve:
         if not self.counting:
             return control
         limit: Any = solve.footsteps
-        return FootstepLimit.around(control, limit)
+        return FootstepLimit(control, limit)
 
     def _error_order(self) -> Any:
         return self.solver.error_order(_TERM)

@@ -246,7 +246,7 @@ class AdaptiveColumns:
             return jnp.maximum(rms_norm(error), columns_norm)
 
         control = step_control(given.rtol, 1e-2 * given.rtol, norm, given.units)
-        return SwitchLocator.around(control, self.watch)
+        return SwitchLocator(control, self.watch)
 
 
 def _select(keep: Scalar, new: Any, old: Any) -> Any:
