@@ -1,15 +1,9 @@
 """The augmented Lagrangian formulation: the paper's "augmented"."""
 
-from typing import ClassVar
-
-import equinox as eqx
-
-from jaxbiped._types import Parameter, Scalar, as_float
-from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
-from jaxbiped.constraints._penalised import augmented_multipliers, check_augmented
+from jaxbiped.constraints._penalised import AbstractAugmented
 
 
-class Augmented(AbstractConstraintMethod):
+class Augmented(AbstractAugmented):
     """M q̈⁰ = Q, then (M + A JᵀJ) q̈ᵏ⁺¹ = M q̈ᵏ − A Jᵀ(J̇ q̇ + 2 ζ ω Φ̇ + ω² Φ), repeated.
 
     The iterations take off what the penalty alone leaves: each shrinks it by about 1/(A s), where
@@ -27,15 +21,3 @@ class Augmented(AbstractConstraintMethod):
     Raises:
         ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
     """
-
-    A: Parameter = eqx.field(converter=as_float, default=1e7)
-    omega: Parameter = eqx.field(converter=as_float, default=10.0)
-    zeta: Parameter = eqx.field(converter=as_float, default=1.0)
-    iterations: int = eqx.field(static=True, default=3)
-    needs_independent: ClassVar[bool] = False
-
-    def __check_init__(self) -> None:
-        check_augmented(self.A, self.omega, self.zeta, self.iterations)
-
-    def multipliers(self, system: Constrained) -> list[Scalar]:
-        return augmented_multipliers(system, self.A, self.omega, self.zeta, self.iterations)

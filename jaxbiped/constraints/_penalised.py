@@ -1,8 +1,18 @@
 """Penalty and augmented Lagrangian systems, shared by the methods that use them."""
 
+from typing import ClassVar
+
+import equinox as eqx
+
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
-from jaxbiped._types import Scalar
-from jaxbiped.constraints._constraint_method import Constrained, gram, inverse_masses, stabilised
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.constraints._constraint_method import (
+    AbstractConstraintMethod,
+    Constrained,
+    gram,
+    inverse_masses,
+    stabilised,
+)
 from jaxbiped.linalg._symmetric import Factors, factorise, solve
 
 
@@ -11,12 +21,6 @@ def check_penalty(A: Scalar, omega: Scalar, zeta: Scalar) -> None:
     check_positive("A", A, "kg")
     check_not_negative("omega", omega, "1/s")
     check_not_negative("zeta", zeta)
-
-
-def check_augmented(A: Scalar, omega: Scalar, zeta: Scalar, iterations: int) -> None:
-    """`check_penalty`, and raises `ArgumentError` for fewer than one iteration."""
-    check_penalty(A, omega, zeta)
-    check_at_least("iterations", iterations, "1", 1)
 
 
 def penalty_system(
@@ -31,14 +35,27 @@ def penalty_system(
     return factorise(gram(system.rows, inverse_masses(system.masses), 1.0 / A)), right
 
 
-def augmented_multipliers(
-    system: Constrained, A: Scalar, omega: Scalar, zeta: Scalar, iterations: int
-) -> list[Scalar]:
-    """λ of the augmented Lagrangian: the penalty's, and again for what that leaves."""
-    factors, right = penalty_system(system, A, omega, zeta)
-    return iterate_multipliers(
-        factors, gram(system.rows, inverse_masses(system.masses)), right, iterations
-    )
+class AbstractAugmented(AbstractConstraintMethod):
+    """Accelerations by the augmented Lagrangian: the penalty's, and again for what that leaves.
+
+    Raises:
+        ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
+    """
+
+    A: Parameter = eqx.field(converter=as_float, default=1e7)
+    omega: Parameter = eqx.field(converter=as_float, default=10.0)
+    zeta: Parameter = eqx.field(converter=as_float, default=1.0)
+    iterations: int = eqx.field(static=True, default=3)
+    needs_independent: ClassVar[bool] = False
+
+    def __check_init__(self) -> None:
+        check_penalty(self.A, self.omega, self.zeta)
+        check_at_least("iterations", self.iterations, "1", 1)
+
+    def multipliers(self, system: Constrained) -> list[Scalar]:
+        factors, right = penalty_system(system, self.A, self.omega, self.zeta)
+        matrix = gram(system.rows, inverse_masses(system.masses))
+        return iterate_multipliers(factors, matrix, right, self.iterations)
 
 
 def iterate_multipliers(
