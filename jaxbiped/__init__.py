@@ -55,9 +55,6 @@ from jaxbiped.simulate._simulate import Simulation as Simulation
 from jaxbiped.simulate._simulate import simulate as simulate
 from jaxbiped.simulate._swing import Swing as Swing
 from jaxbiped.simulate._swing import swing as swing
-from jaxbiped.simulate._compare_constraints import ConstraintRun as ConstraintRun
-from jaxbiped.simulate._compare_constraints import Integrator as Integrator
-from jaxbiped.simulate._compare_constraints import compare_constraints as compare_constraints
 from jaxbiped.solve._accuracy import ACCURACIES as ACCURACIES
 from jaxbiped.solve._ending import Ending as Ending
 from jaxbiped.solve._engine import ENGINES as ENGINES

@@ -54,7 +54,7 @@ def simulate(
     dt: float | None = None,
     save: Literal["steps", "end"] | Array | AbstractSection = "steps",
     most_arrivals: int = 64,
-    extremes: Callable[[Scene, State], PyTree] | None = None,
+    extremes: Callable[..., PyTree] | None = None,
     watch: tuple[str, ...] = WATCHES,
     max_solver_steps: int = 65536,
     adjoint: diffrax.AbstractAdjoint | None = None,
@@ -149,7 +149,7 @@ class Simulation(eqx.Module):
     replaceable: bool = eqx.field(static=True)
     section: AbstractSection | None = eqx.field(static=True)
     most_arrivals: int = eqx.field(static=True)
-    extremes: Callable[[Scene, State], PyTree] | None = eqx.field(static=True)
+    extremes: Callable[..., PyTree] | None = eqx.field(static=True)
 
     @staticmethod
     def prepare(
@@ -165,7 +165,7 @@ class Simulation(eqx.Module):
         dt: float | None = None,
         save: Any = "steps",
         most_arrivals: int = 64,
-        extremes: Callable[[Scene, State], PyTree] | None = None,
+        extremes: Callable[..., PyTree] | None = None,
         watch: tuple[str, ...] = WATCHES,
         max_solver_steps: int = 65536,
         adjoint: diffrax.AbstractAdjoint | None = None,
