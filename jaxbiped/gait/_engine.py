@@ -39,7 +39,7 @@ def orbit_engine(
     if redundant:
         obstacle = "redundant coordinates are diffrax's"
     elif holds_arrays(system):
-        obstacle = f"the system {type(system).__name__} holds arrays, which belong into args"
+        obstacle = f"the system {type(system).__name__} holds arrays, which belong in args"
     return engine_for(engine, obstacle=obstacle, prefers_xla=system is not None)
 
 
@@ -49,7 +49,7 @@ def check_holds_none(gradient: AbstractGradient, system: Any, section: Any) -> N
     if isinstance(gradient, Reverse) and holder is not None:
         raise ArgumentError(
             f"gradient = Reverse() is not allowed here: {type(holder).__name__} holds arrays, "
-            "which belong into args."
+            "which belong in args."
         )
 
 

@@ -303,9 +303,9 @@ def test_what_systems_and_sections_hold_is_refused_where_it_would_not_be_seen():
     omega, zeta = jnp.asarray(2.0), jnp.asarray(0.1)
     with pytest.raises(jb.ArgumentError, match='"lanes" is not allowed here: the system Held'):
         _swung(omega, zeta, engine="lanes")
-    with pytest.raises(jb.ArgumentError, match="Held holds arrays, which belong into args"):
+    with pytest.raises(jb.ArgumentError, match="Held holds arrays, which belong in args"):
         _swung(omega, zeta, gradient=jb.Reverse())
-    with pytest.raises(jb.ArgumentError, match="Level holds arrays, which belong into args"):
+    with pytest.raises(jb.ArgumentError, match="Level holds arrays, which belong in args"):
         _swung(2.0, zeta, section=Level(omega), gradient=jb.Reverse())
     with pytest.raises(jb.ArgumentError, match=r"Held or .* must be among args"):
         jax.jacfwd(lambda held: _swung(held, zeta))(omega)
