@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 import equinox as eqx
 
 from jaxbiped._checks import check_at_least
+from jaxbiped._parameter import check_parameters
 from jaxbiped._types import Scalar
 from jaxbiped.linalg._symmetric import factorise, solve
 
@@ -46,6 +47,9 @@ class AbstractConstraintMethod(eqx.Module):
     """
 
     needs_independent: AbstractClassVar[bool]
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
 
     @abc.abstractmethod
     def multipliers(self, system: Constrained) -> list[Scalar]:

@@ -4,8 +4,9 @@ from typing import ClassVar
 
 import equinox as eqx
 
-from jaxbiped._checks import check_at_least, check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._checks import check_at_least
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.constraints._constraint_method import (
     AbstractConstraintMethod,
     Constrained,
@@ -14,13 +15,6 @@ from jaxbiped.constraints._constraint_method import (
     stabilised,
 )
 from jaxbiped.linalg._symmetric import Factors, factorise, solve
-
-
-def check_penalty(A: Scalar, omega: Scalar, zeta: Scalar) -> None:
-    """Raises `ArgumentError` for A not above 0, or ω or ζ below 0."""
-    check_positive("A", A, "kg")
-    check_not_negative("omega", omega, "1/s")
-    check_not_negative("zeta", zeta)
 
 
 def penalty_system(
@@ -42,14 +36,15 @@ class AbstractAugmented(AbstractConstraintMethod):
         ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
     """
 
-    A: Parameter = eqx.field(converter=as_float, default=1e7)
-    omega: Parameter = eqx.field(converter=as_float, default=10.0)
-    zeta: Parameter = eqx.field(converter=as_float, default=1.0)
+    A: Parameter = parameter("penalty", "$A$", "kg", positive=True, default=1e7)
+    omega: Parameter = parameter(
+        "constraint frequency", r"$\omega$", "1/s", minimum=0.0, default=10.0
+    )
+    zeta: Parameter = parameter("constraint damping ratio", r"$\zeta$", minimum=0.0, default=1.0)
     iterations: int = eqx.field(static=True, default=3)
     needs_independent: ClassVar[bool] = False
 
     def __check_init__(self) -> None:
-        check_penalty(self.A, self.omega, self.zeta)
         check_at_least("iterations", self.iterations, "1", 1)
 
     def multipliers(self, system: Constrained) -> list[Scalar]:

@@ -2,11 +2,10 @@
 
 from typing import ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import pushing
 from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw
 
@@ -27,15 +26,11 @@ class KelvinVoigt(AbstractDampedLaw):
         ArgumentError: K not above 0 or D below 0.
     """
 
-    K: Parameter = eqx.field(converter=as_float)
-    D: Parameter = eqx.field(converter=as_float)
+    K: Parameter = parameter("contact stiffness", "$K$", "N/m", positive=True)
+    D: Parameter = parameter("contact damping", "$D$", "N s/m", minimum=0.0)
 
     jumps_at_touchdown: ClassVar[bool] = True
     exponent: ClassVar[float] = 1.0
-
-    def __check_init__(self) -> None:
-        check_positive("K", self.K, "N/m")
-        check_not_negative("D", self.D, "N s/m")
 
     @staticmethod
     def damping_coefficient(damper: Scalar, penetration: Scalar, weight: Scalar) -> Scalar:
