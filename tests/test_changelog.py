@@ -21,6 +21,7 @@ def rows_below(title):
 
 
 RENAMED = [(old.strip("`"), new.strip("`")) for old, new in rows_below("### Renamed\n")]
+GONE = [old.strip("`") for old, _ in rows_below("### Gone\n")]
 MOVED = [
     (name, space.strip("`"))
     for space, names in rows_below("### Moved under the same name\n")
@@ -34,6 +35,7 @@ def _arguments(name):
 
 def test_the_tables_are_found():
     assert len(RENAMED) >= 12
+    assert len(GONE) >= 3
     assert len(MOVED) > 130
 
 
@@ -47,6 +49,12 @@ def test_what_was_renamed_has_its_new_name_alone(old, new):
     assert is_there(new)
     owner = new.rpartition(".")[0] if "." in old else "jb"
     assert not is_there(f"{owner}.{old.rpartition('.')[2]}")
+
+
+@pytest.mark.parametrize("name", GONE)
+def test_what_is_gone_is_not_there(name):
+    own, _, attribute = name.rpartition(".")
+    assert not is_there(f"jb.gait.{name}" if own else f"jb.{attribute}")
 
 
 @pytest.mark.parametrize(("name", "space"), MOVED)
