@@ -92,6 +92,11 @@ def test_links_lead_somewhere(page):
             assert not heading or heading in _anchors(linked), target
 
 
+def test_every_page_can_be_reached_from_the_readme_or_from_contributing():
+    doors = "".join((ROOT / name).read_text() for name in ("README.md", "CONTRIBUTING.md"))
+    assert [page for page in GUIDES if path_of(page) not in doors and page != README] == []
+
+
 def _anchors(page):
     titles = re.findall(r"^#+ (.*)$", page.read_text(), flags=re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", title).lower().replace(" ", "-") for title in titles}
