@@ -1,4 +1,5 @@
-# `make gait` runs the main job, `make walk` simulates the walker, `make test` runs all checks.
+# `make gait` runs the main job, `make walk` simulates the walker, `make test` runs all checks,
+# `make check` those that take minutes.
 # Each sets up what it needs in .venv inside this checkout; repeated runs do not set up again.
 PYTHON ?= python3
 VENV := .venv
@@ -6,7 +7,11 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 OUT := out/walk
 
-.PHONY: walk gait test lint types notebooks clean
+# What `make figures` runs, at full size: all, or those named by `make figures ONLY="ladder"`.
+EXPERIMENTS := $(filter-out _%,$(patsubst experiments/%.py,%,$(wildcard experiments/*.py)))
+ONLY ?= $(EXPERIMENTS)
+
+.PHONY: walk gait check test lint types notebooks figures clean
 
 walk: $(VENV)/.installed
 	$(BIN)/jaxbiped walk --out $(OUT)
@@ -14,6 +19,10 @@ walk: $(VENV)/.installed
 
 gait: $(VENV)/.installed
 	$(BIN)/jaxbiped gait --out out/gait
+
+# Lint, types and the unit tests; docs/testing.md says which tests these are.
+check: lint types
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 test: lint types
 	$(BIN)/python -m pytest -n 2 --dist loadfile
@@ -28,6 +37,15 @@ types: $(VENV)/.installed-dev
 # Runs all notebooks at full size and keeps them with their outputs; takes some minutes.
 notebooks: $(VENV)/.installed-dev
 	$(BIN)/python notebooks/execute.py
+
+# Runs experiments at full size, one after the other; timings want an idle machine. The numbers are
+# kept in experiments/results, and what the pages quote of them is printed at the end.
+figures: $(VENV)/.installed-dev
+	for name in $(ONLY); do \
+		$(BIN)/python experiments/$$name.py --out out/figures \
+			--json experiments/results/$$name.json || exit 1; \
+	done
+	$(BIN)/python experiments/quote.py
 
 $(VENV)/.made:
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "jaxbiped needs Python 3.11 or newer"'

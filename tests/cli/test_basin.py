@@ -12,6 +12,8 @@ import jaxbiped as jb
 from jaxbiped import plot
 from jaxbiped.cli import main
 
+pytestmark = pytest.mark.slow
+
 HEADER = "hip_x,hip_z,theta_1,theta_2,hip_vx,hip_vz,omega_1,omega_2"
 AXES = ("--x", "theta_swing=-0.5:0.3:9", "--y", "omega_swing=-2:4:7")
 

@@ -15,6 +15,7 @@ def _run(*arguments):
     return stopped.value.code
 
 
+@pytest.mark.slow
 def test_compares_methods_and_integrators(capsys, tmp_path):
     flags = ("--methods", "standard", "described", "--duration", "0.05")
     integrators = ("--integrators", "euler:dt=1e-5", "euler:dt=2e-3")
@@ -73,6 +74,7 @@ def test_bad_flags_are_one_sentence(arguments, said, capsys):
     assert len(error.strip().splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_walk_tells_of_the_hip(tmp_path):
     written = tmp_path / "walk.json"
     flags = ("--formulation", "redundant", "--method", "described", "--duration", "1.3")

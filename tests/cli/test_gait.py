@@ -12,6 +12,8 @@ import jaxbiped as jb
 from jaxbiped.cli import _gait as command
 from jaxbiped.cli import main
 
+pytestmark = pytest.mark.slow
+
 MEASURES = {"period_s", "step_length_m", "speed_m_s", "peak_normal_N", "spectral_radius"}
 
 

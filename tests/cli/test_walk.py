@@ -9,6 +9,8 @@ from PIL import Image
 
 from jaxbiped.cli import main
 
+pytestmark = pytest.mark.slow
+
 
 def _run(*arguments):
     return subprocess.run(

@@ -1,4 +1,8 @@
+import pytest
+
 from tests.experiments.quick import quick_numbers
+
+pytestmark = pytest.mark.slow
 
 
 def test_the_simplest_walkers_basin_is_thin_and_as_the_equations_say(tmp_path):

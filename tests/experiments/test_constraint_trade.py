@@ -1,6 +1,9 @@
 import numpy as np
+import pytest
 
 from tests.experiments.quick import quick_numbers
+
+pytestmark = pytest.mark.slow
 
 
 def test_errors_costs_and_maps(tmp_path):

@@ -2,6 +2,8 @@ import pytest
 
 from tests.experiments.quick import quick_numbers
 
+pytestmark = pytest.mark.slow
+
 
 def test_laws_are_measured_and_judged(tmp_path):
     numbers = quick_numbers(

@@ -1,4 +1,8 @@
+import pytest
+
 from tests.experiments.quick import quick_numbers
+
+pytestmark = pytest.mark.slow
 
 
 def test_both_precautions_make_derivatives_follow_their_tolerance(tmp_path):

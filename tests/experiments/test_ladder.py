@@ -2,6 +2,8 @@ import pytest
 
 from tests.experiments.quick import quick_numbers
 
+pytestmark = pytest.mark.slow
+
 
 def test_rungs_and_the_way_to_the_rigid_limit(tmp_path):
     numbers = quick_numbers(

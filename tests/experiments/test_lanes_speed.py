@@ -1,4 +1,8 @@
+import pytest
+
 from tests.experiments.quick import quick_numbers
+
+pytestmark = pytest.mark.slow
 
 
 def test_what_is_timed_is_right(tmp_path):

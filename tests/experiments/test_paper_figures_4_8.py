@@ -2,6 +2,8 @@ import pytest
 
 from tests.experiments.quick import quick_numbers
 
+pytestmark = pytest.mark.slow
+
 FIGURES = {
     "fig4_strobe",
     "fig5_phase_portrait",

@@ -1,4 +1,8 @@
+import pytest
+
 from tests.experiments.quick import quick_numbers
+
+pytestmark = pytest.mark.slow
 
 
 def test_no_gait_that_walks_settle_on_is_missed(tmp_path):

@@ -2,6 +2,8 @@ import pytest
 
 from tests.experiments.quick import quick_numbers
 
+pytestmark = pytest.mark.slow
+
 
 def test_every_gait_is_found_with_its_elasticities(tmp_path):
     numbers = quick_numbers(

@@ -1,4 +1,8 @@
+import pytest
+
 from tests.experiments.quick import quick_numbers
+
+pytestmark = pytest.mark.slow
 
 
 def test_agrees_with_an_independent_solve(tmp_path):

@@ -1,4 +1,8 @@
+import pytest
+
 from tests.experiments.quick import quick_numbers
+
+pytestmark = pytest.mark.slow
 
 
 def test_a_killed_sweep_is_resumed_to_the_same_labels(tmp_path):

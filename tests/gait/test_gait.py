@@ -7,6 +7,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.lanes._engine import CompiledProgram
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def found():

@@ -18,6 +18,8 @@ from jaxbiped.gait._precision import precision_of
 from jaxbiped.gait._search import search
 from jaxbiped.gait._turn import Turning
 
+pytestmark = pytest.mark.slow
+
 
 class Smooth(jb.AbstractSystem):
     """Without switches, endings or load."""

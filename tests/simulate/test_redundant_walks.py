@@ -7,6 +7,8 @@ import pytest
 
 import jaxbiped as jb
 
+pytestmark = pytest.mark.slow
+
 FOOTSTEP = 0.440835
 HUNDRED = 100.0 * FOOTSTEP
 PROJECTING = ("index1", "index1aug", "described")
