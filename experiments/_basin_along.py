@@ -25,20 +25,21 @@ def along(name: str, count: int, side: int) -> dict[str, Any]:
     The slice keeps its angles and rates; what it does not name is the value's own gait's.
     """
     scene, values = jb.seed_scene(), values_of(name, count)
-    starts = jb.grid(scene, {name: values} | _basin_slice.axes(side))
+    starts = jb.starts.grid(scene, {name: values} | _basin_slice.axes(side))
     labelling = jb.labelling(scene, parameters=starts.parameters)
     known = [bool(row) for row in labelling.family.rows]
     found = jb.sweep(labelling, starts, look_for_gaits=name == "slope")
     labels, periods = found["label"].values, found["period"].values
     fractions = [
-        jb.basin_fractions(jb.label_names(labels[k], periods[k])) for k in range(len(values))
+        jb.basins.fractions(jb.basins.label_names(labels[k], periods[k]))
+        for k in range(len(values))
     ]
     return {"values": values, "gait_known": known, "fractions": fractions}
 
 
-def walking(fractions: dict[str, jb.Fraction]) -> tuple[float, float, float]:
+def walking(fractions: dict[str, jb.basins.Fraction]) -> tuple[float, float, float]:
     """Fraction of starts that walk, whatever the period, with its interval."""
     total = sum(part.count for part in fractions.values())
     count = sum(part.count for name, part in fractions.items() if name.startswith("walking"))
-    low, high = jb.wilson_interval(count, total)
+    low, high = jb.basins.wilson_interval(count, total)
     return count / total, float(low), float(high)

@@ -19,11 +19,11 @@ def axes(side: int) -> dict[str, np.ndarray]:
 
 def codes_on_grid(labelling: jb.Labelling, side: int) -> tuple[np.ndarray, np.ndarray]:
     """Labels and periods of a square grid, shape (side, side)."""
-    found = jb.sweep(labelling, jb.grid(labelling.scene, axes(side)))
+    found = jb.sweep(labelling, jb.starts.grid(labelling.scene, axes(side)))
     return found["label"].values, found["period"].values
 
 
-def in_words(fractions: dict[str, jb.Fraction]) -> dict[str, dict[str, float]]:
+def in_words(fractions: dict[str, jb.basins.Fraction]) -> dict[str, dict[str, float]]:
     """Fractions ready for JSON."""
     return {
         name: {"estimate": float(part.estimate), "low": part.low, "high": part.high}
@@ -33,14 +33,14 @@ def in_words(fractions: dict[str, jb.Fraction]) -> dict[str, dict[str, float]]:
 
 def boundary_measures(codes: np.ndarray) -> dict[str, dict[str, Any]]:
     """Dimension, uncertainty exponent and entropy: of all labels, and of walking or not."""
-    walks = (codes != int(jb.Label.WALKING)).astype(int)
+    walks = (codes != int(jb.basins.Label.WALKING)).astype(int)
     return {"all labels": _measures(codes), "walking or not": _measures(walks)}
 
 
 def _measures(codes: np.ndarray) -> dict[str, Any]:
-    dimension = jb.boundary_dimension(codes)
-    uncertainty = jb.uncertainty_exponent(codes)
-    entropy = jb.basin_entropy(codes)
+    dimension = jb.basins.boundary_dimension(codes)
+    uncertainty = jb.basins.uncertainty_exponent(codes)
+    entropy = jb.basins.entropy(codes)
     return {
         "dimension": float(dimension.estimate),
         "dimension_error": float(dimension.error),
@@ -52,10 +52,10 @@ def _measures(codes: np.ndarray) -> dict[str, Any]:
     }
 
 
-def refined(labelling: jb.Labelling, cells: int, levels: int) -> jb.RefinedBoundary:
+def refined(labelling: jb.Labelling, cells: int, levels: int) -> jb.basins.RefinedBoundary:
     """The slice's boundaries, halved so many times from a coarse grid."""
     lower, upper = zip(THETA, OMEGA, strict=True)
-    return jb.refined_boundary(
+    return jb.basins.refined_boundary(
         jb.label_at(labelling, ("theta_swing", "omega_swing")),
         lower,
         upper,
@@ -76,7 +76,7 @@ def tolerances(scene: jb.Scene, side: int) -> list[dict[str, Any]]:
     rows = []
     for name, codes in found.items():
         changed = codes != exact
-        walks, walked = codes == int(jb.Label.WALKING), exact == int(jb.Label.WALKING)
+        walks, walked = codes == int(jb.basins.Label.WALKING), exact == int(jb.basins.Label.WALKING)
         rows.append(
             {
                 "accuracy": name,

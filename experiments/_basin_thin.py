@@ -20,7 +20,7 @@ def scene_of(slope: float) -> jb.RigidScene:
     return jb.RigidScene(walker=walker, ground=jb.Ground(slope=slope, g=1.0))
 
 
-def just_struck(scene: jb.RigidScene, states: jb.RigidState) -> jb.RigidState:
+def just_struck(scene: jb.RigidScene, states: jb.dynamics.RigidState) -> jb.dynamics.RigidState:
     """Both feet on the ground, and the swing leg's rate from the impact."""
     theta, rate = states.theta_2, states.omega_2
     return states._replace(theta_1=-theta, omega_1=rate * np.cos(2.0 * theta))
@@ -29,18 +29,18 @@ def just_struck(scene: jb.RigidScene, states: jb.RigidState) -> jb.RigidState:
 def labelling_of(slope: float, **options: Any) -> jb.Labelling:
     """A labelling that knows the gait, found from the published equations' own."""
     theta, rate = _simplest.fixed_point(slope)
-    guess = just_struck(scene_of(slope), jb.RigidState(0.0, -theta, theta, rate, rate))
+    guess = just_struck(scene_of(slope), jb.dynamics.RigidState(0.0, -theta, theta, rate, rate))
     return jb.labelling(scene_of(slope), guess=guess, footsteps=FOOTSTEPS, **options)
 
 
-def fractions_of(labelling: jb.Labelling, side: int) -> jb.Fraction:
+def fractions_of(labelling: jb.Labelling, side: int) -> jb.basins.Fraction:
     """Fraction of a grid over the whole square that walks, with its interval."""
     values = {"omega_stance": _middles(*RATE, side), "theta_stance": _middles(*THETA, side)}
-    starts = jb.grid(labelling.scene, values, follow=just_struck)
+    starts = jb.starts.grid(labelling.scene, values, follow=just_struck)
     found = jb.sweep(labelling, starts, look_for_gaits=False)
-    walks = found["label"].values == int(jb.Label.WALKING)
-    low, high = jb.wilson_interval(walks.sum(), walks.size)
-    return jb.Fraction(float(walks.mean()), float(low), float(high), int(walks.sum()))
+    walks = found["label"].values == int(jb.basins.Label.WALKING)
+    low, high = jb.basins.wilson_interval(walks.sum(), walks.size)
+    return jb.basins.Fraction(float(walks.mean()), float(low), float(high), int(walks.sum()))
 
 
 def upright(theta: np.ndarray, slope: float) -> np.ndarray:
@@ -67,11 +67,14 @@ def reach(labelling: jb.Labelling, gait: np.ndarray, *, farthest: float = 0.5) -
     for k, name in enumerate(("angle", "rate")):
         for sign, way in ((1.0, "+"), (-1.0, "-")):
             ray = np.eye(2)[k : k + 1] * sign
-            push = jb.fatal_push(
+            push = jb.basins.minimal_fatal_shock(
                 labels_at(labelling), gait, scales=np.ones(2), farthest=farthest,
                 tolerance=1e-6, directions=ray, steps=2000, improved=0,
             )  # fmt: skip
-            found[f"{name} {way}"] = {"distance": push.distance, "label": str(jb.Label(push.label))}
+            found[f"{name} {way}"] = {
+                "distance": push.distance,
+                "label": str(jb.basins.Label(push.label)),
+            }
     return found
 
 
@@ -81,7 +84,7 @@ def compared(labelling: jb.Labelling, slope: float, count: int) -> dict[str, Any
     theta = 0.05 + 0.4 * spread[:, 0]
     off = OFF[0] + (OFF[1] - OFF[0]) * spread[:, 1]
     points = np.stack([theta, upright(theta, slope) + off], axis=1)
-    ours = labels_at(labelling)(points) == int(jb.Label.WALKING)
+    ours = labels_at(labelling)(points) == int(jb.basins.Label.WALKING)
     gait = _simplest.fixed_point(slope)
     theirs = np.array(
         [_simplest.walks(point, gait, slope, footsteps=FOOTSTEPS) for point in points]

@@ -13,7 +13,7 @@ RIGID = {"theta_stance": (0.1, 0.4), "omega_stance": (-2.4, -0.6)}
 """Starts of the rigid walker just after a strike: stance angle [rad] and its rate [rad/s]."""
 
 
-def rolling_on(scene: jb.RigidScene, states: jb.RigidState) -> jb.RigidState:
+def rolling_on(scene: jb.RigidScene, states: jb.dynamics.RigidState) -> jb.dynamics.RigidState:
     """Both feet on the ground."""
     return states._replace(theta_1=-states.theta_2)
 
@@ -25,12 +25,12 @@ def labelling_of(model: str, **options: Any) -> jb.Labelling:
     return jb.labelling(rigid if model == "rigid" else seed, **options)
 
 
-def starts_of(scene: Any, count: int) -> jb.Sample:
+def starts_of(scene: Any, count: int) -> jb.starts.Sample:
     """So many random starts: of the compliant walker in the slice of basin_seed.py."""
     if isinstance(scene, jb.RigidScene):
-        return jb.sample(scene, RIGID, count, method="uniform", follow=rolling_on)
+        return jb.starts.sample(scene, RIGID, count, method="uniform", follow=rolling_on)
     bounds = {"theta_swing": _basin_slice.THETA, "omega_swing": _basin_slice.OMEGA}
-    return jb.sample(scene, bounds, count, method="uniform")
+    return jb.starts.sample(scene, bounds, count, method="uniform")
 
 
 def swept(labelling: jb.Labelling, count: int, chunk: int = 16384) -> Callable[[], Any]:

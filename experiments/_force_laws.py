@@ -75,18 +75,18 @@ def scene_with(laws: dict[str, str], slope: float = SLOPE) -> jb.Scene:
     if laws.get("normal", SEED["normal"]) != SEED["normal"]:
         own = dict(K=normal.K, c=normal.c, n=normal.n)
         mass, g = scene.walker.total_mass, scene.ground.g
-        normal = jb.normal_law_like(laws["normal"], **own, mass=mass, g=g)
+        normal = jb.laws.normal_law_like(laws["normal"], **own, mass=mass, g=g)
     if laws.get("friction", SEED["friction"]) != SEED["friction"]:
         own = {name: getattr(friction, name) for name in ("mu_static", "mu_kinetic", "v0", "xi")}
-        friction = jb.friction_law_like(laws["friction"], **own)
+        friction = jb.laws.friction_law_like(laws["friction"], **own)
     return eqx.tree_at(lambda each: (each.normal, each.friction), scene, (normal, friction))
 
 
 def extremes(scene: jb.Scene, state: jb.State) -> dict[str, Any]:
     """Loads and depths of both feet, for the `extremes` of a simulation."""
-    both, forces = jb.feet(scene, state), jb.foot_forces(scene, state)
+    both, forces = jb.dynamics.feet(scene, state), jb.dynamics.foot_forces(scene, state)
     normal = [force.normal for force in forces]
-    depths = [jnp.where(jb.touches(foot), foot.penetration, 0.0) for foot in both]
+    depths = [jnp.where(jb.dynamics.touches(foot), foot.penetration, 0.0) for foot in both]
     tangential = [
         0.0 if force.tangential is None else jnp.abs(force.tangential) for force in forces
     ]
@@ -124,7 +124,7 @@ def findings(scene: jb.Scene, repeats: int) -> Findings:
     walks = first.outcome is jb.Ending.WALKING
     walked = settled(scene) if walks else None
     gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
-    found = gait.outcome is jb.Search.FOUND
+    found = gait.outcome is jb.gait.Search.FOUND
     searched = {name: float(getattr(gait.measures, key)) for name, key in MEASURES.items()}
     period = walked["period_s"] if walked else None
     low, high = first.lowest, first.highest
@@ -154,7 +154,7 @@ MEASURES = {
     "peak_normal_N": "peak_normal",
     "spectral_radius": "spectral_radius",
 }
-"""Measures of a gait by their names here and in `jb.Measures`."""
+"""Measures of a gait by their names here and in `jb.gait.Measures`."""
 
 
 def settled(scene: jb.Scene) -> dict[str, float | None] | None:

@@ -58,13 +58,13 @@ def motion(scene: jb.Scene, duration: float) -> Motion:
 
 @eqx.filter_jit
 def _rows(scene: jb.Scene, state: Any) -> dict[str, Any]:
-    both, forces = jb.feet(scene, state), jb.foot_forces(scene, state)
+    both, forces = jb.dynamics.feet(scene, state), jb.dynamics.foot_forces(scene, state)
     nothing = jnp.zeros_like(state.theta_1)
     tangential = [nothing if each.tangential is None else each.tangential for each in forces]
     return {
-        "kinetic": jb.energies(scene, state).kinetic,
+        "kinetic": jb.dynamics.energies(scene, state).kinetic,
         "angle": jnp.stack([state.theta_1, state.theta_2]),
-        "depth": jnp.stack([jnp.where(jb.touches(f), f.penetration, 0.0) for f in both]),
+        "depth": jnp.stack([jnp.where(jb.dynamics.touches(f), f.penetration, 0.0) for f in both]),
         "normal": jnp.stack([each.normal for each in forces]),
         "tangential": jnp.stack(tangential),
         "slip": jnp.stack([foot.slip_speed for foot in both]),

@@ -65,7 +65,7 @@ def curve_of(
         solver=integrator.solver,
         save=times,
         watch=(),
-        extremes=jb.violation,
+        extremes=jb.dynamics.violation,
         max_solver_steps=1 << 25,
         **steps,
     )
@@ -73,8 +73,8 @@ def curve_of(
     begin = time.perf_counter()
     walk = jax.block_until_ready(request())
     seconds = time.perf_counter() - begin
-    off = np.asarray(jb.violation(held, walk.state).position)
-    final = np.array(jb.minimal_state(held, walk.final))
+    off = np.asarray(jb.dynamics.violation(held, walk.state).position)
+    final = np.array(jb.dynamics.minimal_state(held, walk.final))
     error = float(np.max(np.abs(final - truth)))
     alive = np.isfinite(off)
     at_steps = float(walk.highest.position)

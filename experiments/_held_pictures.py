@@ -32,7 +32,7 @@ def draw_each(options: Options, curves: dict[str, Curve]) -> str:
 def draw_all(options: Options, name: str, curves: dict[str, Curve], title: str) -> str:
     figure = new_figure(9.0, 3.8)
     linear, logarithmic = figure.subplots(1, 2)
-    names = list(jb.CONSTRAINT_METHODS)
+    names = list(jb.constraints.CONSTRAINT_METHODS)
     for method, curve in curves.items():
         k = names.index(method)
         style = dict(color=COLOURS[k], linestyle=STYLES[k], linewidth=1.1)

@@ -11,9 +11,9 @@ import jax.tree_util as jtu
 import numpy as np
 
 import jaxbiped as jb
-from jaxbiped.lanes._engine import CompiledProgram
-from jaxbiped.lanes._program import Program
-from jaxbiped.lanes._solve import Setting, compiled_solve
+from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
+from jaxbiped.compiler.runtime._program import Program
+from jaxbiped.variational._differentiable_solve import Setting, compiled_solve
 
 _WATCH = ("fall", "stop", "stumble")
 _CHAINS, _LENGTH = 24, 2000
@@ -72,7 +72,7 @@ def peak_flops() -> float:
 
 def _compiled(scene: jb.Scene) -> CompiledProgram:
     """The very program that `simulate` runs, so that it is traced once."""
-    setting = Setting(jb.Rodas4(), _WATCH, counting=False, quick=True)
+    setting = Setting(jb.solvers.Rodas4(), _WATCH, counting=False, quick=True)
     return compiled_solve(setting, jtu.tree_structure(scene))
 
 
@@ -93,14 +93,14 @@ def scenes(count: int, duration: float, *, quick: bool) -> list[dict[str, Any]]:
     choices = {
         "the seed's": (normal, friction),
         "smooth laws": (
-            jb.SmoothRistowSchafer(K=1e6, c=1e7),
-            jb.SmoothBengisuAkay(
+            jb.laws.SmoothRistowSchafer(K=1e6, c=1e7),
+            jb.laws.SmoothBengisuAkay(
                 mu_static=mu, mu_kinetic=friction.mu_kinetic, v0=friction.v0, xi=friction.xi
             ),
         ),
-        "regularised Coulomb": (normal, jb.RegularisedCoulomb(mu=mu, v_d=1e-2)),
-        "frictionless": (normal, jb.Frictionless()),
-        "frictionless Hertz": (jb.Hertz(K=1e6), jb.Frictionless()),
+        "regularised Coulomb": (normal, jb.laws.RegularisedCoulomb(mu=mu, v_d=1e-2)),
+        "frictionless": (normal, jb.laws.Frictionless()),
+        "frictionless Hertz": (jb.laws.Hertz(K=1e6), jb.laws.Frictionless()),
     }
     if quick:
         choices = {name: choices[name] for name in ("smooth laws", "frictionless Hertz")}

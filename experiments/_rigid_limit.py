@@ -49,7 +49,7 @@ def approach(path: str, rigid: jb.Gait, doublings: int) -> Approach:
         stiffer, damped = PATHS[path](2.0**k)
         scene = jb.seed_scene(K=1e6 * stiffer, c=1e7 * damped)
         gait = jb.find_gait(scene, guess, parameters=(), radius_sensitivities=False)
-        if gait.outcome is not jb.Search.FOUND:
+        if gait.outcome is not jb.gait.Search.FOUND:
             ended = f"at factor {2**k}: {gait.outcome}"
             break
         guess = gait.measures.state

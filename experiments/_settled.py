@@ -86,7 +86,9 @@ def _walked(scene: Any, starts: Any, footsteps: int, rtol: float) -> Any:
         )
         last = jax.tree.map(lambda leaf: leaf[-1], walk.state)
         stands = jnp.abs(last.theta_1) < jnp.abs(last.theta_2)
-        last = jax.tree.map(lambda a, b: jnp.where(stands, a, b), jb.exchange_legs(last), last)
+        last = jax.tree.map(
+            lambda a, b: jnp.where(stands, a, b), jb.dynamics.exchange_legs(last), last
+        )
         return walk.t, last._replace(hip_x=0.0 * last.hip_x), walk.arrivals
 
     def rigid(start: Any) -> Any:

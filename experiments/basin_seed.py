@@ -48,7 +48,7 @@ def main() -> None:
 
 
 def of_slice(options: Options, codes: np.ndarray, periods: np.ndarray) -> dict[str, Any]:
-    fractions = jb.basin_fractions(jb.label_names(codes, periods))
+    fractions = jb.basins.fractions(jb.basins.label_names(codes, periods))
     for name, part in fractions.items():
         options.say(f"{name:<18} {part.estimate:7.2%}  [{part.low:.2%}, {part.high:.2%}]")
     measures = _basin_slice.boundary_measures(codes)
@@ -62,9 +62,9 @@ def of_slice(options: Options, codes: np.ndarray, periods: np.ndarray) -> dict[s
     return {"fractions": _basin_slice.in_words(fractions), "boundary": measures}
 
 
-def of_refined(options: Options, boundary: jb.RefinedBoundary) -> dict[str, Any]:
-    dimension = jb.boundary_dimension(boundary)
-    walking = float((boundary.on_grid() == int(jb.Label.WALKING)).mean())
+def of_refined(options: Options, boundary: jb.basins.RefinedBoundary) -> dict[str, Any]:
+    dimension = jb.basins.boundary_dimension(boundary)
+    walking = float((boundary.on_grid() == int(jb.basins.Label.WALKING)).mean())
     options.say(
         f"refined: {boundary.asked} labels of {boundary.full}, dimension "
         f"{dimension.estimate:.3f} ± {dimension.error:.3f}, walking {walking:.2%}"
@@ -136,7 +136,9 @@ def draw_slice(
     return saved(options, figure, "basin_seed.png")
 
 
-def draw_refined(options: Options, labelling: jb.Labelling, boundary: jb.RefinedBoundary) -> str:
+def draw_refined(
+    options: Options, labelling: jb.Labelling, boundary: jb.basins.RefinedBoundary
+) -> str:
     figure = plot.refined_basin(
         boundary,
         names=_basin_slice.AXES,

@@ -27,7 +27,7 @@ def main() -> None:
     options = parse(__doc__ or "")
     scene, quick = jb.seed_scene(), options.quick
     duration = QUICK_DURATION if quick else DURATION
-    methods = ("standard", "index1") if quick else tuple(jb.CONSTRAINT_METHODS)
+    methods = ("standard", "index1") if quick else tuple(jb.constraints.CONSTRAINT_METHODS)
     integrators = [
         *([] if quick else [jb.Integrator("rodas4", rtol=rtol) for rtol in TOLERANCES]),
         *[jb.Integrator("euler", dt=dt) for dt in STEPS[: 2 if quick else 3]],
@@ -90,11 +90,11 @@ def mapped(
                 duration=duration,
                 save="end",
                 watch=(),
-                extremes=jb.violation,
+                extremes=jb.dynamics.violation,
                 max_solver_steps=1 << 16,
                 **how,
             )
-            end = jb.minimal_state(held, jax.tree.map(lambda leaf: leaf[0], walk.state))
+            end = jb.dynamics.minimal_state(held, jax.tree.map(lambda leaf: leaf[0], walk.state))
             error = jnp.max(jnp.abs(jnp.stack(list(end)) - truth))
             return walk.highest.position, error, walk.accepted + walk.rejected, walk.ending
 
@@ -113,7 +113,7 @@ def mapped(
 def baumgarte_map(scene: jb.Scene, duration: float, count: int, quick: bool) -> dict[str, Any]:
     values = np.logspace(-1.0, 5.0, count)
     a, b = (jnp.asarray(x.ravel()) for x in np.meshgrid(values, values, indexing="ij"))
-    methods = jax.vmap(lambda a, b: jb.Baumgarte(a=a, b=b))(a, b)
+    methods = jax.vmap(lambda a, b: jb.constraints.Baumgarte(a=a, b=b))(a, b)
     found = mapped(scene, methods, (count, count), duration, quick)
     return {"rows": "a (1/s)", "columns": "b (1/s)", "row": values.tolist()} | {
         "column": values.tolist(),
@@ -124,7 +124,7 @@ def baumgarte_map(scene: jb.Scene, duration: float, count: int, quick: bool) -> 
 def penalty_map(scene: jb.Scene, duration: float, count: int, quick: bool) -> dict[str, Any]:
     penalties, rates = np.logspace(1.0, 11.0, count), np.logspace(-1.0, 4.0, count)
     A, omega = (jnp.asarray(x.ravel()) for x in np.meshgrid(penalties, rates, indexing="ij"))
-    methods = jax.vmap(lambda A, omega: jb.Penalty(A=A, omega=omega))(A, omega)
+    methods = jax.vmap(lambda A, omega: jb.constraints.Penalty(A=A, omega=omega))(A, omega)
     found = mapped(scene, methods, (count, count), duration, quick)
     return {"rows": "A (kg)", "columns": "ω (1/s)", "row": penalties.tolist()} | {
         "column": rates.tolist(),
@@ -135,7 +135,9 @@ def penalty_map(scene: jb.Scene, duration: float, count: int, quick: bool) -> di
 def damping_map(scene: jb.Scene, duration: float, count: int, quick: bool) -> dict[str, Any]:
     dampings, rates = np.logspace(-2.0, 2.0, count), np.logspace(-1.0, 4.0, count)
     zeta, omega = (jnp.asarray(x.ravel()) for x in np.meshgrid(dampings, rates, indexing="ij"))
-    methods = jax.vmap(lambda zeta, omega: jb.Penalty(omega=omega, zeta=zeta))(zeta, omega)
+    methods = jax.vmap(lambda zeta, omega: jb.constraints.Penalty(omega=omega, zeta=zeta))(
+        zeta, omega
+    )
     found = mapped(scene, methods, (count, count), duration, quick)
     return {"rows": "ζ", "columns": "ω (1/s)", "row": dampings.tolist()} | {
         "column": rates.tolist(),
@@ -170,7 +172,7 @@ def draw_trade(options: Options, runs: list[jb.ConstraintRun]) -> str:
     integrators = list(dict.fromkeys(run.integrator for run in runs))
     figure = new_figure(3.6 * max(len(integrators), 2), 3.8)
     axes = figure.subplots(1, len(integrators), sharey=True, squeeze=False)[0]
-    names = list(jb.CONSTRAINT_METHODS)
+    names = list(jb.constraints.CONSTRAINT_METHODS)
     for ax, integrator in zip(axes, integrators, strict=True):
         for method in dict.fromkeys(run.method for run in runs):
             mine = [r for r in runs if r.method == method and r.integrator == integrator]

@@ -28,7 +28,7 @@ from _options import Options, parse
 
 import jaxbiped as jb
 
-LAWS = {"normal": tuple(jb.NORMAL_LAWS), "friction": tuple(jb.FRICTION_LAWS)}
+LAWS = {"normal": tuple(jb.laws.NORMAL_LAWS), "friction": tuple(jb.laws.FRICTION_LAWS)}
 QUICK_LAWS = {
     "normal": ("ristow-schafer", "hunt-crossley"),
     "friction": ("bengisu-akay", "coulomb"),

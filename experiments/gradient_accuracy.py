@@ -15,10 +15,17 @@ from _options import Options, parse
 
 import jaxbiped as jb
 from jaxbiped.gait._orbit import slopes_of
+from jaxbiped.gait._poincare_map import (
+    LinearisedReturn,
+    linearised_return,
+    recurring_components,
+    seed_directions,
+    state_with,
+)
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._stability import stability_of
-from jaxbiped.gait._turn import Turn, Turning, recurring_of, seeded, state_with, turn
-from jaxbiped.scene._parameters import chosen_parameters
-from jaxbiped.solve._passage import Precision
+from jaxbiped.scene._parameters import select_parameters
+from jaxbiped.variational._solve_to_section import Precision
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 QUICK_TOLERANCES = (1e-5, 1e-6)
@@ -56,35 +63,35 @@ class Stepping(NamedTuple):
     lands: Any
 
 
-class Stepped(jb.AbstractSystem):
+class Stepped(jb.gait.AbstractSystem):
     """The walker, its switches hidden from the solver or not."""
 
-    drifting = jb.Walking.drifting
+    cyclic_coordinates = jb.gait.Walking.cyclic_coordinates
 
     def vector_field(self, t: Any, y: jb.State, args: Stepping) -> jb.State:
         """The walker's."""
-        return jb.vector_field(t, y, args.scene)
+        return jb.dynamics.vector_field(t, y, args.scene)
 
-    def switches(self, args: Stepping, y: jb.State) -> tuple[jb.Switch, ...]:
+    def switches(self, args: Stepping, y: jb.State) -> tuple[jb.dynamics.Switch, ...]:
         """The walker's; where steps do not land, none is live."""
         lands = args.lands > 0.0
-        found = jb.switches(args.scene, y)
+        found = jb.dynamics.switches(args.scene, y)
         return tuple(each._replace(live=each.live & lands) for each in found)
 
     def ending(self, args: Stepping, y: jb.State) -> Any:
         """The walker's."""
-        return jb.Walking().ending(args.scene, y)
+        return jb.gait.Walking().ending(args.scene, y)
 
-    def renew(self, args: Stepping, y: jb.State) -> jb.State:
+    def reset_map(self, args: Stepping, y: jb.State) -> jb.State:
         """Legs exchanged."""
-        return jb.exchange_legs(y)
+        return jb.dynamics.exchange_legs(y)
 
     def load(self, args: Stepping, y: jb.State) -> None:
         """No largest load: no step is spent on it."""
         return None
 
 
-class Stance(jb.AbstractSection):
+class Stance(jb.dynamics.AbstractSection):
     """Mid-stance."""
 
     def value(self, args: Stepping, y: jb.State) -> Any:
@@ -111,7 +118,7 @@ class Exact(NamedTuple):
     """A gait's state on the section, and the reference footstep from there."""
 
     start: jb.State
-    turn: Turn
+    orbit: LinearisedReturn
 
 
 def laws(quick: bool) -> dict[str, jb.Scene]:
@@ -120,32 +127,34 @@ def laws(quick: bool) -> dict[str, jb.Scene]:
     normal, friction = seed.normal, seed.friction
     smooth = dataclasses.replace(
         seed,
-        normal=jb.SmoothRistowSchafer(K=normal.K, c=normal.c, n=normal.n),
-        friction=jb.SmoothBengisuAkay(
+        normal=jb.laws.SmoothRistowSchafer(K=normal.K, c=normal.c, n=normal.n),
+        friction=jb.laws.SmoothBengisuAkay(
             friction.mu_static, friction.mu_kinetic, friction.v0, friction.xi
         ),
     )
     return {"exact laws": seed} if quick else {"exact laws": seed, "smoothed laws": smooth}
 
 
-def footstep(scene: jb.Scene, start: jb.State, lands: bool, precision: Precision) -> Turn:
+def footstep(
+    scene: jb.Scene, start: jb.State, lands: bool, precision: Precision
+) -> LinearisedReturn:
     """One footstep from mid-stance, with derivatives by the state and by log K.
 
     Landing and tolerances are traced: all of them share one compiled program.
     """
-    turning = Turning(
+    spec = ReturnMapSpec(
         system=Stepped(),
         section=Stance(),
-        solver=jb.Rodas4(),
+        solver=jb.solvers.Rodas4(),
         time_limit=jnp.asarray(10.0),
         steps=1,
         max_solver_steps=MOST_STEPS,
         engine="xla",
     )
-    _, active = chosen_parameters(scene, ("K",))  # whose places are the same in a Stepping
-    seeds, _ = seeded(Stepping(scene, jnp.asarray(float(lands))), active, len(start) - 1)
+    _, active = select_parameters(scene, ("K",))  # whose places are the same in a Stepping
+    seeds, _ = seed_directions(Stepping(scene, jnp.asarray(float(lands))), active, len(start) - 1)
     traced = Precision(*map(jnp.asarray, precision))
-    return turn(turning, seeds, start, traced, jnp.asarray(False))
+    return linearised_return(spec, seeds, start, traced, jnp.asarray(False))
 
 
 def exact_gait(scene: jb.Scene, rtol: float) -> Exact:
@@ -153,7 +162,7 @@ def exact_gait(scene: jb.Scene, rtol: float) -> Exact:
 
     `find_gait` would find the same; this needs no other program compiled.
     """
-    system, y = jb.Walking(), jb.seed_state()
+    system, y = jb.gait.Walking(), jb.seed_state()
     first = footstep(scene, y, True, Precision(1e-6, 1e-5))
     x = first.recurring
     for tolerance in (1e-6, rtol, rtol, rtol):
@@ -170,30 +179,30 @@ def measured(scene: jb.Scene, exact: Exact, stepping: str, rtol: float) -> Point
     lands, heard = STEPPINGS[stepping]
     precision = Precision(rtol, TANGENT_SHARE * rtol if heard else UNHEARD)
     found = footstep(scene, exact.start, lands, precision)
-    slope, true_slope = (float(slopes_of(each).period[0]) for each in (found, exact.turn))
+    slope, true_slope = (float(slopes_of(each).period[0]) for each in (found, exact.orbit))
     return Point(
         rtol=rtol,
         steps=int(found.attempted),
-        state=float(jnp.max(jnp.abs(found.recurring - exact.turn.recurring))),
-        period_s=abs(float(found.period - exact.turn.period)),
+        state=float(jnp.max(jnp.abs(found.recurring - exact.orbit.recurring))),
+        period_s=abs(float(found.period - exact.orbit.period)),
         unit_multiplier=unit_error(scene, exact.start, found),
         period_slope=abs(slope / true_slope - 1.0),
     )
 
 
-def unit_error(scene: jb.Scene, start: jb.State, found: Turn) -> float:
+def unit_error(scene: jb.Scene, start: jb.State, found: LinearisedReturn) -> float:
     """Distance from 1 of the multiplier of the direction along the orbit."""
-    system = jb.Walking()
+    system = jb.gait.Walking()
     m = len(found.recurring)
-    velocity = recurring_of(system, jb.vector_field(0.0, start, scene))
+    velocity = recurring_components(system, jb.dynamics.vector_field(0.0, start, scene))
     square = found.monodromy[:, :m]
     return float(stability_of(square, square, velocity, 1e-3).unit_error)
 
 
 def residual(exact: Exact) -> float:
     """Largest change of a component of the state over the reference footstep, SI units."""
-    before = recurring_of(jb.Walking(), exact.start)
-    return float(jnp.max(jnp.abs(exact.turn.recurring - before)))
+    before = recurring_components(jb.gait.Walking(), exact.start)
+    return float(jnp.max(jnp.abs(exact.orbit.recurring - before)))
 
 
 def report(options: Options, points: dict[str, list[Point]]) -> None:
@@ -242,10 +251,10 @@ def main() -> None:
             name: [measured(scene, exact, name, rtol) for rtol in levels] for name in STEPPINGS
         }
         references[law] = {
-            "period_s": float(exact.turn.period),
-            "period_slope_s": float(slopes_of(exact.turn).period[0]),
-            "steps": int(exact.turn.attempted),
-            "unit_multiplier": unit_error(scene, exact.start, exact.turn),
+            "period_s": float(exact.orbit.period),
+            "period_slope_s": float(slopes_of(exact.orbit).period[0]),
+            "steps": int(exact.orbit.attempted),
+            "unit_multiplier": unit_error(scene, exact.start, exact.orbit),
             "residual": residual(exact),
         }
         options.say(f"\n{law}, in {time.perf_counter() - began:.0f} s")

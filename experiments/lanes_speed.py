@@ -148,7 +148,7 @@ def first_result() -> float:
     new = jb.Scene(
         walker=seed.walker,
         ground=seed.ground,
-        normal=jb.SmoothRistowSchafer(K=1e6, c=1e7),
+        normal=jb.laws.SmoothRistowSchafer(K=1e6, c=1e7),
         friction=seed.friction,
     )
     began = time.perf_counter()

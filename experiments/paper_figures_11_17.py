@@ -38,7 +38,11 @@ def main() -> None:
     quick = options.quick
     step = 1e-5 if quick else 1e-6
     duration = 0.3 if quick else 2.0
-    methods = ("standard", "augmented", "described") if quick else tuple(jb.CONSTRAINT_METHODS)
+    methods = (
+        ("standard", "augmented", "described")
+        if quick
+        else tuple(jb.constraints.CONSTRAINT_METHODS)
+    )
     euler, runge = jb.Integrator("euler", dt=step), jb.Integrator("runge2", dt=step)
     truth = truth_of(scene, duration)
     by_method = {name: curve_of(scene, name, euler, duration, truth) for name in methods}
@@ -93,7 +97,7 @@ def hundred_footsteps(scene: jb.Scene) -> dict[str, Curve]:
     truth = truth_of(scene, duration)
     return {
         name: curve_of(scene, name, STIFF, duration, truth, points=4001)
-        for name in jb.CONSTRAINT_METHODS
+        for name in jb.constraints.CONSTRAINT_METHODS
     }
 
 

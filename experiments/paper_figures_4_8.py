@@ -52,8 +52,8 @@ def draw(options: Options, scene: jb.Scene, walk: jb.Trajectory) -> list[Path]:
 def measure(scene: jb.Scene, walk: jb.Trajectory) -> dict[str, Any]:
     """The numbers that each figure shows, at the solver's own steps."""
     state = walk.state
-    both, forces = jb.feet(scene, state), jb.foot_forces(scene, state)
-    depths = [jnp.where(jb.touches(foot), foot.penetration, 0.0) for foot in both]
+    both, forces = jb.dynamics.feet(scene, state), jb.dynamics.foot_forces(scene, state)
+    depths = [jnp.where(jb.dynamics.touches(foot), foot.penetration, 0.0) for foot in both]
     return {
         "fig4_strobe": {
             "distance_along_slope_m": float(state.hip_x[-1] - state.hip_x[0]),

@@ -164,7 +164,7 @@ def result(family: Family, value: float, gait: jb.Gait, seconds: float, walk: Se
     return Result(
         value=float(value),
         verdict=verdict,
-        found_by=str(gait.found_by) if gait.outcome is jb.Search.FOUND else "",
+        found_by=str(gait.found_by) if gait.outcome is jb.gait.Search.FOUND else "",
         period=period,
         radius=float(gait.measures.spectral_radius),
         others=len(gait.others),
@@ -179,7 +179,7 @@ def _verdict(gait: jb.Gait, walk: Settled) -> str:
     if walk.cycle == 1:
         same = bool(gait.stable) and abs(float(gait.measures.period) - walk.period) <= SAME
         return "agrees" if same else "missed"
-    if gait.outcome is not jb.Search.FOUND:
+    if gait.outcome is not jb.gait.Search.FOUND:
         return "none, no walk settles"
     return "stable, walks not seen" if bool(gait.stable) else "unstable, no walk settles"
 

@@ -61,7 +61,7 @@ def point(name: str, value: float, gait: Any) -> Point:
 
     return Point(
         value=value,
-        outcome=str(jb.Search(int(gait.ending))),
+        outcome=str(jb.gait.Search(int(gait.ending))),
         stable=float(gait.spectral_radius) < 1.0,
         residual=float(gait.residual),
         measures={key: float(gait[key]) for key in MEASURES},
@@ -126,7 +126,7 @@ def report(options: Options, found: dict[str, list[Point]], keys: list[str]) -> 
         options.say(f"\n{name:>9}" + "".join(f"{MEASURES[key]:>17}" for key in keys) + "  outcome")
         for i, p in enumerate(points):
             cells = "".join(f"{own(name, points, key)[i]:17.2e}" for key in keys)
-            word = "" if p.outcome != str(jb.Search.FOUND) or p.stable else ", not stable"
+            word = "" if p.outcome != str(jb.gait.Search.FOUND) or p.stable else ", not stable"
             options.say(f"{p.value:9.2e}{cells}  {p.outcome}{word}")
 
 
@@ -141,7 +141,7 @@ def main() -> None:
         {"parameter": name, "value": p.value, "outcome": p.outcome}
         for name, points in found.items()
         for p in points
-        if p.outcome != str(jb.Search.FOUND)
+        if p.outcome != str(jb.gait.Search.FOUND)
     ]
     options.say(f"\n{len(missing)} points without a gait, {time.perf_counter() - began:.0f} s")
     picture(options, found, keys)

@@ -80,7 +80,7 @@ def diffrax_plain(solver: diffrax.AbstractSolver) -> Method:
     """diffrax by itself: the state one vector, which suits its implicit solvers best."""
 
     def field(t: Any, y: Any, scene: jb.Scene) -> Any:
-        return jnp.stack(jb.vector_field(t, jb.State(*y), scene))
+        return jnp.stack(jb.dynamics.vector_field(t, jb.State(*y), scene))
 
     def solve(scene: jb.Scene, state: jb.State, rtol: Any) -> tuple[Any, Any]:
         control = diffrax.PIDController(rtol=rtol, atol=1e-2 * rtol, dtmin=1e-12, force_dtmin=True)
@@ -103,7 +103,7 @@ def diffrax_plain(solver: diffrax.AbstractSolver) -> Method:
 
 def methods(quick: bool) -> dict[str, tuple[Method | None, list[float]]]:
     """Every method by name, with the tolerances that suit it; None where it is not installed."""
-    chord = jb.SOLVERS["kvaerno3"]().root_finder
+    chord = jb.solvers.SOLVERS["kvaerno3"]().root_finder
     fine, coarse = (-4, -9), (-3, -7)
     if quick:
         return {

@@ -130,7 +130,7 @@ def one(path: str, model: str, starts: str, chunk: str) -> None:
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     said: dict[str, Any] = {"peak_mb": peak, "labelled": labelled}
     stored = found["label"].values
-    said["pending"] = int((stored == int(jb.Label.PENDING)).sum())
+    said["pending"] = int((stored == int(jb.basins.Label.PENDING)).sum())
     said["differ"] = None
     if int(starts) <= MOST_COMPARED:
         plain = _batches.swept(labelling, int(starts))()["label"].values

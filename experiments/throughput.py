@@ -141,9 +141,8 @@ def by_peer(
     batch = _batches.starts_of(labelling.scene, count).batch(labelling, 0, count)
     states = np.stack(list(map(np.asarray, batch.states)), axis=1)
     codes = labelling(batch.states).label
-    walking, falling = (
-        np.flatnonzero(codes == int(label)) for label in (jb.Label.WALKING, jb.Label.FELL_FORWARD)
-    )
+    walking = np.flatnonzero(codes == int(jb.basins.Label.WALKING))
+    falling = np.flatnonzero(codes == int(jb.basins.Label.FELL_FORWARD))
     rows = peers_on(labelling, "all", states, rounds, scipy=False)
     rows += peers_on(labelling, "that walk", states[walking], rounds, scipy=True)
     rows += peers_on(labelling, "that fall", states[falling], rounds, scipy=True)
@@ -184,7 +183,7 @@ def peers_on(
 def compared(
     way: str, which: str, ours: np.ndarray, theirs: np.ndarray, seconds: float
 ) -> dict[str, Any]:
-    walks, walked = ours == int(jb.Label.WALKING), theirs == int(jb.Label.WALKING)
+    walks, walked = ours == int(jb.basins.Label.WALKING), theirs == int(jb.basins.Label.WALKING)
     return {
         "way": way,
         "which": which,
@@ -197,8 +196,8 @@ def compared(
 
 def fate(codes: np.ndarray) -> np.ndarray:
     """Labels, a stumble counted as a fall forward: from sampled states it looks like one."""
-    stumbled = np.asarray(codes) == int(jb.Label.STUMBLED)
-    return np.where(stumbled, int(jb.Label.FELL_FORWARD), codes)
+    stumbled = np.asarray(codes) == int(jb.basins.Label.STUMBLED)
+    return np.where(stumbled, int(jb.basins.Label.FELL_FORWARD), codes)
 
 
 def by_engine(options: Options, model: str = "compliant", size: int = 512) -> list[dict[str, Any]]:

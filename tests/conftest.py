@@ -10,6 +10,7 @@ import pytest
 
 import jaxbiped as jb
 from tests.reference import reference_states
+from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 
 # What decides whether a change lands draws the same examples every time; elsewhere they are new.
 hypothesis.settings.register_profile("landing", derandomize=True, print_blob=True)
@@ -65,3 +66,16 @@ def seed_walk():
 def reference():
     """The seed's walk by an independent program and integrator: (times, states (n, 8))."""
     return reference_states()
+
+
+@pytest.fixture(scope="session")
+def simplest():
+    """A labelling of the simplest walker on its slope of 0.009, with its gait."""
+    guess = simplest_state(*STABLE)
+    return jb.labelling(simplest_walker(0.009), guess=guess, accuracy="balanced")
+
+
+@pytest.fixture(scope="session")
+def seed():
+    """A labelling of the seed's walker, with its gait."""
+    return jb.labelling(jb.seed_scene())

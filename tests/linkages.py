@@ -13,24 +13,24 @@ DISTANCE = 0.1
 
 def pinned_pendulum(orientation="angle", *, twice=False):
     """Two of the seed's legs hanging from one pin; `twice` says the second joint twice."""
-    body = jb.Body(**LEG)
+    body = jb.constraints.Body(**LEG)
     hip = (0.0, DISTANCE)
-    joints = [jb.Joint(hip, (0.0, 0.0), 0), jb.Joint(hip, hip, 0, 1)]
-    return jb.Linkage((body, body), joints + joints[1:] * twice, orientation)
+    joints = [jb.constraints.Joint(hip, (0.0, 0.0), 0), jb.constraints.Joint(hip, hip, 0, 1)]
+    return jb.constraints.Linkage((body, body), joints + joints[1:] * twice, orientation)
 
 
 def four_bar(orientation="angle"):
     """Crank, coupler and rocker between two pins of the ground; each bar a thin rod."""
     lengths = (0.2, 0.5, 0.4)
-    bars = [jb.Body(length, length**3 / 12.0) for length in lengths]
+    bars = [jb.constraints.Body(length, length**3 / 12.0) for length in lengths]
     ends = [((-length / 2, 0.0), (length / 2, 0.0)) for length in lengths]
     joints = (
-        jb.Joint(ends[0][0], (0.0, 0.0), 0),
-        jb.Joint(ends[0][1], ends[1][0], 0, 1),
-        jb.Joint(ends[1][1], ends[2][1], 1, 2),
-        jb.Joint(ends[2][0], (0.5, 0.0), 2),
+        jb.constraints.Joint(ends[0][0], (0.0, 0.0), 0),
+        jb.constraints.Joint(ends[0][1], ends[1][0], 0, 1),
+        jb.constraints.Joint(ends[1][1], ends[2][1], 1, 2),
+        jb.constraints.Joint(ends[2][0], (0.5, 0.0), 2),
     )
-    return jb.Linkage(bars, joints, orientation)
+    return jb.constraints.Linkage(bars, joints, orientation)
 
 
 def four_bar_state(crank, rate=0.0):
@@ -41,7 +41,9 @@ def four_bar_state(crank, rate=0.0):
     place = _four_bar_place(crank)
     step = 1e-6
     slopes = (_four_bar_place(crank + step) - _four_bar_place(crank - step)) / (2.0 * step)
-    return jb.LinkageState(tuple(map(float, place)), tuple(float(rate * s) for s in slopes))
+    return jb.dynamics.LinkageState(
+        tuple(map(float, place)), tuple(float(rate * s) for s in slopes)
+    )
 
 
 def _four_bar_place(crank):
@@ -70,7 +72,7 @@ def hanging(*angles, rates=(0.0, 0.0)):
         sine, cosine = math.sin(angle), math.cos(angle)
         q += [DISTANCE * sine, -DISTANCE * cosine, angle]
         v += [DISTANCE * cosine * rate, DISTANCE * sine * rate, rate]
-    return jb.LinkageState(tuple(q), tuple(v))
+    return jb.dynamics.LinkageState(tuple(q), tuple(v))
 
 
 def with_euler_parameters(state):
@@ -82,4 +84,4 @@ def with_euler_parameters(state):
         cosine, sine = jnp.cos(0.5 * angle), jnp.sin(0.5 * angle)
         q += [x, z, cosine, sine]
         v += [vx, vz, -0.5 * rate * sine, 0.5 * rate * cosine]
-    return jb.LinkageState(tuple(q), tuple(v))
+    return jb.dynamics.LinkageState(tuple(q), tuple(v))

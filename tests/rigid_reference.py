@@ -26,7 +26,7 @@ def contact_rows(walker, angle, leg):
 
 
 def coordinates(scene, state):
-    whole = jb.whole_state(scene, state)
+    whole = jb.dynamics.whole_state(scene, state)
     theta = np.array([float(state.theta_1), float(state.theta_2)])
     rates = np.array([float(whole.hip_vx), float(whole.hip_vz), *map(float, state[3:])])
     return whole, theta, rates

@@ -21,7 +21,7 @@ def simplest_walker(slope):
 def simplest_state(theta, rate):
     """Just after a strike: θ of the stance leg and its rate, the swing leg's from the impact."""
     swing = rate - rate * (1.0 - np.cos(2.0 * theta))
-    return jb.RigidState(*map(jnp.asarray, (0.0, -theta, theta, swing, rate)))
+    return jb.dynamics.RigidState(*map(jnp.asarray, (0.0, -theta, theta, swing, rate)))
 
 
 def compass_gait():

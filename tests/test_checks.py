@@ -23,9 +23,9 @@ import jaxbiped as jb
         (lambda: jb.seed_scene(m=True), ("m", "True", "not a number")),
         (lambda: jb.seed_scene(m=np.bool_(True)), ("m", "True", "not a number")),
         (lambda: jb.seed_scene(m=jnp.asarray(True)), ("m", "True", "not a number")),
-        (lambda: jb.Hertz(K=0.0), ("K", "0")),
-        (lambda: jb.RegularisedCoulomb(mu=0.4, v_d=-1.0), ("v_d", "-1")),
-        (lambda: jb.SmoothRistowSchafer(K=1e6, c=1e7, depth_width=0.0), ("depth_width", "0")),
+        (lambda: jb.laws.Hertz(K=0.0), ("K", "0")),
+        (lambda: jb.laws.RegularisedCoulomb(mu=0.4, v_d=-1.0), ("v_d", "-1")),
+        (lambda: jb.laws.SmoothRistowSchafer(K=1e6, c=1e7, depth_width=0.0), ("depth_width", "0")),
         (lambda: jb.seed_scene(K=jnp.array([1e6, -1.0])), ("K", "-1")),
     ],
 )
@@ -103,7 +103,7 @@ _TWO_SCENES = jb.seed_scene(slope=jnp.array([0.01, 0.02]))
         (
             lambda: jb.rigid_walk(
                 jb.RigidScene(_TWO_SCENES.walker, _TWO_SCENES.ground),
-                jb.rigid_state(jb.seed_state()),
+                jb.dynamics.rigid_state(jb.seed_state()),
                 steps=1,
             ),
             "scene.ground.slope",
@@ -111,7 +111,7 @@ _TWO_SCENES = jb.seed_scene(slope=jnp.array([0.01, 0.02]))
         (
             lambda: jb.rigid_walk(
                 jb.RigidScene(_TWO_SCENES.walker, jb.seed_scene().ground),
-                jb.rigid_state(_TWO_STARTS),
+                jb.dynamics.rigid_state(_TWO_STARTS),
                 steps=1,
             ),
             "state.hip_x",

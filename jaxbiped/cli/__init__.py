@@ -30,7 +30,7 @@ _Command = (
 def main(arguments: list[str] | None = None) -> None:
     """Runs a command and exits; with 2 and one sentence for an argument that is not allowed."""
     given = sys.argv[1:] if arguments is None else list(arguments)
-    command = None if given == ["--version"] else _parsed(given)
+    command = None if given == ["--version"] else _parse(given)
     if command is None:
         from importlib.metadata import version
 
@@ -44,7 +44,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(2)
 
 
-def _parsed(arguments: list[str]) -> Any:
+def _parse(arguments: list[str]) -> Any:
     """The command; exits with 2 and one sentence where there is none."""
     refusal = io.StringIO()
     try:

@@ -14,6 +14,8 @@ from tyro.conf import OmitArgPrefixes
 from jaxbiped import _clock
 from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._progress import stage
+from jaxbiped.basins._fractions import fractions as fractions_of
+from jaxbiped.basins._label import label_names
 from jaxbiped.cli._basin_options import StartsOptions
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions
@@ -22,15 +24,13 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._cluster import cluster_executor, local_executor
-from jaxbiped.sweep._coordinates import COORDINATES
-from jaxbiped.sweep._fractions import basin_fractions
-from jaxbiped.sweep._given_starts import GivenStarts
-from jaxbiped.sweep._label import label_names
-from jaxbiped.sweep._labelling import Labelling, checked_effort
+from jaxbiped.sweep._labelling import Labelling, effort_of
 from jaxbiped.sweep._prepare import labelling
-from jaxbiped.sweep._starts import AbstractStarts
-from jaxbiped.sweep._store import check_store
 from jaxbiped.sweep._sweep import CHUNK, sweep
+from jaxbiped.sweep._zarr_store import check_store
+from jaxbiped.sweep.starts._coordinates import COORDINATES
+from jaxbiped.sweep.starts._given_starts import GivenStarts
+from jaxbiped.sweep.starts._starts import AbstractStarts
 
 if TYPE_CHECKING:
     import xarray
@@ -100,7 +100,7 @@ class Basin:
             accuracy=self.sweep.accuracy,
             engine=self.sweep.engine,
         )
-        effort = checked_effort(scene, **how)
+        effort = effort_of(scene, **how)
         check_count("chunk", self.sweep.chunk)
         self.output.check()
         if self.sweep.store is not None:
@@ -131,7 +131,7 @@ class Basin:
         _print(report, numbers)
         if self.output.out is not None:
             with stage("drawing the basin"):
-                paths = _written(found, known, starts, self.output.out)
+                paths = _write_results(found, known, starts, self.output.out)
             for path in paths:
                 report.say(f"wrote {path}")
         numbers["wall_s"] = time.perf_counter() - _clock.IMPORT_BEGAN
@@ -141,7 +141,7 @@ class Basin:
 
 def basin_numbers(found: "xarray.Dataset", seconds: float) -> dict[str, Any]:
     """What is known of a basin in SI units, ready for JSON."""
-    fractions = basin_fractions(_names(found))
+    fractions = fractions_of(_names(found))
     fresh = int(found.attrs["labelled_in_this_run"])
     gaits = [
         gait | {"parameters": row["parameters"]}
@@ -197,7 +197,7 @@ def _at(parameters: dict[str, float]) -> str:
     return "".join(f", {name} {value:.4g}" for name, value in parameters.items())
 
 
-def _written(
+def _write_results(
     found: "xarray.Dataset", known: Labelling, starts: AbstractStarts, out: Path
 ) -> list[Path]:
     """Writes the results, and the picture where there are two axes; returns the paths."""

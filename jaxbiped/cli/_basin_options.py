@@ -13,9 +13,9 @@ from jaxbiped.dynamics._rigid_state import rigid_state
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.sweep._coordinates import check_coordinates
-from jaxbiped.sweep._given_starts import GivenStarts
-from jaxbiped.sweep._starts import AbstractStarts, grid, sample
+from jaxbiped.sweep.starts._coordinates import check_coordinates
+from jaxbiped.sweep.starts._given_starts import GivenStarts
+from jaxbiped.sweep.starts._starts import AbstractStarts, grid, sample
 
 _USUAL = ("theta_swing=-0.5:0.3:100", "omega_swing=-2:4:100")
 """Axes of a basin that nobody chose, and as many starts on each."""
@@ -74,7 +74,7 @@ class StartsOptions:
         named = [text for text in (*self.more, self.y, self.x) if text is not None]
         axes: dict[str, tuple[float, float, int]] = {}
         for text in named or reversed(usual):
-            name, axis = parsed_axis(text)
+            name, axis = parse_axis(text)
             check_coordinates(scene, [name])
             if name in axes:
                 raise ArgumentError(f"{name} is named by two axes: each needs its own.")
@@ -82,7 +82,7 @@ class StartsOptions:
         return axes
 
 
-def parsed_axis(text: str) -> tuple[str, tuple[float, float, int]]:
+def parse_axis(text: str) -> tuple[str, tuple[float, float, int]]:
     """Name, first, last and count of an axis, from name=first:last:count."""
     match = re.fullmatch(r"([\w.-]+)=([^:]+):([^:]+):([^:]+)", text.strip())
     try:

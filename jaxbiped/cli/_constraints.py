@@ -10,7 +10,7 @@ from tyro.conf import OmitArgPrefixes
 from jaxbiped._checks import ArgumentError, check_choice, check_positive
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
-from jaxbiped.scene._constraint_methods import CONSTRAINT_METHODS
+from jaxbiped.constraints._constraint_methods import CONSTRAINT_METHODS
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._compare_constraints import (
     ConstraintRun,

@@ -1,4 +1,4 @@
-"""Where a command starts that was not told otherwise: the seed's start, fitted to the scene."""
+"""Default start of a command: the seed's start, fitted to the scene."""
 
 import math
 from typing import Any
@@ -11,10 +11,10 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State, seed_state
-from jaxbiped.gait._seed_start import seed_start
-from jaxbiped.scene._law import AbstractNormalLaw
+from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 _DEEPEST = 0.1
 """The deepest that a foot begins in a soft ground, in units of l."""
@@ -30,12 +30,12 @@ def default_start(scene: Any) -> State | RigidState:
     """
     seed, own = seed_state(), seed_scene()
     if isinstance(scene, RigidScene):
-        return seed_start(scene)
-    if _known(scene.walker, scene.normal, scene.ground.g) == _known(
+        return default_guess(scene)
+    if _fitted_to(scene.walker, scene.normal, scene.ground.g) == _fitted_to(
         own.walker, own.normal, own.ground.g
     ):
         return seed
-    start = seed_start(scene)
+    start = default_guess(scene)
     depth = standing_height(own, seed.theta_2) - seed.hip_z
     load = (scene.walker.total_mass * scene.ground.g) / (own.walker.total_mass * own.ground.g)
     fitted = float(_depth(scene.normal, own.normal, depth, load))
@@ -45,7 +45,7 @@ def default_start(scene: Any) -> State | RigidState:
     return start._replace(hip_z=standing_height(scene, seed.theta_2, fitted))
 
 
-def _known(*parts: Any) -> Any:
+def _fitted_to(*parts: Any) -> Any:
     """What a start is fitted to, to be compared."""
     leaves, structure = jtu.tree_flatten(parts)
     return structure, [float(leaf) for leaf in leaves]

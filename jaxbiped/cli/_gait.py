@@ -19,8 +19,8 @@ from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._explain_search import explain_search
 from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
-from jaxbiped.gait._search import Search
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._rigid_scene import RigidScene
 
@@ -89,7 +89,7 @@ class FindGait:
         if found:
             _print(report, numbers, gait)
             if "assumptions" in numbers:
-                report.say(_assumed(numbers["assumptions"]))
+                report.say(_assumption_line(numbers["assumptions"]))
         else:
             report.say(_failure(numbers, gait))
         if found and self.output.out is not None:
@@ -189,7 +189,7 @@ def _assumptions(scene: RigidScene, gait: Gait) -> dict[str, float]:
     }
 
 
-def _assumed(known: dict[str, float]) -> str:
+def _assumption_line(known: dict[str, float]) -> str:
     flies = "would fly" if known["least_normal_N"] <= 0.0 else "stays down"
     held = "leaves the ground" if known["lifting_m_s"] >= 0.0 else "would be held by the ground"
     return (
@@ -202,12 +202,14 @@ def _assumed(known: dict[str, float]) -> str:
 
 def _failure(numbers: dict[str, Any], gait: Gait) -> str:
     """One sentence on a search that found no gait."""
-    residual, turns = numbers["residual"], int(gait.turns)
+    residual, turns = numbers["residual"], int(gait.evaluations)
     returned = "no trial returned" if residual is None else f"residual {residual:.2e}"
     lost = "every trial walked on"
     if int(gait.walk_ending) != 0:
         lost = f"the last trial that did not return ended {numbers['walk_ending']!r}"
-    best = ", ".join(f"{name} = {_shown(value, '.6g')}" for name, value in numbers["state"].items())
+    best = ", ".join(
+        f"{name} = {_format(value, '.6g')}" for name, value in numbers["state"].items()
+    )
     return (
         f"{numbers['search']}; {numbers['ending']} after {turns} cycle{'s' * (turns != 1)}, "
         f"{returned}; {lost}; best state {best}"
@@ -215,14 +217,15 @@ def _failure(numbers: dict[str, Any], gait: Gait) -> str:
 
 
 def _print(report: Report, numbers: dict[str, Any], gait: Gait) -> None:
-    report.say(_gait_table(numbers, int(gait.turns)))
+    report.say(_gait_table(numbers, int(gait.evaluations)))
     report.say()
     report.say(_multiplier_table(numbers))
     report.say(
-        f"the multiplier that must be 1 is off by {_shown(numbers['unit_multiplier_error'], '.1e')}"
+        "the multiplier that must be 1 is off by "
+        + _format(numbers["unit_multiplier_error"], ".1e")
     )
     report.say(
-        f"spectral radius {_shown(numbers['spectral_radius'], '.6f')}: "
+        f"spectral radius {_format(numbers['spectral_radius'], '.6f')}: "
         + ("stable" if numbers["stable"] else "NOT STABLE")
     )
     report.say(numbers["search"])
@@ -237,11 +240,11 @@ def _print(report: Report, numbers: dict[str, Any], gait: Gait) -> None:
 
 def _gait_table(numbers: dict[str, Any], turns: int) -> str:
     rows = [
-        ("period s", _shown(numbers["period_s"], ".7f")),
-        ("step length m", _shown(numbers["step_length_m"], ".7f")),
-        ("speed m/s", _shown(numbers["speed_m_s"], ".7f")),
-        ("peak force N", _shown(numbers["peak_normal_N"], ".3f")),
-        ("residual", _shown(numbers["residual"], ".1e")),
+        ("period s", _format(numbers["period_s"], ".7f")),
+        ("step length m", _format(numbers["step_length_m"], ".7f")),
+        ("speed m/s", _format(numbers["speed_m_s"], ".7f")),
+        ("peak force N", _format(numbers["peak_normal_N"], ".3f")),
+        ("residual", _format(numbers["residual"], ".1e")),
         ("cycles of search", str(turns)),
         ("solver steps", str(numbers["solver_steps"])),
         ("engine", numbers["engine"]),
@@ -254,19 +257,19 @@ def _multiplier_table(numbers: dict[str, Any]) -> str:
     pairs = zip(numbers["multipliers"], numbers["multiplier_errors"], strict=True)
     for k, ((real, imaginary), error) in enumerate(pairs):
         size = None if real is None or imaginary is None else math.hypot(real, imaginary)
-        shown = [_shown(value, "z.6f") for value in (real, imaginary, size)]
-        rows.append((str(k + 1), *shown, _shown(error, ".1e")))
+        shown = [_format(value, "z.6f") for value in (real, imaginary, size)]
+        rows.append((str(k + 1), *shown, _format(error, ".1e")))
     return table(("multiplier", "real", "imaginary", "absolute", "error"), rows, most=_MOST_ROWS)
 
 
 def _elasticity_table(elasticities: dict[str, dict[str, float | None]]) -> str:
     head = ("parameter", "period", "length", "speed", "peak", "radius")
     rows = [
-        (parameter, *(_shown(values[name], ".4g") for name in _UNITS.values()))
+        (parameter, *(_format(values[name], ".4g") for name in _UNITS.values()))
         for parameter, values in elasticities.items()
     ]
     return table(head, rows, most=_MOST_ROWS)
 
 
-def _shown(value: float | None, form: str) -> str:
+def _format(value: float | None, form: str) -> str:
     return "unknown" if value is None else format(value, form)

@@ -1,11 +1,11 @@
-"""What `jaxbiped walk` says of a hip held together by constraints."""
+"""Constraint report of `jaxbiped walk`: violations of the hip's constraints."""
 
 from typing import Any
 
 import numpy as np
 
+from jaxbiped.constraints._constraint_methods import name_of
 from jaxbiped.dynamics._redundant_motion import hip_force, violation
-from jaxbiped.scene._constraint_methods import name_of
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._trajectory import Trajectory
 

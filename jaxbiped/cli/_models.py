@@ -9,19 +9,19 @@ from typing import Any
 from jaxbiped._checks import check_writable_file
 from jaxbiped._progress import stage
 from jaxbiped.cli._report import Report, table
-from jaxbiped.dynamics._bristles import state_type
+from jaxbiped.dynamics._bristle_state import state_type
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.lanes._count import operation_counts
-from jaxbiped.scene._catalogue import (
+from jaxbiped.measure._operation_counts import operation_counts
+from jaxbiped.scene._ladder import ladder
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene.laws._catalogue import (
     FRICTION_LAWS,
     NORMAL_LAWS,
     friction_law_like,
     normal_law_like,
 )
-from jaxbiped.scene._ladder import ladder
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._seed import seed_scene
 
 _SEED_NORMAL = dict(K=1e6, c=1e7, n=1.5, mass=2.0)
 _SEED_FRICTION = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
@@ -93,7 +93,7 @@ def _units(law: type) -> dict[str, str]:
 def _print(report: Report, numbers: dict[str, Any]) -> None:
     for kind in ("normal", "friction"):
         rows = [
-            (law["name"], str(law["operations"]), _shown(law["parameters"]))
+            (law["name"], str(law["operations"]), _format(law["parameters"]))
             for law in numbers[kind]
         ]
         width = max(len(row[0]) for row in rows)
@@ -106,7 +106,7 @@ def _print(report: Report, numbers: dict[str, Any]) -> None:
     report.say("operations: of one evaluation of the vector field, equal ones shared")
 
 
-def _shown(parameters: dict[str, Any]) -> str:
+def _format(parameters: dict[str, Any]) -> str:
     if not parameters:
         return "none"
     return ", ".join(

@@ -1,4 +1,4 @@
-"""What the command line's parser refuses, in one sentence instead of a box."""
+"""Messages of the command line's parser, in one sentence instead of a box."""
 
 import re
 
@@ -26,17 +26,17 @@ def one_sentence(box: str) -> str:
     if not filled:
         return "these arguments are not allowed: see jaxbiped --help."
     message, *others = filled
-    parts = [_joined(message)]
+    parts = [_join_lines(message)]
     for block in others:
         flags = [line.split()[0] for line in block[1:] if line.startswith("--")]
         if block[0].startswith("Perhaps you meant") and flags:
             parts.append(f"perhaps you meant {' or '.join(dict.fromkeys(flags))}")
         elif block[0].startswith("Available subcommands"):
-            parts.append(_joined(block))
+            parts.append(_join_lines(block))
     return "; ".join(part[0].lower() + part[1:] for part in parts) + "."
 
 
-def _joined(lines: list[str]) -> str:
+def _join_lines(lines: list[str]) -> str:
     """The lines of a block in one, up to where it begins to list its reasons."""
     shown = []
     for line in lines:

@@ -1,4 +1,4 @@
-"""Printing for people and for programs."""
+"""Reports for people and for programs."""
 
 import json
 import os

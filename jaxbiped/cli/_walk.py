@@ -19,8 +19,8 @@ from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, SolveOptions
 from jaxbiped.cli._warnings import ending_name, relative_residual, walk_warnings
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
-from jaxbiped.gait._footsteps import Footsteps, footsteps
-from jaxbiped.gait._ledger import energy_ledger
+from jaxbiped.measure._energy_ledger import energy_ledger
+from jaxbiped.measure._footsteps import Footsteps, footsteps
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._simulate import Simulation
@@ -64,7 +64,7 @@ class Walk:
             request = self._request(scene, state)
         self.output.check()
         began = time.perf_counter()
-        trajectory, seconds = _simulated(request)
+        trajectory, seconds = _simulate(request)
         wall = {
             "import": imported - _clock.IMPORT_BEGAN,
             "compile": time.perf_counter() - began - seconds,
@@ -126,7 +126,7 @@ class Walk:
         report.finish(numbers)
 
 
-def _simulated(request: Simulation) -> tuple[Trajectory, float]:
+def _simulate(request: Simulation) -> tuple[Trajectory, float]:
     """The trajectory, and how long the solve took once it was compiled [s]."""
     most = room = request.max_solver_steps
     if request.engine == "xla" and request.dt is None:
@@ -152,7 +152,7 @@ def _run(request: Simulation) -> tuple[Trajectory, float]:
 def write_outputs(scene: Any, trajectory: Trajectory, out: Path) -> list[Path]:
     """Writes the figures, the animation and the trajectory; returns their paths."""
     from jaxbiped import plot
-    from jaxbiped.gait._dataset import trajectory_dataset
+    from jaxbiped.measure._dataset import trajectory_dataset
 
     figures: dict[str, Callable[..., Any]] = {
         "strobe.png": plot.gait_strobe,

@@ -17,15 +17,9 @@ from jaxbiped._checks import (
 )
 from jaxbiped._types import as_float
 from jaxbiped.cli._default_start import default_start
+from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._catalogue import (
-    FRICTION_LAWS,
-    NORMAL_LAWS,
-    friction_law_like,
-    normal_law_like,
-)
-from jaxbiped.scene._constraint_methods import method_named
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
@@ -33,6 +27,12 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
+from jaxbiped.scene.laws._catalogue import (
+    FRICTION_LAWS,
+    NORMAL_LAWS,
+    friction_law_like,
+    normal_law_like,
+)
 
 _SEED = {
     parameter.name: parameter.default for parameter in signature(seed_scene).parameters.values()
@@ -127,7 +127,7 @@ class SceneOptions:
     def _compliant(self) -> Scene:
         own = seed_scene(**{name: getattr(self, name) for name in _SEED})
         normal = normal_law_like(
-            _known("normal", self.normal, NORMAL_LAWS),
+            _known_name("normal", self.normal, NORMAL_LAWS),
             K=self.K,
             c=self.c,
             n=self.n,
@@ -135,7 +135,7 @@ class SceneOptions:
             g=self.g,
         )
         friction = friction_law_like(
-            _known("friction", self.friction, FRICTION_LAWS),
+            _known_name("friction", self.friction, FRICTION_LAWS),
             mu_static=self.mu_static,
             mu_kinetic=self.mu_kinetic,
             v0=self.v0,
@@ -156,7 +156,7 @@ class SceneOptions:
         return RigidScene(walker=Walker(**body), ground=Ground(slope=self.slope, g=self.g))
 
 
-def _known(name: str, value: str, known: Iterable[str]) -> str:
+def _known_name(name: str, value: str, known: Iterable[str]) -> str:
     check_choice(name, value, known)
     return value
 

@@ -1,12 +1,12 @@
-"""What `jaxbiped walk` warns of: a walk that is no walk, and numbers not to be relied on."""
+"""Warnings of `jaxbiped walk`: a walk that is no walk, numbers not to be relied on."""
 
 from typing import Any
 
 import numpy as np
 
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.gait._ledger import EnergyLedger
-from jaxbiped.gait._samples import at_steps
+from jaxbiped.measure._energy_ledger import EnergyLedger
+from jaxbiped.measure._samples import at_steps
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._trajectory import Trajectory
 

@@ -1,4 +1,4 @@
-"""What the ground does to both feet."""
+"""Contacts of both feet: kinematics and forces."""
 
 from typing import Any, NamedTuple
 

@@ -1,4 +1,4 @@
-"""Where the feet are, how they move, and which of them touch the ground."""
+"""Feet: where they are, how they move, and which of them touch the ground."""
 
 from typing import Any, NamedTuple
 

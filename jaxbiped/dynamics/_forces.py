@@ -7,8 +7,8 @@ import jax.numpy as jnp
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet
-from jaxbiped.scene._bristle_law import AbstractBristleLaw
-from jaxbiped.scene._frictionless import Frictionless
+from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
+from jaxbiped.scene.laws.friction._frictionless import Frictionless
 
 
 class FootForce(NamedTuple):

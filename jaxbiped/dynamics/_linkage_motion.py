@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._constraints import Heading, constraints_of, masses_of
-from jaxbiped.scene._constraint_method import AbstractConstraintMethod, Constrained
-from jaxbiped.scene._linkage import Linkage
+from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
+from jaxbiped.constraints._linkage import Linkage
+from jaxbiped.constraints._linkage_constraints import Heading, constraints_of, masses_of
 from jaxbiped.scene._linkage_scene import LinkageScene
 
 
@@ -38,7 +38,7 @@ class LinkageMotion(NamedTuple):
     violation: list[Scalar]
 
 
-def moved_under(
+def motion_under(
     linkage: Linkage,
     method: AbstractConstraintMethod,
     q: Sequence[Scalar],
@@ -66,7 +66,7 @@ def linkage_motion(scene: LinkageScene, state: LinkageState) -> LinkageMotion:
     for body in linkage.bodies:
         weight = [body.mass * g for g in scene.gravity]
         applied += [*weight, *[0.0 * body.mass] * (linkage.coordinates - 2)]
-    return moved_under(linkage, scene.method, state.q, state.v, applied)
+    return motion_under(linkage, scene.method, state.q, state.v, applied)
 
 
 def linkage_field(t: Any, state: LinkageState, scene: LinkageScene) -> LinkageState:

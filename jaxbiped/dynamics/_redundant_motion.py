@@ -6,16 +6,21 @@ import jax.numpy as jnp
 
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._constraints import constraints_of, headings_of, point_of, torque_on
+from jaxbiped.constraints._linkage_constraints import (
+    constraints_of,
+    headings_of,
+    point_of,
+    torque_on,
+)
 from jaxbiped.dynamics._feet import feet, feet_of
 from jaxbiped.dynamics._forces import foot_force
-from jaxbiped.dynamics._linkage_motion import LinkageMotion, moved_under
-from jaxbiped.dynamics._motion import Accelerations, accelerations, bristle_rates
+from jaxbiped.dynamics._linkage_motion import LinkageMotion, motion_under
+from jaxbiped.dynamics._minimal_motion import Accelerations, accelerations, bristle_rates
 from jaxbiped.dynamics._redundant_state import Leg, legs_of
-from jaxbiped.scene._bristle_law import AbstractBristleLaw
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._walker_linkage import leg_of
+from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 
 class HipForce(NamedTuple):
@@ -75,8 +80,8 @@ def with_coordinates(state: Any, q: list[Scalar], v: list[Scalar]) -> Any:
 def redundant_motion(scene: RedundantScene, state: Any) -> RedundantMotion:
     """Accelerations and the hip's reaction by the scene's method."""
     q, v = coordinates_of(scene, state)
-    moved = _moved(scene, state)
-    minimal, hip = _minimal(scene, q, v, moved.accelerations)
+    moved = _linkage_motion(scene, state)
+    minimal, hip = _minimal_accelerations(scene, q, v, moved.accelerations)
     (force_x, force_z), half = moved.joint_forces[0], 0.5 * scene.walker.hip_mass
     downhill, weight = _gravity(scene)
     force = HipForce(force_x - half * (hip[0] - downhill), force_z - half * (hip[1] - weight))
@@ -86,7 +91,7 @@ def redundant_motion(scene: RedundantScene, state: Any) -> RedundantMotion:
 def redundant_field(t: Any, state: Any, scene: RedundantScene) -> Any:
     """Time derivative of a redundant state, in the form that `diffrax.ODETerm` takes."""
     _, v = coordinates_of(scene, state)
-    moved = _moved(scene, state)
+    moved = _linkage_motion(scene, state)
     memory = {}
     if isinstance(scene.friction, AbstractBristleLaw):
         memory = bristle_rates(scene.friction, scene, state)
@@ -128,14 +133,16 @@ def _gravity(scene: Any) -> tuple[Scalar, Scalar]:
     return ground.g * jnp.sin(ground.slope), -ground.g * jnp.cos(ground.slope)
 
 
-def _moved(scene: RedundantScene, state: Any) -> LinkageMotion:
+def _linkage_motion(scene: RedundantScene, state: Any) -> LinkageMotion:
     q, v = coordinates_of(scene, state)
     legs = legs_of(scene, state)
     headings = headings_of(scene.linkage, q, v, [(leg.sine, leg.cosine) for leg in legs])
-    return moved_under(scene.linkage, scene.method, q, v, _applied(scene, state, legs), headings)
+    return motion_under(
+        scene.linkage, scene.method, q, v, _applied_forces(scene, state, legs), headings
+    )
 
 
-def _applied(scene: RedundantScene, state: Any, legs: tuple[Leg, Leg]) -> list[Scalar]:
+def _applied_forces(scene: RedundantScene, state: Any, legs: tuple[Leg, Leg]) -> list[Scalar]:
     """Gravity and the ground's forces on each leg, from that leg's own coordinates."""
     walker, linkage = scene.walker, scene.linkage
     body, distance = leg_of(walker)
@@ -158,7 +165,7 @@ def _applied(scene: RedundantScene, state: Any, legs: tuple[Leg, Leg]) -> list[S
     return applied
 
 
-def _minimal(
+def _minimal_accelerations(
     scene: RedundantScene, q: list[Scalar], v: list[Scalar], second: list[Scalar]
 ) -> tuple[Accelerations, tuple[Scalar, Scalar]]:
     """Accelerations in minimal coordinates, and of the hip as leg 1 has it."""

@@ -1,4 +1,4 @@
-"""The state of a walker whose legs have coordinates of their own."""
+"""State in redundant coordinates: each leg has its own."""
 
 from typing import Any, NamedTuple
 
@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._bristles import BristleState
+from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._walker_linkage import leg_of

@@ -1,4 +1,4 @@
-"""Whether real feet could do what the rigid walker assumes."""
+"""Checks of the rigid limit: whether real feet could do what it assumes."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Poincaré sections: where an orbit is looked at, once a turn."""
+"""Poincaré sections: where an orbit is looked at, once a cycle."""
 
 import abc
 from collections.abc import Callable

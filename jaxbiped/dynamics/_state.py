@@ -60,17 +60,17 @@ def exchange_legs(state: Any) -> Any:
     return state._replace(**swapped)
 
 
-def checked_state(state: Any, kind: type = State, name: str = "state") -> Any:
+def check_state(state: Any, kind: type = State, name: str = "state") -> Any:
     """`state` with every leaf a floating-point array of one shape.
 
     Raises:
         ArgumentError: not a `kind`, an entry that is not finite, or leaves of different shapes.
     """
     check_type(name, state, kind)
-    return checked_leaves(state, name)
+    return check_leaves(state, name)
 
 
-def checked_leaves(state: Any, name: str) -> Any:
+def check_leaves(state: Any, name: str) -> Any:
     """`state` with every leaf a floating-point array of one shape; None stays.
 
     Raises:

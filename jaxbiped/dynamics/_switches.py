@@ -1,4 +1,4 @@
-"""Where the vector field or a derivative of it jumps."""
+"""Switches: surfaces where the vector field or a derivative of it jumps."""
 
 from typing import Any, NamedTuple
 

@@ -1,1 +1,16 @@
-"""What a walk consists of: footsteps and energy. Public names are exported by `jaxbiped`."""
+"""Periodic gaits: search, return map, stability, sensitivities, continuation."""
+
+from jaxbiped.gait._continuation import BranchEnd as BranchEnd
+from jaxbiped.gait._find_gaits import Gaits as Gaits
+from jaxbiped.gait._fixed_point_search import Search as Search
+from jaxbiped.gait._gait import Measures as Measures
+from jaxbiped.gait._gradient_modes import AbstractGradient as AbstractGradient
+from jaxbiped.gait._origin import FoundBy as FoundBy
+from jaxbiped.gait._origin import Origin as Origin
+from jaxbiped.gait._origin import OtherGait as OtherGait
+from jaxbiped.gait._return_map import Return as Return
+from jaxbiped.gait._stability import Bifurcation as Bifurcation
+from jaxbiped.variational._hybrid_system import AbstractSystem as AbstractSystem
+from jaxbiped.variational._hybrid_system import RedundantWalking as RedundantWalking
+from jaxbiped.variational._hybrid_system import Rolling as Rolling
+from jaxbiped.variational._hybrid_system import Walking as Walking

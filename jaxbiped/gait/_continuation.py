@@ -112,7 +112,7 @@ def follow_branch(
             length = (1.0 - here[-1]) / tangent[-1]
         # The last step ends on s = 1, the others where the tangent says.
         border = np.eye(len(here))[-1] if length < step else tangent
-        found, quick, failure = _corrected(change, here + length * tangent, border, sizes)
+        found, quick, failure = _correct(change, here + length * tangent, border, sizes)
         if found is not None:
             there, known = found
             ahead = _tangent(known, sizes, tangent)
@@ -157,7 +157,7 @@ def _fold(
         (a, b), (u, v) = lengths[-2:], rises[-2:]
         lengths.append(a - u * (b - a) / (v - u))
         guess = here + lengths[-1] * tangents[0]
-        found, *_ = _corrected(change, guess, tangents[0], sizes)
+        found, *_ = _correct(change, guess, tangents[0], sizes)
         if found is None:
             return []
         point, known = found
@@ -171,7 +171,7 @@ def _branch(path: list[np.ndarray], sizes: np.ndarray, end: BranchEnd, code: int
     return Branch(points[:, :-1], points[:, -1], end, code)
 
 
-def _corrected(
+def _correct(
     change: Callable[[np.ndarray, float], Change],
     guess: np.ndarray,
     border: np.ndarray,

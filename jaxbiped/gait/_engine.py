@@ -1,4 +1,4 @@
-"""Which engine follows the orbits of a search."""
+"""Choice of the engine that follows the orbits of a search."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped.solve._engine import engine_for
-from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 
 def orbit_engine(
@@ -30,13 +30,13 @@ def orbit_engine(
     Raises:
         ArgumentError: an unknown name, or lanes for what they cannot do.
     """
-    obstacle = _obstacle(solver, section, leaves)
+    obstacle = _hindrance(solver, section, leaves)
     if redundant:
         obstacle = "redundant coordinates are diffrax's"
     return engine_for(engine, obstacle=obstacle, prefers_xla=own_system)
 
 
-def _obstacle(solver: Any, section: Any, leaves: Any) -> str | None:
+def _hindrance(solver: Any, section: Any, leaves: Any) -> str | None:
     if not isinstance(solver, AbstractRosenbrock):
         return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
     if jtu.tree_leaves(section):

@@ -1,10 +1,10 @@
-"""What a search for a gait says of itself, in a sentence."""
+"""Explanation of a search for a gait, in a sentence."""
 
 from typing import Any
 
 from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._search import Search
 from jaxbiped.scene._parameters import parameter_values
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._ending import Ending
@@ -21,7 +21,7 @@ def explain_search(scene: Any, gait: Gait) -> str:
         gait: what `find_gait` returned for it.
     """
     if gait.outcome is not Search.FOUND:
-        return f"no gait found: {_why(gait)}{_branch(scene, gait)}"
+        return f"no gait found: {_search_sentence(gait)}{_branch(scene, gait)}"
     text = f"found by {gait.found_by}"
     if gait.others:
         seen = ", ".join(
@@ -34,7 +34,7 @@ def explain_search(scene: Any, gait: Gait) -> str:
     return text
 
 
-def _why(gait: Gait) -> str:
+def _search_sentence(gait: Gait) -> str:
     if gait.outcome is Search.NO_RETURN:
         return f"the walk from the start ends ({gait.walk_outcome})"
     if gait.outcome is Search.NO_WALK:
@@ -55,7 +55,7 @@ def _branch(scene: Any, gait: Gait) -> str:
         )
     if end is BranchEnd.NO_BEGINNING:
         return "; the seed's walker has no gait under these laws, from which one could be followed"
-    place = _place(modelled, gait.origin.nearest)
+    place = _differing_parameters(modelled, gait.origin.nearest)
     if end is BranchEnd.FOLD:
         return f"; the branch of the seed's gait turns back at a fold at {place}, which has one"
     if end is BranchEnd.WALK_ENDS:
@@ -81,7 +81,7 @@ _HOW = {
 }
 
 
-def _place(scene: Any, nearest: Any) -> str:
+def _differing_parameters(scene: Any, nearest: Any) -> str:
     """The parameters of `nearest` that are not those of `scene`."""
     asked, there = parameter_values(scene), parameter_values(nearest)
     moved = [name for name in asked if float(asked[name]) != float(there[name])]

@@ -1,4 +1,4 @@
-"""The search for the walker's periodic gait."""
+"""Search for a periodic gait of a scene."""
 
 import dataclasses
 import functools
@@ -17,30 +17,30 @@ from jaxtyping import PyTree
 from jaxbiped._checks import check_choice, check_count, check_type, check_unbatched
 from jaxbiped._progress import stage
 from jaxbiped._types import as_float
-from jaxbiped.dynamics._bristles import state_for
-from jaxbiped.dynamics._consistent import consistent_state
+from jaxbiped.compiler import deferred_checks
+from jaxbiped.dynamics._bristle_state import state_for
+from jaxbiped.dynamics._consistent_state import consistent_state
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import checked_state
+from jaxbiped.dynamics._state import check_state
+from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._engine import orbit_engine
-from jaxbiped.gait._gait import Gait, described
+from jaxbiped.gait._fixed_point_search import Found, Search, search
+from jaxbiped.gait._gait import Gait, summarise_gait
 from jaxbiped.gait._newton import Method
-from jaxbiped.gait._origin import FoundBy, Origin, plain_origin
+from jaxbiped.gait._origin import FoundBy, Origin, single_stage_origin
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
-from jaxbiped.gait._search import Found, Search, search
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._search_along import search_along
-from jaxbiped.gait._seed_start import seed_start
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
-from jaxbiped.gait._system import RedundantWalking, checked_section, system_of
-from jaxbiped.gait._turn import Turning
-from jaxbiped.lanes._call import lowered_ahead
-from jaxbiped.scene._parameters import chosen_parameters
+from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._projected import projecting
+from jaxbiped.solve._projected_solver import with_projection
+from jaxbiped.variational._hybrid_system import RedundantWalking, section_of, system_of
 
 _RESIDUAL_SHARE = 0.3
 """Residual that counts as none, in units of the state's tolerance."""
@@ -58,7 +58,7 @@ def find_gait(
     accuracy: str = "balanced",
     method: Literal["newton", "optax"] = "newton",
     optimiser: optax.GradientTransformation | None = None,
-    most_turns: int | None = None,
+    max_evaluations: int | None = None,
     radius_sensitivities: bool = True,
     solver: str | diffrax.AbstractSolver | None = None,
     engine: str = "auto",
@@ -90,7 +90,7 @@ def find_gait(
         accuracy: "balanced" or "tight".
         method: "newton", or "optax" to minimise the squared residual by gradient.
         optimiser: for "optax"; Adam with a rate of 1e-2 unless given.
-        most_turns: cycles allowed, and no stages beyond the first; unless given, 40 in each
+        max_evaluations: cycles allowed, and no stages beyond the first; unless given, 40 in each
             search by "newton", 400 by "optax".
         radius_sensitivities: whether to differentiate the spectral radius, which takes second
             derivatives of the motion.
@@ -111,17 +111,17 @@ def find_gait(
     check_count("period", period)
     check_unbatched("scene", scene)
     rigid = isinstance(scene, RigidScene)
-    start = _checked_start(scene, seed_start(scene) if guess is None else guess)
+    start = _check_start(scene, default_guess(scene) if guess is None else guess)
     check_unbatched("guess", start, "one state")
-    most = (40 if method == "newton" else 400) if most_turns is None else most_turns
-    check_count("most_turns", most)
+    most = (40 if method == "newton" else 400) if max_evaluations is None else max_evaluations
+    check_count("max_evaluations", most)
     scene = jtu.tree_map(as_float, scene)
     # A redundant scene's leaves begin with those of what it models.
     modelled = scene.scene if isinstance(scene, RedundantScene) else scene
-    names, active = chosen_parameters(modelled, parameters)
+    names, active = select_parameters(modelled, parameters)
     precision = precision_of(accuracy, scene)
     method_of_steps = orbit_solver(solver, rigid=rigid)
-    section = checked_section(scene, section)
+    section = section_of(scene, section)
     chosen = orbit_engine(
         engine,
         solver=method_of_steps,
@@ -129,40 +129,40 @@ def find_gait(
         leaves=(scene, start),
         redundant=isinstance(scene, RedundantScene),
     )
-    turning = _turning(
+    spec = _return_map_spec(
         scene, section, method_of_steps, chosen, steps=int(period), most=MOST_SOLVER_STEPS[accuracy]
     )
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
-        most_turns=int(most),
+        max_evaluations=int(most),
         residual=_RESIDUAL_SHARE * precision.rtol,
         patience=np.asarray(int(most)),
     )
-    searching = (turning, scene, active, start, precision, how)
+    searching = (spec, scene, active, start, precision, how)
     describing = (names, active, radius_sensitivities)
     by = FoundBy.GUESS if guess is not None else FoundBy.START
-    origin = plain_origin(modelled, start, by)
-    staged = guess is None and most_turns is None and method == "newton"
+    origin = single_stage_origin(modelled, start, by)
+    staged = guess is None and max_evaluations is None and method == "newton"
     if _is_traced(searching):
         if staged:
             found, origin = search_along(*searching, origin)
         else:
             found = search(*searching)
-        return described(turning, scene, start, found, *describing, origin)
+        return summarise_gait(spec, scene, start, found, *describing, origin)
     _compile_once(searching, describing, origin)
-    found = _searched(*searching)
+    found = _search(*searching)
     if staged and not _is_stable(found):
         found, origin = _search_on(searching, modelled, found, engine)
-    return described(turning, scene, start, found, *describing, origin)
+    return summarise_gait(spec, scene, start, found, *describing, origin)
 
 
-def _turning(
+def _return_map_spec(
     scene: Any, section: AbstractSection, solver: Any, engine: str, *, steps: int, most: int
-) -> Turning:
+) -> ReturnMapSpec:
     within = None
     if isinstance(scene, RedundantScene):
-        solver, within = projecting(scene, solver), RedundantWalking()
-    return Turning(
+        solver, within = with_projection(scene, solver), RedundantWalking()
+    return ReturnMapSpec(
         system=system_of(scene),
         section=section,
         solver=solver,
@@ -183,21 +183,21 @@ def _search_on(
     searching: tuple, modelled: Scene | RigidScene, first: Found, engine: str
 ) -> tuple[Found, Origin]:
     """The stages of a search beyond the first."""
-    turning, scene, active, start, precision, how = searching
+    spec, scene, active, start, precision, how = searching
     solver = orbit_solver(None, rigid=isinstance(modelled, RigidScene))
-    section = checked_section(modelled, None)
+    section = section_of(modelled, None)
     if isinstance(scene, RedundantScene):
         engine = "auto"
     scout_engine = orbit_engine(engine, solver=solver, section=section, leaves=(modelled, start))
-    scout = _turning(
+    scout = _return_map_spec(
         modelled, section, solver, scout_engine, steps=1, most=MOST_SOLVER_STEPS["balanced"]
     )
 
-    def search_from(turning: Turning, scene: Any, start: Any, most_turns: int) -> Found:
-        hasty = dataclasses.replace(how, patience=np.asarray(min(most_turns, how.most_turns)))
-        return _searched(turning, scene, active, start, precision, hasty)
+    def search_from(spec: ReturnMapSpec, scene: Any, start: Any, patience: int) -> Found:
+        hasty = dataclasses.replace(how, patience=np.asarray(min(patience, how.max_evaluations)))
+        return _search(spec, scene, active, start, precision, hasty)
 
-    staged = search_in_stages(search_from, turning, scout, scene, modelled, first)
+    staged = search_in_stages(search_from, spec, scout, scene, modelled, first)
     if staged.best is not None:
         found = staged.best.found
     elif int(first.ending) == int(Search.FOUND):
@@ -207,9 +207,9 @@ def _search_on(
     return found, origin_of(staged, modelled, start)
 
 
-def _checked_start(scene: Any, start: Any) -> Any:
+def _check_start(scene: Any, start: Any) -> Any:
     if isinstance(scene, RigidScene):
-        return checked_state(start, RigidState, "guess")
+        return check_state(start, RigidState, "guess")
     if isinstance(scene, RedundantScene):
         return minimal_state(scene, consistent_state(scene, start).state)
     return state_for(scene, start, "guess")
@@ -231,14 +231,14 @@ def _compile_once(searching: tuple, describing: tuple, origin: Origin) -> None:
 
 def _compile(searching: tuple, describing: tuple, origin: Origin) -> None:
     """Compiles both programs, and what lanes run for them, at the same time."""
-    turning, scene, _, start, *_ = searching
-    nothing = _nothing(eqx.filter_eval_shape(_searched, *searching))
-    first: Any = _searched
-    second: Any = described
+    spec, scene, _, start, *_ = searching
+    nothing = _empty_arrays(eqx.filter_eval_shape(_search, *searching))
+    first: Any = _search
+    second: Any = summarise_gait
     with ThreadPoolExecutor() as meanwhile:
-        with lowered_ahead() as programs:
+        with deferred_checks() as programs:
             # What takes lanes longest begins first.
-            lowered = second.lower(turning, scene, start, nothing, *describing, origin)
+            lowered = second.lower(spec, scene, start, nothing, *describing, origin)
             ready = [meanwhile.submit(lowered.compile)]
             ready.append(meanwhile.submit(first.lower(*searching).compile))
         for program in programs:
@@ -264,14 +264,14 @@ def _is_traced(tree: PyTree) -> bool:
 
 
 @eqx.filter_jit
-def _searched(*searching: Any) -> Found:
+def _search(*searching: Any) -> Found:
     # Without weak types, which would make the next program another one than was compiled.
     return jtu.tree_map(
         lambda leaf: jax.lax.convert_element_type(leaf, leaf.dtype), search(*searching)
     )
 
 
-def _nothing(shape: PyTree) -> PyTree:
+def _empty_arrays(shape: PyTree) -> PyTree:
     """Arrays of these shapes that hold nothing."""
     return jtu.tree_map(
         # Made by NumPy: JAX would compile a program for every shape.

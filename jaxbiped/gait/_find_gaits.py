@@ -14,8 +14,8 @@ from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._search import Search
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
@@ -61,7 +61,7 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
             f"starts has leaves of shapes {sorted(shapes)}: they must all be (n,), n at least 1."
         )
 
-    gaits = _every(jtu.tree_map(as_float, scene), jtu.tree_map(as_float, starts), options)
+    gaits = _find_each(jtu.tree_map(as_float, scene), jtu.tree_map(as_float, starts), options)
     no_walk = (gaits.ending == int(Search.FOUND)) & ~gaits.sound
     ending = jnp.where(no_walk, int(Search.NO_WALK), gaits.ending)
     gaits = dataclasses.replace(gaits, ending=ending)
@@ -79,7 +79,7 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
 
 
 @eqx.filter_jit
-def _every(scene: Scene | RigidScene, starts: Any, options: dict[str, Any]) -> Gait:
+def _find_each(scene: Scene | RigidScene, starts: Any, options: dict[str, Any]) -> Gait:
     def one(start: Any) -> Gait:
         return find_gait(scene, start, parameters=(), radius_sensitivities=False, **options)
 

@@ -1,4 +1,4 @@
-"""What is known of a periodic gait, found or not."""
+"""Periodic gait: its state, measures, stability and sensitivities, found or not."""
 
 from typing import Any, NamedTuple
 
@@ -10,12 +10,13 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
+from jaxbiped.compiler import Recording
+from jaxbiped.gait._fixed_point_search import Found, Search
 from jaxbiped.gait._orbit import Orbit, orbit_of
 from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
-from jaxbiped.gait._search import Found, Search
+from jaxbiped.gait._poincare_map import LinearisedReturn
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.gait._turn import Turn, Turning
-from jaxbiped.lanes._call import Recording
 from jaxbiped.solve._ending import Ending
 
 _NOTHING = 1e-9
@@ -70,7 +71,7 @@ class Gait(eqx.Module):
         sensitivity_errors: their estimated errors: what a ten times looser solve changes.
         elasticities: d log |measure| / d log parameter, leaves of shape (p,); zero for a parameter
             that is zero, NaN for a measure that is.
-        turns: cycles that the search took.
+        evaluations: evaluations of the return map that the search took.
         history: residual of each of them, NaN beyond the last.
         solver_steps: solver steps attempted in the last cycle.
         sound: whether the orbit is a walk: no foot deep underground, and a step downhill (boolean).
@@ -95,7 +96,7 @@ class Gait(eqx.Module):
     sensitivities: Measures
     sensitivity_errors: Measures
     elasticities: Measures
-    turns: Scalar
+    evaluations: Scalar
     history: Scalar
     solver_steps: Scalar
     sound: Scalar
@@ -138,8 +139,8 @@ class Gait(eqx.Module):
 
 
 @eqx.filter_jit
-def described(
-    turning: Turning,
+def summarise_gait(
+    spec: ReturnMapSpec,
     scene: Any,
     start: Any,
     found: Found,
@@ -149,7 +150,7 @@ def described(
     origin: Origin,
 ) -> Gait:
     """The gait that a search from `start` found, with its stability and its derivatives."""
-    orbit = orbit_of(turning, scene, active, start, found, radius=radius)
+    orbit = orbit_of(spec, scene, active, start, found, radius=radius)
     stability = orbit.stability
     last, m = found.last, found.recurring.shape[0]
     lost = found.ending == int(Search.NO_RETURN)
@@ -190,18 +191,18 @@ def described(
         sensitivities=known(jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes)),
         sensitivity_errors=known(jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), errors)),
         elasticities=known(_elasticities(scene, active, measures, slopes)),
-        turns=found.turns,
+        evaluations=found.evaluations,
         history=found.history,
         solver_steps=last.attempted,
         sound=found.sound,
         origin=jtu.tree_map(jnp.asarray, origin),
         orbit=_path(last, start),
         parameters=names,
-        engine=turning.engine,
+        engine=spec.engine,
     )
 
 
-def _path(last: Turn, like: Any) -> tuple[Scalar, Any]:
+def _path(last: LinearisedReturn, like: Any) -> tuple[Scalar, Any]:
     """Times and states of a cycle's nodes, leaves of shape (footsteps, nodes); NaN beyond them."""
     nodes = last.nodes
     assert nodes is not None

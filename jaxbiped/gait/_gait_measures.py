@@ -1,4 +1,4 @@
-"""Measures of the periodic gait as a function of the scene that JAX can differentiate."""
+"""Gait measures as a function of the scene that JAX can differentiate."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,13 +16,13 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
-from jaxbiped.gait._gradient import AbstractGradient, Implicit
+from jaxbiped.gait._gradient_modes import AbstractGradient, Implicit
 from jaxbiped.gait._return_map import Return, return_map
-from jaxbiped.scene._parameters import chosen_parameters
+from jaxbiped.linalg._elimination import solution
+from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._elimination import solution
 
 
 def gait_measures(
@@ -73,7 +73,7 @@ def gait_measures(
     if implicit:
         return _by_theorem(scene, gait)
 
-    def turn(state: State | RigidState) -> Return:
+    def once_from(state: State | RigidState) -> Return:
         return return_map(
             scene,
             state,
@@ -84,25 +84,27 @@ def gait_measures(
             engine=engine,
         )
 
-    return _by_correction(gait, turn)
+    return _by_correction(gait, once_from)
 
 
 def _by_theorem(scene: Scene | RigidScene | RedundantScene, gait: Gait) -> Measures:
     modelled = scene.scene if isinstance(scene, RedundantScene) else scene
-    _, active = chosen_parameters(modelled, gait.parameters)
+    _, active = select_parameters(modelled, gait.parameters)
     leaves = jtu.tree_leaves(modelled)
     parameters = jnp.stack([leaves[i] for i in active])
-    return _where_found(gait, _attached(gait.measures, gait.sensitivities, parameters))
+    return _nan_unless_found(
+        gait, _attach_derivatives(gait.measures, gait.sensitivities, parameters)
+    )
 
 
 @eqx.filter_custom_jvp
-def _attached(values: Measures, slopes: Measures, parameters: Scalar) -> Measures:
+def _attach_derivatives(values: Measures, slopes: Measures, parameters: Scalar) -> Measures:
     """The values, with derivatives known beforehand: linear, so both modes follow from it."""
     return values
 
 
-@_attached.def_jvp
-def _attached_jvp(primals: tuple, tangents: tuple) -> tuple[Measures, Measures]:
+@_attach_derivatives.def_jvp
+def _attach_derivatives_jvp(primals: tuple, tangents: tuple) -> tuple[Measures, Measures]:
     values, slopes, _ = primals
     moved = tangents[2]
     # A second derivative would need slopes that are themselves differentiated.
@@ -113,10 +115,10 @@ def _attached_jvp(primals: tuple, tangents: tuple) -> tuple[Measures, Measures]:
 _SECOND = "gait_measures by Implicit(), which has first derivatives only; a second"
 
 
-def _by_correction(gait: Gait, turn: Callable[[Any], Return]) -> Measures:
+def _by_correction(gait: Gait, once_from: Callable[[Any], Return]) -> Measures:
     """Newton's correction at the gait changes nothing but has the gait's derivatives."""
     state = gait.measures.state
-    once = turn(state)
+    once = once_from(state)
     recurring = state._fields[1:]
     change = jnp.stack([getattr(once.state, n) - getattr(state, n) for n in recurring])
     size = len(recurring)
@@ -125,10 +127,10 @@ def _by_correction(gait: Gait, turn: Callable[[Any], Return]) -> Measures:
     by_period, by_length = gait.return_jacobian[size:]
     time, length = once.time + by_period @ step, once.state.hip_x + by_length @ step
     measures = Measures(time, length, length / time, None, None, state._replace(**moved))
-    return _where_found(gait, measures)
+    return _nan_unless_found(gait, measures)
 
 
-def _where_found(gait: Gait, measures: Measures) -> Measures:
+def _nan_unless_found(gait: Gait, measures: Measures) -> Measures:
     # A factor, not a choice: derivatives become NaN as well.
     factor = jnp.where(gait.ending == 0, 1.0, jnp.nan)
     return jtu.tree_map(lambda leaf: leaf * factor, measures)

@@ -11,16 +11,16 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.scene._catalogue import (
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene.laws._catalogue import (
     FRICTION_LAWS,
     NORMAL_LAWS,
     friction_law_like,
     normal_law_like,
 )
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._seed import seed_scene
 
 
 class Homotopy(NamedTuple):
@@ -35,15 +35,15 @@ class Homotopy(NamedTuple):
 
     def at(self, s: Any) -> Any:
         """The scene at s; beyond 1 the line goes on."""
-        return jtu.tree_map(lambda a, b: _between(a, b, s)[0], self.first, self.last)
+        return jtu.tree_map(lambda a, b: _interpolate(a, b, s)[0], self.first, self.last)
 
     def slopes(self, s: Any) -> Scalar:
         """Derivatives of the scene's leaves with respect to s, shape (leaves,)."""
         pairs = zip(jtu.tree_leaves(self.first), jtu.tree_leaves(self.last), strict=True)
-        return jnp.stack([_between(a, b, s)[1] for a, b in pairs])
+        return jnp.stack([_interpolate(a, b, s)[1] for a, b in pairs])
 
 
-def _between(a: Any, b: Any, s: Any) -> tuple[Any, Any]:
+def _interpolate(a: Any, b: Any, s: Any) -> tuple[Any, Any]:
     """The number at s between `a` and `b`, and its derivative with respect to s."""
     geometric = (a > 0.0) & (b > 0.0)
     ratio = jnp.where(geometric, b, 1.0) / jnp.where(geometric, a, 1.0)

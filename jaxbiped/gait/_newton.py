@@ -1,4 +1,4 @@
-"""Newton's method with affine-invariant damping: a turn is judged, the next trial proposed.
+"""Newton's method with affine-invariant damping: a trial is judged, the next one proposed.
 
 A step is measured by Newton's own correction ("natural level function"), not by the residual: the
 fast directions of contact make the residual a poor guide. Deuflhard, Newton Methods for Nonlinear
@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import optax
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._small_matrices import solved
-from jaxbiped.gait._turn import Turn
+from jaxbiped.gait._poincare_map import LinearisedReturn
+from jaxbiped.linalg._small_matrices import solve
 
 _NEAR, _NEARER = 1e-3, 1e-4
 """Residuals at which rough solves give way to coarse ones, and these to fine ones."""
@@ -29,20 +29,20 @@ class Method(eqx.Module):
     Attributes:
         optimiser: of the squared residual, by its gradient; None for Newton's method, damped by
             its natural level function.
-        most_turns: turns for whose history there is room.
-        patience: turns allowed, at most as many; None for as many.
-        residual: largest change of a recurring component over a turn that counts as none.
+        max_evaluations: evaluations for whose history there is room.
+        patience: evaluations allowed, at most as many; None for as many.
+        residual: largest change of a recurring component over a cycle that counts as none.
     """
 
     optimiser: optax.GradientTransformation | None = eqx.field(static=True)
-    most_turns: int = eqx.field(static=True)
+    max_evaluations: int = eqx.field(static=True)
     residual: Any
     patience: Any = None
 
     @property
-    def turns_allowed(self) -> Any:
-        """How many turns a search may take."""
-        return self.most_turns if self.patience is None else self.patience
+    def evaluations_allowed(self) -> Any:
+        """How many evaluations of the return map a search may take."""
+        return self.max_evaluations if self.patience is None else self.patience
 
 
 class Stage(enum.IntEnum):
@@ -62,14 +62,14 @@ class Progress(NamedTuple):
 
     Attributes:
         stage: code of a `Stage`.
-        trial: the m recurring components to turn from next.
-        base: the last accepted; `base_residual` the largest change over its turn `base_turn`,
+        trial: the m recurring components to follow next.
+        base: the last accepted; `base_residual` the largest change over its cycle `base_return`,
             `slope` the derivatives of its changes with respect to the components (m, m), `step`
             Newton's correction of it.
         damping: share of the step that `trial` took.
-        coarse: the last looser turn.
+        coarse: the last looser return.
         optimiser: its state.
-        code, turns, history: as in `Found`.
+        code, evaluations, history: as in `Found`.
     """
 
     stage: Scalar
@@ -78,19 +78,21 @@ class Progress(NamedTuple):
     base_residual: Scalar
     slope: Scalar
     step: Scalar
-    base_turn: Turn
+    base_return: LinearisedReturn
     damping: Scalar
-    coarse: Turn
+    coarse: LinearisedReturn
     optimiser: Any
     code: Scalar
-    turns: Scalar
+    evaluations: Scalar
     history: Scalar
 
 
-def begun(first: Scalar, off: Scalar, method: Method, nothing: Turn) -> Progress:
-    """Before the first turn, from components that are `off` the section by so much.
+def initial_progress(
+    first: Scalar, off: Scalar, method: Method, nothing: LinearisedReturn
+) -> Progress:
+    """Before the first return, from components that are `off` the section by so much.
 
-    `nothing` is in the place of a turn.
+    `nothing` is in the place of a return.
     """
     on_section = off < 1e-9
     stage = jnp.where(on_section, int(Stage.ROUGH), int(Stage.APPROACH))
@@ -101,38 +103,38 @@ def begun(first: Scalar, off: Scalar, method: Method, nothing: Turn) -> Progress
         base_residual=jnp.asarray(jnp.inf),
         slope=jnp.eye(len(first)),
         step=jnp.zeros_like(first),
-        base_turn=nothing,
+        base_return=nothing,
         damping=jnp.asarray(1.0),
         coarse=nothing,
         optimiser=None if method.optimiser is None else method.optimiser.init(first),
         code=jnp.asarray(0),
-        turns=jnp.asarray(0),
-        history=jnp.full(method.most_turns, jnp.nan),
+        evaluations=jnp.asarray(0),
+        history=jnp.full(method.max_evaluations, jnp.nan),
     )
 
 
-def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
-    """One turn further: judge the trial, and propose the next."""
+def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) -> Progress:
+    """One evaluation further: judge the trial, and propose the next."""
     returned = latest.code == 0
     change = latest.recurring - now.trial
     residual = jnp.where(returned, jnp.max(jnp.abs(change)), jnp.inf)
-    history = now.history.at[now.turns].set(residual)
+    history = now.history.at[now.evaluations].set(residual)
     approaching = now.stage == Stage.APPROACH
     if method.optimiser is not None:
         forward = jnp.asarray(True)
         simplified = jnp.zeros_like(change)
     else:
-        simplified = -solved(now.slope, change)
+        simplified = -solve(now.slope, change)
         forward = jnp.isinf(now.base_residual) | (_size(simplified) < _size(now.step))
     better = returned & ~approaching & forward
 
     base = jnp.where(better, now.trial, now.base)
     base = jnp.where(approaching & returned, latest.recurring, base)
     m = len(base)
-    base_residual, slope, base_turn = chosen(
+    base_residual, slope, base_return = select(
         better,
         (residual, latest.jacobian[:, :m] - jnp.eye(m), latest),
-        (now.base_residual, now.slope, now.base_turn),
+        (now.base_residual, now.slope, now.base_return),
     )
     rough_done = (now.stage == Stage.ROUGH) & (base_residual <= _NEAR)
     coarse_done = (now.stage == Stage.COARSE) & (base_residual <= _NEARER)
@@ -140,11 +142,11 @@ def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
     fine_done = (now.stage == Stage.FINE) & (base_residual <= method.residual)
     nowhere = ~returned & ~jnp.isfinite(base_residual) & (now.stage < Stage.COARSE)
     if method.optimiser is not None:
-        step, optimiser = _optimised(now, base, change, slope, better, method.optimiser)
+        step, optimiser = _descent_step(now, base, change, slope, better, method.optimiser)
         damping = jnp.asarray(1.0)
     else:
-        step = jnp.where(better, -solved(slope, change), now.step)
-        damping, optimiser = _damped(now, step, simplified, returned, better), now.optimiser
+        step = jnp.where(better, -solve(slope, change), now.step)
+        damping, optimiser = _damping_factor(now, step, simplified, returned, better), now.optimiser
     damping = jnp.where(refined | approaching, 1.0, damping)
     stuck = (damping < _SMALLEST_DAMPING) | (better & ~jnp.all(jnp.isfinite(step)))
     stage = jnp.where(approaching, int(Stage.ROUGH), now.stage)
@@ -161,17 +163,17 @@ def progressed(now: Progress, latest: Turn, method: Method) -> Progress:
         base_residual=jnp.where(refined, jnp.inf, base_residual),
         slope=slope,
         step=step,
-        base_turn=base_turn,
+        base_return=base_return,
         damping=damping,
-        coarse=chosen(coarse_done, base_turn, now.coarse),
+        coarse=select(coarse_done, base_return, now.coarse),
         optimiser=optimiser,
         code=jnp.where(returned, now.code, latest.code),
-        turns=now.turns + 1,
+        evaluations=now.evaluations + 1,
         history=history,
     )
 
 
-def _damped(
+def _damping_factor(
     now: Progress, step: Scalar, simplified: Scalar, returned: Scalar, better: Scalar
 ) -> Scalar:
     """Share of `step` to try next, from what the last trial told of the map's nonlinearity."""
@@ -194,7 +196,7 @@ def _size(step: Scalar) -> Scalar:
     return jnp.sqrt(jnp.sum(step * step))
 
 
-def _optimised(
+def _descent_step(
     now: Progress,
     base: Scalar,
     change: Scalar,
@@ -210,6 +212,6 @@ def _optimised(
     return jnp.where(better, step, 0.5 * (now.trial - base)), state
 
 
-def chosen(condition: Scalar, new: Any, old: Any) -> Any:
+def select(condition: Scalar, new: Any, old: Any) -> Any:
     """One of two trees of the same structure."""
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b), new, old)

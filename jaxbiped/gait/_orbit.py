@@ -1,4 +1,4 @@
-"""A periodic orbit, its stability and its sensitivities."""
+"""Periodic orbit: its stability and its sensitivities."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,11 +8,12 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._search import Found
-from jaxbiped.gait._second_turn import second_turn
-from jaxbiped.gait._small_matrices import eigen, inverted, solved
+from jaxbiped.gait._fixed_point_search import Found
+from jaxbiped.gait._poincare_map import LinearisedReturn, seed_directions, state_with
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.gait._stability import Stability, stability_of
-from jaxbiped.gait._turn import Turn, Turning, seeded, state_with
+from jaxbiped.linalg._small_matrices import eigenpairs, invert, solve
 
 CLOSENESS = 1e-3
 """Distance of a multiplier from the unit circle that is flagged as a bifurcation."""
@@ -24,7 +25,7 @@ class Slopes(NamedTuple):
     Attributes:
         recurring: of the m recurring components on the section, shape (m, p).
         period: of the period, shape (p,).
-        advance: of what the drifting components gain in a turn, shape (d, p).
+        advance: of what the cyclic coordinates gain in a cycle, shape (d, p).
         peak: of the largest load, shape (p,).
     """
 
@@ -38,7 +39,7 @@ class Orbit(NamedTuple):
     """A periodic orbit of a system with m recurring components and d drifting ones.
 
     Attributes:
-        found: how the search went, and the last turn.
+        found: how the search went, and the last return.
         state: the state on the section, its drifting components zero.
         stability: its Floquet multipliers.
         slopes: its derivatives by the parameters; `slope_errors` their estimated errors.
@@ -58,7 +59,7 @@ class Orbit(NamedTuple):
 
 
 def orbit_of(
-    turning: Turning,
+    spec: ReturnMapSpec,
     args: PyTree,
     active: tuple[int, ...],
     guess: PyTree,
@@ -70,7 +71,7 @@ def orbit_of(
 
     `radius` asks for the derivatives of the spectral radius as well.
     """
-    state = state_with(turning.system, guess, found.recurring)
+    state = state_with(spec.system, guess, found.recurring)
     m = found.recurring.shape[0]
     last, coarse = found.last, found.coarse
     monodromy, witness = last.monodromy[:, :m], coarse.monodromy[:, :m]
@@ -79,29 +80,29 @@ def orbit_of(
     # Where the force itself jumped on the section, columns lack the jump's own correction.
     slopes = jax.tree.map(lambda leaf: jnp.where(last.missed > 0, jnp.nan, leaf), slopes)
     errors = jax.tree.map(lambda a, b: jnp.abs(a - b), slopes, looser)
-    _, sizes = seeded(args, active, m)
+    _, sizes = seed_directions(args, active, m)
     radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
-    if _bends(turning, active, radius):
+    if _second_derivatives(spec, active, radius):
         # Lanes take both at once; XLA would compute in lockstep and compile for longer.
-        each_of = jax.vmap if turning.engine == "lanes" else _one_by_one
+        each_of = jax.vmap if spec.engine == "lanes" else _map_over_rows
         radius_slopes, looser_slopes = each_of(
-            lambda each: _radius_slopes(turning, args, active, guess, each)
+            lambda each: _radius_slopes(spec, args, active, guess, each)
         )(found.both)
         radius_errors = jnp.abs(radius_slopes - looser_slopes)
     return Orbit(found, state, stability, slopes, errors, radius_slopes, radius_errors, sizes)
 
 
-def _bends(turning: Turning, active: tuple[int, ...], radius: bool) -> bool:
+def _second_derivatives(spec: ReturnMapSpec, active: tuple[int, ...], radius: bool) -> bool:
     """Whether second derivatives are wanted and can be had."""
-    differentiable = turning.steps == 1 or turning.system.renews_by_symmetry
+    differentiable = spec.steps == 1 or spec.system.reset_is_symmetry
     return radius and bool(active) and differentiable
 
 
-def slopes_of(last: Turn) -> Slopes:
+def slopes_of(last: LinearisedReturn) -> Slopes:
     """x(p) = P(x(p), p) differentiated: dx = (I − P_x)⁻¹ P_p, and all else by the chain rule."""
     m = last.recurring.shape[0]
     by_state, by_parameter = last.jacobian[:, :m], last.jacobian[:, m:]
-    recurring = solved(jnp.eye(m) - by_state, by_parameter)
+    recurring = solve(jnp.eye(m) - by_state, by_parameter)
 
     def total(rows: Scalar) -> Scalar:
         return rows[..., m:] + rows[..., :m] @ recurring
@@ -110,7 +111,7 @@ def slopes_of(last: Turn) -> Slopes:
 
 
 def _radius_slopes(
-    turning: Turning, args: PyTree, active: tuple[int, ...], like: PyTree, last: Turn
+    spec: ReturnMapSpec, args: PyTree, active: tuple[int, ...], like: PyTree, last: LinearisedReturn
 ) -> Scalar:
     """Derivatives of the leading multiplier's absolute value, shape (p,).
 
@@ -118,26 +119,28 @@ def _radius_slopes(
     """
     m = last.recurring.shape[0]
     jacobian = last.jacobian[:, :m]
-    vector, left = _leading(jacobian)
+    vector, left = _leading_eigenvectors(jacobian)
     value = left @ (jacobian.astype(vector.dtype) @ vector)
     # d|λ| is the real part of dλ in the direction of λ.
     weight = jnp.conj(value) * left
     turned = jnp.stack([vector.real, vector.imag])
     weights = jnp.stack([weight.real, -weight.imag]) / jnp.abs(value)
     family = slopes_of(last).recurring
-    seeds, sizes = seeded(args, active, m)
-    slopes = second_turn(turning, seeds, like, last, turned, weights, family, sizes)
+    seeds, sizes = seed_directions(args, active, m)
+    slopes = second_variation(spec, seeds, like, last, turned, weights, family, sizes)
     # Second derivatives across a jump of the force itself would need more than its Jacobians'.
     return jnp.where(last.jumps > 0, jnp.nan, slopes)
 
 
-def _one_by_one(function: Callable[[Turn], Scalar]) -> Callable[[Turn], Scalar]:
-    return lambda turns: jax.lax.map(function, turns)
+def _map_over_rows(
+    function: Callable[[LinearisedReturn], Scalar],
+) -> Callable[[LinearisedReturn], Scalar]:
+    return lambda returns: jax.lax.map(function, returns)
 
 
-def _leading(jacobian: Scalar) -> tuple[Scalar, Scalar]:
+def _leading_eigenvectors(jacobian: Scalar) -> tuple[Scalar, Scalar]:
     """Right and left eigenvectors of the largest eigenvalue, wᵀ v = 1."""
     finite = jnp.all(jnp.isfinite(jacobian))
-    values, vectors = eigen(jnp.where(finite, jacobian, jnp.eye(jacobian.shape[0])))
+    values, vectors = eigenpairs(jnp.where(finite, jacobian, jnp.eye(jacobian.shape[0])))
     largest = jnp.argmax(jnp.abs(values))
-    return vectors[:, largest], inverted(vectors)[largest]
+    return vectors[:, largest], invert(vectors)[largest]

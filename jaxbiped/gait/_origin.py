@@ -1,4 +1,4 @@
-"""How a search came to a gait, what else it saw, and where the seed's gait ended."""
+"""Origin of a gait: how a search came to it, and what else it saw."""
 
 import enum
 from typing import Any, NamedTuple
@@ -70,7 +70,7 @@ class Origin(NamedTuple):
     nearest: Any
 
 
-def plain_origin(scene: Any, start: Any, found_by: FoundBy) -> Origin:
+def single_stage_origin(scene: Any, start: Any, found_by: FoundBy) -> Origin:
     """Of a search that had but one stage."""
     nothing: Any = np.full(MOST_OTHERS, np.nan)
     return Origin(

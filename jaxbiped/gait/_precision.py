@@ -1,9 +1,9 @@
-"""How exactly gaits and return maps are solved."""
+"""Precision of gaits and return maps."""
 
 from typing import Any
 
 from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.solve._passage import Precision
+from jaxbiped.variational._solve_to_section import Precision
 
 _PRECISIONS = {"balanced": Precision(3e-7, 3e-6), "tight": Precision(1e-9, 1e-8)}
 # Rolling is smooth, and a gait of it costs little at any precision.

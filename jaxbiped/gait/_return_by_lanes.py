@@ -11,79 +11,80 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._return_by_xla import NO_REVERSE, full_tangents, renewed
-from jaxbiped.gait._turn import PARAMETER_FLOOR, STATE_FLOOR, Turning
-from jaxbiped.lanes._crossed import Crossed
-from jaxbiped.lanes._crossing import cross
-from jaxbiped.solve._columns import Seeded, Tangents
-from jaxbiped.solve._passage import Precision
+from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR
+from jaxbiped.gait._return_by_xla import NO_REVERSE, full_tangents, reset_on_arrival
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._units import units_of
+from jaxbiped.variational._solve_to_section import Precision
+from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._variational_solve import solve_variational
+from jaxbiped.variational._variational_types import VariationalSolution
 
 
 @eqx.filter_custom_jvp
 def forward_by_lanes(
-    turning: Turning, precision: Precision, args: PyTree, state: PyTree
+    spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree
 ) -> tuple[PyTree, Scalar, Scalar]:
-    found = _crossed(turning, precision, args, state, (), ())
-    return renewed(turning, args, found.state, found.t, found.code)
+    found = _solve(spec, precision, args, state, (), ())
+    return reset_on_arrival(spec, args, found.state, found.t, found.code)
 
 
 @forward_by_lanes.def_jvp
 def _forward_by_lanes_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
-    turning, precision, args, state = primals
+    spec, precision, args, state = primals
     _, _, args_dot, state_dot = tangents
     moved, steered = _leaves_with_none(state_dot, state), _leaves_with_none(args_dot, args)
     places = tuple(i for i, dot in enumerate(moved) if dot is not None)
     active = tuple(i for i, dot in enumerate(steered) if dot is not None)
-    found = _crossed(turning, precision, args, state, places, active)
+    found = _solve(spec, precision, args, state, places, active)
     sizes = _sizes(args, active)
     dots = [moved[i] for i in places]
     dots += [steered[i] / size for i, size in zip(active, sizes, strict=True)]
     along = jnp.stack(dots) if dots else jnp.zeros(0)
     arrived = jtu.tree_unflatten(jtu.tree_structure(state), list(along @ found.columns))
 
-    def renew(args: PyTree, y: PyTree) -> PyTree:
-        return renewed(turning, args, y, found.t, found.code)[0]
+    def reset_map(args: PyTree, y: PyTree) -> PyTree:
+        return reset_on_arrival(spec, args, y, found.t, found.code)[0]
 
-    _, end_dot = jax.jvp(renew, (args, found.state), (full_tangents(args_dot, args), arrived))
+    _, end_dot = jax.jvp(reset_map, (args, found.state), (full_tangents(args_dot, args), arrived))
     end_dot, time_dot = eqxi.nondifferentiable_backward(
         (end_dot, along @ found.time_columns), msg=NO_REVERSE
     )
-    return forward_by_lanes(turning, precision, args, state), (end_dot, time_dot, None)
+    return forward_by_lanes(spec, precision, args, state), (end_dot, time_dot, None)
 
 
 @eqx.filter_custom_vjp
 def _reversible(
-    given: tuple[PyTree, PyTree], turning: Turning, precision: Precision
+    given: tuple[PyTree, PyTree], spec: ReturnMapSpec, precision: Precision
 ) -> tuple[PyTree, Scalar, Scalar]:
     args, state = given
-    return forward_by_lanes(turning, precision, args, state)
+    return forward_by_lanes(spec, precision, args, state)
 
 
 def reverse_by_lanes(
-    turning: Turning, precision: Precision, args: PyTree, state: PyTree
+    spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree
 ) -> tuple[PyTree, Scalar, Scalar]:
     """In reverse mode: the columns, of just what is differentiated, are known and transposed."""
-    return _reversible((args, state), turning, precision)
+    return _reversible((args, state), spec, precision)
 
 
 @_reversible.def_fwd
 def _reversible_fwd(
-    perturbed: Any, given: tuple[PyTree, PyTree], turning: Turning, precision: Precision
-) -> tuple[Any, Crossed]:
+    perturbed: Any, given: tuple[PyTree, PyTree], spec: ReturnMapSpec, precision: Precision
+) -> tuple[Any, VariationalSolution]:
     args, state = given
     active, places = (_places(part) for part in perturbed)
-    found = _crossed(turning, precision, args, state, places, active)
-    return renewed(turning, args, found.state, found.t, found.code), found
+    found = _solve(spec, precision, args, state, places, active)
+    return reset_on_arrival(spec, args, found.state, found.t, found.code), found
 
 
 @_reversible.def_bwd
 def _reversible_bwd(
-    found: Crossed,
+    found: VariationalSolution,
     cotangents: Any,
     perturbed: Any,
     given: tuple[PyTree, PyTree],
-    turning: Turning,
+    spec: ReturnMapSpec,
     precision: Precision,
 ) -> tuple[PyTree, PyTree]:
     del precision
@@ -91,10 +92,10 @@ def _reversible_bwd(
     active, places = (_places(part) for part in perturbed)
     end_bar, time_bar, _ = cotangents
 
-    def renew(args: PyTree, y: PyTree) -> PyTree:
-        return renewed(turning, args, y, found.t, found.code)[0]
+    def reset_map(args: PyTree, y: PyTree) -> PyTree:
+        return reset_on_arrival(spec, args, y, found.t, found.code)[0]
 
-    _, pull = jax.vjp(renew, args, found.state)
+    _, pull = jax.vjp(reset_map, args, found.state)
     args_bar, arrived_bar = pull(full_tangents(end_bar, state))
     along = found.columns @ jnp.stack(jtu.tree_leaves(arrived_bar))
     if time_bar is not None:
@@ -103,7 +104,7 @@ def _reversible_bwd(
     by_args = zip(active, along[len(places) :], _sizes(args, active), strict=True)
     own = jtu.tree_leaves(args_bar)
     by_parameter = {i: own[i] + bar / size for i, bar, size in by_args}
-    return _only(args, by_parameter), _only(state, by_state)
+    return _sparse_tree(args, by_parameter), _sparse_tree(state, by_state)
 
 
 def _places(perturbed: PyTree) -> tuple[int, ...]:
@@ -111,35 +112,35 @@ def _places(perturbed: PyTree) -> tuple[int, ...]:
     return tuple(i for i, is_so in enumerate(jtu.tree_leaves(perturbed)) if is_so)
 
 
-def _only(like: PyTree, known: dict[int, Scalar]) -> PyTree:
+def _sparse_tree(like: PyTree, known: dict[int, Scalar]) -> PyTree:
     """These leaves, and None for the others."""
     leaves, structure = jtu.tree_flatten(like)
     return jtu.tree_unflatten(structure, [known.get(i) for i in range(len(leaves))])
 
 
-def _crossed(
-    turning: Turning,
+def _solve(
+    spec: ReturnMapSpec,
     precision: Precision,
     args: PyTree,
     state: PyTree,
     places: tuple[int, ...],
     active: tuple[int, ...],
-) -> Crossed:
+) -> VariationalSolution:
     """Columns by these leaves of the state, then by the logarithms of these of the arguments."""
     m, p = len(places), len(active)
     columns = np.zeros((len(jtu.tree_leaves(state)), m + p))
     columns[list(places), range(m)] = 1.0
     inverse = jtu.tree_leaves(units_of(args, state).inverse)
     floors = jnp.asarray([*(STATE_FLOOR * inverse[i] for i in places), *[PARAMETER_FLOOR] * p])
-    found, _ = cross(
-        turning.watch(args, state, peak=False),
-        turning.solver,
+    found, _ = solve_variational(
+        spec.watch(args, state, peak=False),
+        spec.solver,
         Tangents(state, jnp.asarray(columns)),
         Seeded(args, jnp.zeros((p, m + p)), floors, active),
         jnp.stack(_sizes(args, active)) if active else jnp.zeros(0),
         precision=precision,
-        time_limit=turning.time_limit,
-        max_solver_steps=turning.max_solver_steps,
+        time_limit=spec.time_limit,
+        max_solver_steps=spec.max_solver_steps,
     )
     return found
 

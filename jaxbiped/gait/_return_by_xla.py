@@ -10,10 +10,11 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._turn import PARAMETER_FLOOR, STATE_FLOOR, Turning
-from jaxbiped.solve._columns import Seeded, Tangents
-from jaxbiped.solve._passage import Precision, passage
+from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._units import units_of
+from jaxbiped.variational._solve_to_section import Precision, solve_to_section
+from jaxbiped.variational._tangents import Seeded, Tangents
 
 NO_REVERSE = (
     "gradient = Forward() carries tangents along the motion and has no reverse mode: pass "
@@ -23,24 +24,24 @@ NO_REVERSE = (
 
 @eqx.filter_custom_jvp
 def forward_by_xla(
-    turning: Turning, precision: Precision, args: PyTree, state: PyTree
+    spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree
 ) -> tuple[PyTree, Scalar, Scalar]:
-    watch = turning.watch(args, state, peak=False)
-    found = passage(
+    watch = spec.watch(args, state, peak=False)
+    found = solve_to_section(
         watch,
-        turning.solver,
+        spec.solver,
         state,
         args,
         precision=precision,
-        time_limit=turning.time_limit,
-        max_solver_steps=turning.max_solver_steps,
+        time_limit=spec.time_limit,
+        max_solver_steps=spec.max_solver_steps,
     )
-    return renewed(turning, args, found.y, found.time, found.code)
+    return reset_on_arrival(spec, args, found.y, found.time, found.code)
 
 
 @forward_by_xla.def_jvp
 def _by_xla_forward_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
-    turning, precision, args, state = primals
+    spec, precision, args, state = primals
     _, _, args_dot, state_dot = tangents
     args_leaves = jtu.tree_leaves(args)
     column = jnp.stack(_dense(state_dot, state))[:, None]
@@ -56,55 +57,57 @@ def _by_xla_forward_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
         floor[None],
         tuple(range(len(seeds))),
     )
-    found = passage(
-        turning.watch(args, state, peak=False),
-        turning.solver,
+    found = solve_to_section(
+        spec.watch(args, state, peak=False),
+        spec.solver,
         Tangents(state, column),
         seeded,
         precision=precision,
-        time_limit=turning.time_limit,
-        max_solver_steps=turning.max_solver_steps,
+        time_limit=spec.time_limit,
+        max_solver_steps=spec.max_solver_steps,
     )
     structure = jtu.tree_structure(state)
     arrived = jtu.tree_unflatten(structure, list(found.y.columns[:, 0]))
 
-    def renew(args: PyTree, y: PyTree) -> PyTree:
-        return renewed(turning, args, y, found.time, found.code)[0]
+    def reset_map(args: PyTree, y: PyTree) -> PyTree:
+        return reset_on_arrival(spec, args, y, found.time, found.code)[0]
 
-    _, end_dot = jax.jvp(renew, (args, found.y.state), (full_tangents(args_dot, args), arrived))
+    _, end_dot = jax.jvp(reset_map, (args, found.y.state), (full_tangents(args_dot, args), arrived))
     end_dot, time_dot = eqxi.nondifferentiable_backward(
         (end_dot, found.time_columns[0]), msg=NO_REVERSE
     )
     # The values by themselves: they must not depend on what they are differentiated along.
-    values = forward_by_xla(turning, precision, args, state)
+    values = forward_by_xla(spec, precision, args, state)
     return values, (end_dot, time_dot, None)
 
 
 def reverse_by_xla(
-    turning: Turning, precision: Precision, args: PyTree, state: PyTree
+    spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree
 ) -> tuple[PyTree, Scalar, Scalar]:
     inverse = jnp.stack(jtu.tree_leaves(units_of(args, state).inverse))
     count = len(inverse)
     steering = Tangents(state, jnp.eye(count))
     seeded = Seeded(args, jnp.zeros((0, count)), STATE_FLOOR * inverse, ())
-    found = passage(
-        turning.watch(args, state, peak=False),
-        turning.solver,
+    found = solve_to_section(
+        spec.watch(args, state, peak=False),
+        spec.solver,
         steering,
         seeded,
         precision=precision,
-        time_limit=turning.time_limit,
-        max_solver_steps=turning.max_solver_steps,
+        time_limit=spec.time_limit,
+        max_solver_steps=spec.max_solver_steps,
         columns_only_steer=True,
     )
-    return renewed(turning, args, found.y.state, found.time, found.code)
+    return reset_on_arrival(spec, args, found.y.state, found.time, found.code)
 
 
-def renewed(turning: Turning, args: PyTree, state: PyTree, time: Any, code: Any) -> tuple:
-    return chosen(code == 0, turning.system.renew(args, state), state), time, code
+def reset_on_arrival(
+    spec: ReturnMapSpec, args: PyTree, state: PyTree, time: Any, code: Any
+) -> tuple:
+    return select(code == 0, spec.system.reset_map(args, state), state), time, code
 
 
-def chosen(condition: Any, a: PyTree, b: PyTree) -> PyTree:
+def select(condition: Any, a: PyTree, b: PyTree) -> PyTree:
     return jtu.tree_map(lambda x, y: jnp.where(condition, x, y), a, b)
 
 

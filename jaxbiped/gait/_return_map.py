@@ -13,21 +13,21 @@ from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._engine import orbit_engine
-from jaxbiped.gait._gradient import AbstractGradient, Forward, Reverse, check_anywhere
+from jaxbiped.gait._gradient_modes import AbstractGradient, Forward, Reverse, check_anywhere
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._return_by_lanes import forward_by_lanes, reverse_by_lanes
-from jaxbiped.gait._return_by_xla import chosen, forward_by_xla, reverse_by_xla
+from jaxbiped.gait._return_by_xla import forward_by_xla, reverse_by_xla, select
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
-from jaxbiped.gait._system import (
-    AbstractSystem,
-    RedundantWalking,
-    checked_section,
-    system_of,
-)
-from jaxbiped.gait._turn import Turning
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.solve._projected import projecting
+from jaxbiped.solve._projected_solver import with_projection
+from jaxbiped.variational._hybrid_system import (
+    AbstractSystem,
+    RedundantWalking,
+    section_of,
+    system_of,
+)
 
 
 class Return(NamedTuple):
@@ -91,7 +91,7 @@ def return_map(
     enters = redundant and not is_redundant(state)
     if enters:
         state = redundant_state(args, state)
-    section = checked_section(args, section)
+    section = section_of(args, section)
     method = orbit_solver(solver, rigid=isinstance(args, RigidScene))
     by = orbit_engine(
         engine,
@@ -102,8 +102,8 @@ def return_map(
         redundant=redundant,
     )
     if redundant:
-        system, method = RedundantWalking(), projecting(args, method)
-    turning = Turning(
+        system, method = RedundantWalking(), with_projection(args, method)
+    spec = ReturnMapSpec(
         system=system_of(args) if system is None else system,
         section=section,
         solver=method,
@@ -116,8 +116,8 @@ def return_map(
     precision = precision_of(accuracy, args)
     time, code = jnp.zeros(()), jnp.asarray(0)
     for _ in range(int(steps)):
-        arrived, lasted, came = follow(turning, precision, args, state)
-        state = chosen(code == 0, arrived, state)
+        arrived, lasted, came = follow(spec, precision, args, state)
+        state = select(code == 0, arrived, state)
         time = time + jnp.where(code == 0, lasted, 0.0)
         code = jnp.where(code == 0, came, code)
     return Return(minimal_state(args, state) if enters else state, time, code)

@@ -8,11 +8,11 @@ import jax.tree_util as jtu
 
 from jaxbiped._checks import check_positive, check_type
 from jaxbiped._types import as_float
-from jaxbiped.dynamics._bristles import state_for
+from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
-from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
@@ -39,7 +39,7 @@ def rolling_starts(
     check_positive("count", count)
     check_positive("spread", spread)
     scene = jtu.tree_map(as_float, scene)
-    middle = seed_start(scene)
+    middle = default_guess(scene)
     scatter = jax.random.uniform(jax.random.key(seed), (4, int(count)), minval=-1.0, maxval=1.0)
     factors = 1.0 + spread * scatter.at[:, 0].set(0.0)
     theta_1, theta_2 = middle.theta_1 * factors[0], middle.theta_2 * factors[1]

@@ -1,4 +1,4 @@
-"""The search without a guess as one program, for `jit` and `vmap`: start, then continuation.
+"""Traced search without a guess, for `jit` and `vmap`: start, then continuation.
 
 The fitted start is tried first. Where no stable gait comes of it, the seed scene's gait is followed
 to the scene along the line between them, each search beginning where those before point to.
@@ -11,15 +11,16 @@ import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
 from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._default_guess import default_guess
+from jaxbiped.gait._fixed_point_search import Found, Search, search
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
-from jaxbiped.gait._newton import Method, chosen
+from jaxbiped.gait._newton import Method, select
 from jaxbiped.gait._origin import FoundBy, Origin
-from jaxbiped.gait._search import Found, Search, search
-from jaxbiped.gait._seed_start import seed_start
-from jaxbiped.gait._small_matrices import eigen
-from jaxbiped.gait._turn import Turning, recurring_of, state_with
+from jaxbiped.gait._poincare_map import recurring_components, state_with
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.linalg._small_matrices import eigenpairs
 from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.solve._passage import Precision
+from jaxbiped.variational._solve_to_section import Precision
 
 _FIRST, _LARGEST, _SMALLEST = 0.05, 0.3, 1e-3
 """Steps along the line: the first, at most, and at which it is given up."""
@@ -60,7 +61,7 @@ class _Way(NamedTuple):
 
 
 def search_along(
-    turning: Turning,
+    spec: ReturnMapSpec,
     scene: Any,
     active: tuple[int, ...],
     start: Any,
@@ -70,17 +71,17 @@ def search_along(
 ) -> tuple[Found, Origin]:
     """Searches from `start`, and along the line from the seed's scene where need be."""
     line = homotopy_to(scene)
-    fitted = recurring_of(turning.system, start)
+    fitted = recurring_components(spec.system, start)
     of_seed = line.first.scene if isinstance(line.first, RedundantScene) else line.first
-    first = recurring_of(turning.system, seed_start(of_seed))
+    first = recurring_components(spec.system, default_guess(of_seed))
 
     def run(way: _Way) -> Found:
         there = line.at(jnp.where(way.s < 0.0, 1.0, way.s))
-        guess = state_with(turning.system, start, way.ahead)
-        return search(turning, there, active, guess, precision, method, ~way.over)
+        guess = state_with(spec.system, start, way.ahead)
+        return search(spec, there, active, guess, precision, method, ~way.over)
 
     shape = jax.eval_shape(
-        lambda: search(turning, scene, active, start, precision, method, jnp.asarray(True))
+        lambda: search(spec, scene, active, start, precision, method, jnp.asarray(True))
     )
     nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
     begin = _Way(
@@ -98,7 +99,7 @@ def search_along(
     )
     end = jax.lax.while_loop(
         lambda way: ~way.over,
-        lambda way: chosen(way.over, way, _after(way, run(way), line, first)),
+        lambda way: select(way.over, way, _after(way, run(way), line, first)),
         begin,
     )
     no_walk = (end.best.ending == int(Search.FOUND)) & ~end.best.sound
@@ -146,7 +147,7 @@ def _after(way: _Way, latest: Found, line: Homotopy, first: Scalar) -> _Way:
         before=before,
         at=at,
         ahead=ahead,
-        best=chosen(better, latest, way.best),
+        best=select(better, latest, way.best),
         radius=jnp.where(better, radius, way.radius),
         origin=origin,
         searches=way.searches + 1,
@@ -166,12 +167,12 @@ def _is_ahead(way: _Way, point: Scalar) -> Scalar:
 
 def _nearest(kept: Any, line: Homotopy, s: Scalar, wanted: Scalar) -> Any:
     scene = line.at(s)
-    return chosen(wanted, scene.scene if isinstance(scene, RedundantScene) else scene, kept)
+    return select(wanted, scene.scene if isinstance(scene, RedundantScene) else scene, kept)
 
 
 def _radius(found: Found) -> Scalar:
     """Largest absolute value of a Floquet multiplier: on the section the trivial one is zero."""
     jacobian = found.last.jacobian[:, : found.recurring.shape[0]]
     finite = jnp.all(jnp.isfinite(jacobian))
-    values, _ = eigen(jnp.where(finite, jacobian, 0.0))
+    values, _ = eigenpairs(jnp.where(finite, jacobian, 0.0))
     return jnp.where(finite, jnp.max(jnp.abs(values)), jnp.inf)

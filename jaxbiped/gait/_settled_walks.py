@@ -1,4 +1,4 @@
-"""Walking forwards from many starts at once: where those that do not fall settle."""
+"""Settled walks: where walking forwards from many starts ends that does not fall."""
 
 from typing import Any
 
@@ -23,7 +23,7 @@ _DEPTH = 4
 """Longest cycle [footsteps] that is looked for in a walk's last arrivals."""
 
 
-def settled_states(scene: Scene | RigidScene, starts: Any, *, most: int = 4) -> list[np.ndarray]:
+def settle_walks(scene: Scene | RigidScene, starts: Any, *, most: int = 4) -> list[np.ndarray]:
     """Where walks from the starts are after many footsteps, the most settled first.
 
     Args:
@@ -35,7 +35,7 @@ def settled_states(scene: Scene | RigidScene, starts: Any, *, most: int = 4) -> 
         States on the section without hip_x, each of shape (m,), apart from each other.
     """
     rigid = isinstance(scene, RigidScene)
-    walked: Any = _walked_rigidly if rigid else _walked
+    walked: Any = _rigid_arrivals if rigid else _arrivals
     counts, last = walked(scene, starts)
     points = np.stack([np.asarray(leaf) for leaf in last[1:]], axis=-1)
     walking = np.flatnonzero(np.asarray(counts) >= _FOOTSTEPS)
@@ -67,7 +67,7 @@ def component_sizes(scene: Scene | RigidScene, state: Any) -> np.ndarray:
 
 
 @eqx.filter_jit
-def _walked(scene: Scene, starts: Any) -> tuple[Any, Any]:
+def _arrivals(scene: Scene, starts: Any) -> tuple[Any, Any]:
     """Arrivals at mid-stance of each walk, and the states at the last ones, leg 2 standing."""
 
     def one(start: Any) -> tuple[Any, Any]:
@@ -89,7 +89,7 @@ def _walked(scene: Scene, starts: Any) -> tuple[Any, Any]:
 
 
 @eqx.filter_jit
-def _walked_rigidly(scene: RigidScene, starts: Any) -> tuple[Scalar, Any]:
+def _rigid_arrivals(scene: RigidScene, starts: Any) -> tuple[Scalar, Any]:
     """Heel strikes of each walk, and the states just after the last ones."""
 
     def one(start: Any) -> tuple[Scalar, Any]:

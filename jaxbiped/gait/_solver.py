@@ -1,9 +1,9 @@
-"""Which solver follows the orbits of a search."""
+"""Choice of the solver that follows the orbits of a search."""
 
 import diffrax
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve.solvers import solver_named
 
 
 def orbit_solver(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._small_matrices import eigen, solved
+from jaxbiped.linalg._small_matrices import eigenpairs, solve
 
 
 class Bifurcation(enum.IntEnum):
@@ -56,7 +56,7 @@ def stability_of(
     """Multipliers of a monodromy matrix.
 
     Args:
-        monodromy: derivative of one turn at a fixed time, shape (m, m).
+        monodromy: derivative of one cycle at a fixed time, shape (m, m).
         witness: the same from a looser solve.
         velocity: rates of the recurring components at the orbit, shape (m,).
         closeness: distance from the unit circle that counts as on it, at least.
@@ -85,10 +85,10 @@ def stability_of(
 def _nontrivial(matrix: Scalar, velocity: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """Eigenvalues and vectors, largest first, without the one along the velocity; its error."""
     finite = jnp.all(jnp.isfinite(matrix))
-    values, vectors = eigen(jnp.where(finite, matrix, 0.0))
+    values, vectors = eigenpairs(jnp.where(finite, matrix, 0.0))
     values = jnp.where(finite, values, jnp.nan)
     # The velocity is an eigenvector: the one that it is made of.
-    parts = solved(vectors, velocity.astype(vectors.dtype))
+    parts = solve(vectors, velocity.astype(vectors.dtype))
     trivial = jnp.argmax(jnp.where(jnp.isfinite(jnp.abs(parts)), jnp.abs(parts), 0.0))
     size = jnp.where(jnp.arange(values.shape[0]) == trivial, -1.0, jnp.abs(values))
     order = jnp.argsort(-size)[:-1]

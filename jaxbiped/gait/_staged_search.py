@@ -1,4 +1,4 @@
-"""The search without a guess, in stages, each only where those before found no stable gait."""
+"""Staged search without a guess: each stage only where those before found no stable gait."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -11,13 +11,25 @@ import numpy as np
 from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.gait._continuation import Branch, BranchEnd, Change, follow_branch
+from jaxbiped.gait._default_guess import default_guess
+from jaxbiped.gait._fixed_point_search import ROUGH, Found, Search
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
-from jaxbiped.gait._origin import MOST_OTHERS, FoundBy, Origin, OtherGait, code_array, plain_origin
+from jaxbiped.gait._origin import (
+    MOST_OTHERS,
+    FoundBy,
+    Origin,
+    OtherGait,
+    code_array,
+    single_stage_origin,
+)
+from jaxbiped.gait._poincare_map import (
+    linearised_return,
+    seed_directions,
+    state_with,
+)
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._rolling_starts import rolling_starts
-from jaxbiped.gait._search import ROUGH, Found, Search
-from jaxbiped.gait._seed_start import seed_start
-from jaxbiped.gait._settled_walks import component_sizes, settled_states
-from jaxbiped.gait._turn import Turning, seeded, state_with, turn
+from jaxbiped.gait._settled_walks import component_sizes, settle_walks
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
@@ -35,8 +47,8 @@ _SAME = 1e-5
 """Relative difference of period and length up to which two finds are of one gait."""
 
 
-Searching = Callable[[Turning, Any, Any, int], Found]
-"""Newton's method on the return map of a scene, from a start, in at most so many turns."""
+Searching = Callable[[ReturnMapSpec, Any, Any, int], Found]
+"""Newton's method on the return map of a scene, from a start, in at most so many evaluations."""
 
 
 class Seen(NamedTuple):
@@ -71,8 +83,8 @@ class Staged(NamedTuple):
 
 def search_in_stages(
     search: Searching,
-    turning: Turning,
-    scout: Turning,
+    spec: ReturnMapSpec,
+    scout: ReturnMapSpec,
     scene: Any,
     modelled: Scene | RigidScene,
     first: Found,
@@ -88,7 +100,7 @@ def search_in_stages(
     """
     seen: list[Seen] = []
     branch = line = None
-    start = seed_start(modelled)
+    start = default_guess(modelled)
 
     def has_stable() -> bool:
         return any(each.radius < 1.0 for each in seen)
@@ -102,7 +114,7 @@ def search_in_stages(
 
     def try_all(points: Sequence[np.ndarray] | np.ndarray, by: FoundBy) -> None:
         for point in points:
-            add(search(turning, scene, _state(start, point), _TURNS), by)
+            add(search(spec, scene, _state(start, point), _TURNS), by)
             if has_stable():
                 return
 
@@ -110,7 +122,7 @@ def search_in_stages(
         for count in _STARTS[type(modelled)] if scout.engine == "lanes" else ():
             if not has_stable():
                 with stage(f"walking {count} starts"):
-                    points = settled_states(modelled, _starts(modelled, seen, count))
+                    points = settle_walks(modelled, _starts(modelled, seen, count))
                 try_all(points, FoundBy.WALKING)
 
     add(first, FoundBy.START)
@@ -119,7 +131,7 @@ def search_in_stages(
     if not has_stable():
         with stage("following the seed's gait to this scene"):
             line = homotopy_to(modelled)
-            branch = _followed(search, scout, line, start)
+            branch = _follow_from_seed(search, scout, line, start)
             if branch.end is BranchEnd.REACHED:
                 known = len(seen)
                 try_all([branch.points[-1]], FoundBy.CONTINUATION)
@@ -136,7 +148,7 @@ def search_in_stages(
 def origin_of(staged: Staged, scene: Scene | RigidScene, start: Any) -> Origin:
     """What a search in stages tells of itself; `scene` in minimal coordinates."""
     by = FoundBy.START if staged.best is None else staged.best.by
-    plain = plain_origin(scene, start, by)
+    plain = single_stage_origin(scene, start, by)
     columns: Any = np.full((MOST_OTHERS, 3 + len(start)), np.nan)
     for row, each in zip(columns, staged.others, strict=False):
         last = each.found.last
@@ -169,8 +181,8 @@ def spectral_radius(found: Found) -> float:
 
 def _same(a: Found, b: Seen) -> bool:
     def measures(found: Found) -> np.ndarray:
-        turn = found.last
-        return np.append(np.asarray(turn.advance), np.asarray(turn.period))
+        last = found.last
+        return np.append(np.asarray(last.advance), np.asarray(last.period))
 
     return bool(np.allclose(measures(a), measures(b.found), rtol=_SAME, atol=0.0))
 
@@ -193,13 +205,13 @@ def _starts(scene: Scene | RigidScene, seen: list[Seen], count: int) -> Any:
     ]
     rows = np.concatenate([_columns(half) for half in halves])
     sizes = component_sizes(scene, halves[0])
-    pushed = [row for each in seen for row in _pushed(each.found, sizes)][: count // 2]
+    pushed = [row for each in seen for row in _push_off_unstable(each.found, sizes)][: count // 2]
     if pushed:
         rows[1 : 1 + len(pushed)] = pushed
     return type(halves[0])(jnp.zeros(count), *map(jnp.asarray, rows.T))
 
 
-def _pushed(found: Found, sizes: np.ndarray) -> list[np.ndarray]:
+def _push_off_unstable(found: Found, sizes: np.ndarray) -> list[np.ndarray]:
     """States just off an unstable gait, along its leading direction."""
     m = len(sizes)
     point = np.asarray(found.recurring)
@@ -209,29 +221,31 @@ def _pushed(found: Found, sizes: np.ndarray) -> list[np.ndarray]:
     return [point + push * unit for push in _PUSHES]
 
 
-def _followed(search: Searching, scout: Turning, line: Homotopy, like: Any) -> Branch:
+def _follow_from_seed(search: Searching, scout: ReturnMapSpec, line: Homotopy, like: Any) -> Branch:
     """The branch of gaits from the seed's scene."""
-    first = search(scout, line.first, seed_start(line.first), _TURNS)
+    first = search(scout, line.first, default_guess(line.first), _TURNS)
     point = np.asarray(first.recurring)
     if int(first.ending) != int(Search.FOUND):
         return Branch(point[None], np.zeros(1), BranchEnd.NO_BEGINNING, int(first.code))
 
     def change(point: np.ndarray, s: float) -> Change:
         given: Any = point, np.float64(s)
-        value, by_point, by_s, code = map(np.asarray, _change(scout, line, like, *given))
+        value, by_point, by_s, code = map(np.asarray, _scene_along(scout, line, like, *given))
         return Change(value, by_point, by_s, int(code))
 
     return follow_branch(change, point, scales=component_sizes(line.first, like))
 
 
 @eqx.filter_jit
-def _change(
-    scout: Turning, line: Homotopy, like: Any, point: Scalar, s: Scalar
+def _scene_along(
+    scout: ReturnMapSpec, line: Homotopy, like: Any, point: Scalar, s: Scalar
 ) -> tuple[Scalar, Scalar, Scalar, Scalar]:
-    """What a turn changes in a point, and how that depends on the point and on s."""
+    """What a return changes in a point, and how that depends on the point and on s."""
     m, scene = point.shape[0], line.at(s)
-    seeds, sizes = seeded(scene, tuple(range(len(jtu.tree_leaves(scene)))), m)
+    seeds, sizes = seed_directions(scene, tuple(range(len(jtu.tree_leaves(scene)))), m)
     start = state_with(scout.system, like, point)
-    once = turn(scout, seeds, start, ROUGH, jnp.asarray(False), steered=jnp.asarray(True))
+    once = linearised_return(
+        scout, seeds, start, ROUGH, jnp.asarray(False), steered=jnp.asarray(True)
+    )
     by_s = once.jacobian[:, m:] @ (line.slopes(s) / sizes)
     return once.recurring - point, once.jacobian[:, :m] - jnp.eye(m), by_s, once.code

@@ -1,4 +1,4 @@
-"""The walk as a moving picture."""
+"""Animation of a walk."""
 
 from pathlib import Path
 from typing import Any

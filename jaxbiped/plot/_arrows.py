@@ -1,4 +1,4 @@
-"""Arrows that say which way a curve is run through."""
+"""Arrows along a curve, in the direction in which it is run through."""
 
 from typing import Any
 

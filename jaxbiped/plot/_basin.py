@@ -1,4 +1,4 @@
-"""A picture of basins of attraction in two coordinates of the start."""
+"""Basin picture in two coordinates of the start."""
 
 from typing import Any
 
@@ -12,12 +12,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from jaxbiped._checks import ArgumentError, check_finite
+from jaxbiped.basins._arguments import check_known
+from jaxbiped.basins._fractions import fractions as fractions_of
+from jaxbiped.basins._label import Label, label_names
 from jaxbiped.plot._label_colours import GAIT_SUFFIX, in_order, label_colour
 from jaxbiped.plot._style import axes_or_new, figure_of
 from jaxbiped.plot._symbols import axis_label
-from jaxbiped.sweep._arguments import check_known
-from jaxbiped.sweep._fractions import basin_fractions
-from jaxbiped.sweep._label import Label, label_names
 
 _HATCH = "////"
 """Over what is pending, so that it reads as missing in print without colour too."""
@@ -84,15 +84,15 @@ def names_of(
     if period is None:
         words = np.vectorize(lambda code: str(Label(code)), otypes=[object])(grid)
     else:
-        words = label_names(grid, _fitting("period", period, grid.shape))
+        words = label_names(grid, _fitting_names("period", period, grid.shape))
     if gait is not None:
-        which = _fitting("gait", gait, grid.shape)
+        which = _fitting_names("gait", gait, grid.shape)
         walks = grid == Label.WALKING
         words[walks] += [GAIT_SUFFIX.format(gait=k) for k in which[walks]]
     return words
 
 
-def _fitting(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
+def _fitting_names(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> np.ndarray:
     array = np.asarray(value)
     try:
         return np.broadcast_to(array, shape)
@@ -188,7 +188,7 @@ def finish(
 
 def _patches(words: np.ndarray) -> list[Patch]:
     """Entries of the legend: labels that occur, with their parts of what is labelled."""
-    fractions = basin_fractions(words)
+    fractions = fractions_of(words)
     patches = []
     for name in in_order(set(words.ravel().tolist())):
         if name == str(Label.PENDING):

@@ -1,4 +1,4 @@
-"""A friction law with a memory, over a slip there and back."""
+"""Bristle law as curves over a slip there and back."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -16,7 +16,7 @@ from jaxbiped.plot._style import (
     legend_above,
 )
 from jaxbiped.plot._symbols import FORCE_RATIO, law_name
-from jaxbiped.scene._bristle_law import AbstractBristleLaw
+from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 _GIVES = 5.0
 """Travel in one direction, in units of the slip over which the bristles bend."""
@@ -47,7 +47,7 @@ def bristle_law(
     passes = (("from straight bristles", 1.0), ("back", -1.0), ("there again", 1.0))
     for k, (label, direction) in enumerate(passes):
         speed = direction * slip_speed
-        times, bristles = _bent(law, speed, bristle)
+        times, bristles = _bristle_deflection(law, speed, bristle)
         places = place + speed * times
         friction = law.coefficient(jnp.asarray(speed), jnp.asarray(bristles))
         look = dict(color=LEG_COLOURS[min(k, 1)], linestyle=LEG_STYLES[min(k, 1)])
@@ -59,7 +59,9 @@ def bristle_law(
     return figure_of(ax)
 
 
-def _bent(law: AbstractBristleLaw, speed: float, bristle: float) -> tuple[np.ndarray, np.ndarray]:
+def _bristle_deflection(
+    law: AbstractBristleLaw, speed: float, bristle: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Times and bristles in a slide at one speed: the law is linear in the bristle."""
     at = jnp.asarray(speed)
     straight = float(law.rate(at, jnp.asarray(0.0)))

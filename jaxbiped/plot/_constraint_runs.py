@@ -1,4 +1,4 @@
-"""Ways to hold the hip against each other: violation, error and time."""
+"""Constraint methods compared: violation, error and time."""
 
 from collections.abc import Callable, Sequence
 
@@ -37,13 +37,13 @@ def constraint_runs(runs: Sequence[ConstraintRun]) -> Figure:
     if not runs:
         raise ArgumentError("runs is empty: there must be one at least.")
     methods = list(dict.fromkeys(run.method for run in runs))
-    ways = list(dict.fromkeys(_way(run) for run in runs))
+    ways = list(dict.fromkeys(_integrator_label(run) for run in runs))
     figure = new_figure(11.0, 1.7 + 0.42 * len(methods) + 0.2 * -(-len(ways) // 3))
     panels = figure.subplots(1, len(_MEASURES), sharey=True)
     for ax, (label, measure) in zip(panels, _MEASURES.items(), strict=True):
         timed = label == list(_MEASURES)[-1]
         for k, way in enumerate(ways):
-            mine = [run for run in runs if _way(run) == way]
+            mine = [run for run in runs if _integrator_label(run) == way]
             rows = np.array([methods.index(run.method) for run in mine], dtype=float)
             rows += 0.5 * (k + 0.5) / len(ways) - 0.25
             _draw_way(ax, mine, rows, measure, k, way, timed)
@@ -86,7 +86,7 @@ def _draw_way(
     ax.plot(np.full(lost.sum(), 0.985), rows[lost], "x", color=colour, transform=edge)
 
 
-def _way(run: ConstraintRun) -> str:
+def _integrator_label(run: ConstraintRun) -> str:
     return f"{run.integrator}, " + (
         f"steps of {run.rtol_or_dt:g} s" if run.fixed else f"tolerance {run.rtol_or_dt:g}"
     )

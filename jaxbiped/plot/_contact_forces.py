@@ -8,7 +8,7 @@ from matplotlib.figure import Figure, SubFigure
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._contacts import Contacts
-from jaxbiped.gait._footsteps import heel_strikes
+from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.plot._force_samples import sampled_forces
 from jaxbiped.plot._style import (
     LEG_COLOURS,

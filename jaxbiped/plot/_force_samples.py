@@ -1,11 +1,11 @@
-"""Forces of the ground on times fit for drawing: fine enough about each peak."""
+"""Force samples on times fit for drawing: fine enough about each peak."""
 
 import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped.dynamics._contacts import Contacts, contacts
-from jaxbiped.gait._samples import applied, observed
-from jaxbiped.plot._samples import sampled
+from jaxbiped.measure._samples import evaluate_along, evaluate_at
+from jaxbiped.plot._samples import sample
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -34,13 +34,13 @@ def sampled_forces(
     Raises:
         ValueError: the trajectory was not saved step by step.
     """
-    samples = sampled(trajectory, start=start, stop=stop)
-    t, found = samples.t, applied(scene, samples.state, contacts)
+    samples = sample(trajectory, start=start, stop=stop)
+    t, found = samples.t, evaluate_along(scene, samples.state, contacts)
     for _ in range(_ROUNDS):
         times = _beside_extremes(t, found)
         if not times.size:
             break
-        more = observed(scene, trajectory, contacts, times)
+        more = evaluate_at(scene, trajectory, contacts, times)
         t, order = np.unique(np.concatenate([t, times]), return_index=True)
         found = jtu.tree_map(
             lambda old, new, order=order: np.concatenate([old, new])[order], found, more

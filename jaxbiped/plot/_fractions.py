@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
+from jaxbiped.basins._fractions import Fraction, wilson_interval
 from jaxbiped.plot._label_colours import in_order, label_colour, label_marker
 from jaxbiped.plot._style import axes_or_new, dress, figure_of
 from jaxbiped.plot._symbols import axis_label
-from jaxbiped.sweep._fractions import Fraction, wilson_interval
 
 
 def basin_fractions(
@@ -33,7 +33,7 @@ def basin_fractions(
 
     Args:
         values: the parameter, increasing, shape (n,).
-        fractions: what `jaxbiped.basin_fractions` found at each value.
+        fractions: what `jaxbiped.basins.fractions` found at each value.
         name, unit: of the parameter; its own name, as "K", says all by itself.
         kind: "lines", or "stacked": areas that add up to one, without bands.
         confidence: of the bands.
@@ -46,7 +46,7 @@ def basin_fractions(
             labelled at a value.
     """
     check_choice("kind", kind, ("lines", "stacked"))
-    along = _checked(values, fractions, log)
+    along = _check(values, fractions, log)
     if kind == "stacked" and along.size == 1:
         raise ArgumentError("values has one entry: a stacked figure must have at least 2.")
     labels = in_order({label for found in fractions for label in found})
@@ -77,7 +77,7 @@ def _count(found: Mapping[str, Fraction], label: str) -> int:
     return found[label].count if label in found else 0
 
 
-def _checked(
+def _check(
     values: npt.ArrayLike, fractions: Sequence[Mapping[str, Fraction]], log: bool
 ) -> np.ndarray:
     check_finite("values", values)

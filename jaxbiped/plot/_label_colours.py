@@ -2,7 +2,7 @@
 
 import re
 
-from jaxbiped.sweep._label import Label
+from jaxbiped.basins._label import Label
 
 _COLOURS = {
     str(Label.FELL_FORWARD): "#D55E00",

@@ -27,7 +27,7 @@ from jaxbiped.plot._symbols import (
     SLIP_SPEED,
     law_name,
 )
-from jaxbiped.scene._law import AbstractFrictionLaw, AbstractNormalLaw
+from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, AbstractNormalLaw
 
 _RATE_COLOURS = ("#56B4E9", GROUND_COLOUR, "#E69F00", LEG_COLOURS[1])
 """One rate each, from the slowest; the fifth begins anew."""

@@ -5,7 +5,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from jaxbiped.plot._samples import sampled
+from jaxbiped.plot._samples import sample
 from jaxbiped.plot._style import (
     LEG_COLOURS,
     LEG_NAMES,
@@ -31,7 +31,7 @@ def leg_angles(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None) 
     Raises:
         ValueError: the trajectory was not saved step by step.
     """
-    t, state = sampled(trajectory)
+    t, state = sample(trajectory)
     return draw_leg_angles(t, (state.theta_1, state.theta_2), "Leg angles", ax)
 
 

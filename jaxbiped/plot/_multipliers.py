@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._search import Search
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.plot._style import GROUND_COLOUR, LEG_COLOURS, SHADE_COLOUR, axes_or_new, figure_of
 

@@ -7,8 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.gait._samples import applied
-from jaxbiped.plot._samples import sampled
+from jaxbiped.measure._samples import evaluate_along
+from jaxbiped.plot._samples import sample
 from jaxbiped.plot._style import (
     LEG_COLOURS,
     LEG_NAMES,
@@ -37,8 +37,8 @@ def penetrations(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None
     Raises:
         ValueError: the trajectory was not saved step by step.
     """
-    samples = sampled(trajectory)
-    found = applied(scene, samples.state, contacts)
+    samples = sample(trajectory)
+    found = evaluate_along(scene, samples.state, contacts)
     ax = axes_or_new(ax, 7.2, 3.4)
     deepest = 0.0
     for k, (foot, touching) in enumerate(zip(found.feet, found.touching, strict=True)):

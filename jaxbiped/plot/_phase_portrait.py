@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.gait._footsteps import heel_strikes
+from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.plot._arrows import direction_arrows
-from jaxbiped.plot._samples import sampled
+from jaxbiped.plot._samples import sample
 from jaxbiped.plot._style import (
     LEG_COLOURS,
     LEG_NAMES,
@@ -53,7 +53,7 @@ def phase_portrait(
     """
     if not legs or not set(legs) <= {1, 2}:
         raise ArgumentError(f"legs = {legs!r} is not allowed: it must name legs 1, 2 or both.")
-    t, state = sampled(trajectory)
+    t, state = sample(trajectory)
     strikes = heel_strikes(scene, trajectory)
     angles, rates = (state.theta_1, state.theta_2), (state.omega_1, state.omega_2)
     ax = axes_or_new(ax, 5.8, 5.0)

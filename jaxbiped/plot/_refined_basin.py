@@ -1,4 +1,4 @@
-"""A picture of basins whose boundary was refined."""
+"""Refined basin picture: labels about a boundary, and the cells that it crosses."""
 
 from collections.abc import Mapping
 
@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped.basins._refined_boundary import RefinedBoundary
 from jaxbiped.plot._basin import draw_labels, finish, names_of
 from jaxbiped.plot._style import axes_or_new, figure_of
-from jaxbiped.sweep._refine import RefinedBoundary
 
 _CORNERS = np.asarray([(0, 0), (1, 0), (1, 1), (0, 1)])
 

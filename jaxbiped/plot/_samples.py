@@ -1,4 +1,4 @@
-"""A trajectory on times fit for drawing: the solver's own steps and evenly spaced times."""
+"""Samples of a trajectory on times fit for drawing: the solver's own steps and even ones."""
 
 from typing import Any, NamedTuple
 
@@ -38,7 +38,7 @@ def state_at(trajectory: Trajectory, t: Any) -> State:
     return jtu.tree_map(np.asarray, trajectory.at(t))
 
 
-def sampled(
+def sample(
     trajectory: Trajectory, *, start: float | None = None, stop: float | None = None
 ) -> Samples:
     """Every step of the solver between two times [s], and 2048 evenly spaced times.

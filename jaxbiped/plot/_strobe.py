@@ -1,4 +1,4 @@
-"""The walk as a stroboscope shows it (paper, figure 4)."""
+"""Stroboscopic picture of a walk (paper, figure 4)."""
 
 import math
 from typing import Any

@@ -1,4 +1,4 @@
-"""What all figures share: colours, sizes, new figures, and where legends go."""
+"""Style that all figures share: colours, sizes, new figures, and where legends go."""
 
 from typing import Any
 

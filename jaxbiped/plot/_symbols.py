@@ -109,17 +109,21 @@ def axis_label(name: str, unit: str = "") -> str:
 
     Any other name is taken for words, with the unit behind them, if there is one.
     """
-    if not unit and _own(name) in QUANTITIES:
-        return QUANTITIES[_own(name)].on_axis()
+    if not unit and _qualified_symbol(name) in QUANTITIES:
+        return QUANTITIES[_qualified_symbol(name)].on_axis()
     return f"{name} ({unit})" if unit else name
 
 
 def row_label(name: str) -> str:
     """Words and symbol of a name of the table; any other name itself."""
-    return QUANTITIES[_own(name)].in_row() if _own(name) in QUANTITIES else name
+    return (
+        QUANTITIES[_qualified_symbol(name)].in_row()
+        if _qualified_symbol(name) in QUANTITIES
+        else name
+    )
 
 
-def _own(name: str) -> str:
+def _qualified_symbol(name: str) -> str:
     """A parameter's own name, where it is told from its namesake as `part.name`."""
     return name.rpartition(".")[2]
 

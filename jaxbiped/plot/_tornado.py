@@ -1,4 +1,4 @@
-"""Which parameter moves a gait how much: tornado charts of elasticities."""
+"""Tornado charts of elasticities: which parameter moves a gait how much."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -62,7 +62,7 @@ def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -
     figure = new_figure(max(3.9 * columns, 4.6), height * rows)
     panels = list(figure.subplots(rows, columns, squeeze=False).flat)
     values = {name: np.asarray(getattr(gait.elasticities, name)) for name in names}
-    largest = max(float(np.max(np.abs(_known(each)))) for each in values.values())
+    largest = max(float(np.max(np.abs(_finite(each)))) for each in values.values())
     for ax, name in zip(panels, names, strict=False):
         _panel(ax, MEASURES[name], gait.parameters, values[name])
         _scale(ax, largest)
@@ -74,7 +74,7 @@ def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -
     return figure
 
 
-def _known(values: np.ndarray) -> np.ndarray:
+def _finite(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values), values, 0.0)
 
 
@@ -82,7 +82,7 @@ def _panel(ax: Axes, title: str, parameters: tuple[str, ...], values: np.ndarray
     """One measure: bars from the largest down, unknown ones last."""
     order = np.argsort(-np.where(np.isfinite(values), np.abs(values), -1.0), kind="stable")
     values = values[order]
-    drawn = _known(values)
+    drawn = _finite(values)
     places = np.arange(len(values))
     colours = [LEG_COLOURS[0] if value >= 0.0 else LEG_COLOURS[1] for value in drawn]
     ax.barh(places, drawn, color=colours, height=0.7)
@@ -118,7 +118,7 @@ def _numbers(ax: Axes, places: np.ndarray, values: np.ndarray) -> None:
         ax.text(
             1.02,
             place,
-            _shown(value),
+            _format(value),
             transform=ax.get_yaxis_transform(),
             va="center",
             fontsize="x-small",
@@ -126,7 +126,7 @@ def _numbers(ax: Axes, places: np.ndarray, values: np.ndarray) -> None:
         )
 
 
-def _shown(value: float) -> str:
+def _format(value: float) -> str:
     if np.isnan(value):
         return "unknown"
     return "0" if value == 0.0 else f"{value:+.2g}".replace("-", "−")

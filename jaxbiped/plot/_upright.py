@@ -1,4 +1,4 @@
-"""The walker as a bystander sees it: gravity down the page and the slope inclined."""
+"""Upright view of the walker: gravity down the page and the slope inclined."""
 
 from typing import NamedTuple
 

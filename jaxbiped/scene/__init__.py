@@ -1,1 +1,1 @@
-"""What is modelled and nothing else. Public names are exported by `jaxbiped`."""
+"""What is modelled and nothing else: walker, ground, laws, and the scenes of them."""

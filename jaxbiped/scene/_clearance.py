@@ -1,4 +1,4 @@
-"""Rules for which foot may touch the ground: how a walker without knees clears it."""
+"""Clearance rules: which foot may touch the ground, as a walker without knees clears it."""
 
 import abc
 

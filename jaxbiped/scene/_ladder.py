@@ -1,14 +1,14 @@
-"""The ladder of fidelity: one walker, modelled more and more closely."""
+"""Ladder of fidelity: one walker, modelled more and more closely."""
 
 import dataclasses
 
 from jaxbiped._checks import check_type
-from jaxbiped.scene._bengisu_akay import BengisuAkay
-from jaxbiped.scene._coulomb import RegularisedCoulomb
-from jaxbiped.scene._lugre import LuGre
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene.laws.bristles._lugre import LuGre
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
+from jaxbiped.scene.laws.friction._coulomb import RegularisedCoulomb
 
 _CREEP = 1e-3
 """Slip speed of the friction without slip cost [m/s]: a stance foot creeps at less than it."""

@@ -4,8 +4,8 @@ import equinox as eqx
 
 from jaxbiped._checks import check_finite, check_type
 from jaxbiped._types import Parameter, as_float
-from jaxbiped.scene._constraint_method import AbstractConstraintMethod
-from jaxbiped.scene._linkage import Linkage
+from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
+from jaxbiped.constraints._linkage import Linkage
 
 
 class LinkageScene(eqx.Module):

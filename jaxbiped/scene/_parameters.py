@@ -1,4 +1,4 @@
-"""A scene's parameters by name."""
+"""Parameters of a scene by name."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -36,7 +36,7 @@ def parameter_values(scene: Scene | RigidScene) -> dict[str, Any]:
     return {name: by_leaf[name] for name in parameter_names(scene)}
 
 
-def chosen_parameters(
+def select_parameters(
     scene: Scene | RigidScene, parameters: tuple[str, ...] | None
 ) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """Names of the parameters asked for, all for None, and the positions of their leaves.
@@ -72,12 +72,12 @@ def with_parameters(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
 
 def _names_by_leaf(scene: Scene | RigidScene) -> list[str]:
     paths = [path for path, _ in jtu.tree_flatten_with_path(scene)[0]]
-    own = [_shown(path[-1:]) for path in paths]
+    own = [_format(path[-1:]) for path in paths]
     return [
-        name if own.count(name) == 1 else _shown(path)
+        name if own.count(name) == 1 else _format(path)
         for name, path in zip(own, paths, strict=True)
     ]
 
 
-def _shown(path: tuple[Any, ...]) -> str:
+def _format(path: tuple[Any, ...]) -> str:
     return ".".join(str(getattr(key, "name", key)) for key in path)

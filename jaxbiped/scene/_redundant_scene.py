@@ -5,16 +5,16 @@ from typing import Any
 import equinox as eqx
 
 from jaxbiped._checks import check_choice, check_type
+from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
+from jaxbiped.constraints._constraint_methods import method_named
+from jaxbiped.constraints._index1 import Index1
+from jaxbiped.constraints._linkage import ORIENTATIONS, Linkage
 from jaxbiped.scene._clearance import AbstractClearance
-from jaxbiped.scene._constraint_method import AbstractConstraintMethod
-from jaxbiped.scene._constraint_methods import method_named
 from jaxbiped.scene._ground import Ground
-from jaxbiped.scene._index1 import Index1
-from jaxbiped.scene._law import AbstractNormalLaw
-from jaxbiped.scene._linkage import ORIENTATIONS, Linkage
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene._walker_linkage import walker_linkage
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 
 class RedundantScene(eqx.Module):

@@ -3,11 +3,11 @@
 import equinox as eqx
 
 from jaxbiped._checks import check_type
-from jaxbiped.scene._bristle_law import AbstractBristleLaw
 from jaxbiped.scene._clearance import AbstractClearance, StanceRotation
 from jaxbiped.scene._ground import Ground
-from jaxbiped.scene._law import AbstractFrictionLaw, AbstractNormalLaw
 from jaxbiped.scene._walker import Walker
+from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, AbstractNormalLaw
+from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 
 class Scene(eqx.Module):

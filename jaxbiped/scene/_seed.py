@@ -1,11 +1,11 @@
 """The seed paper's own scene."""
 
-from jaxbiped.scene._bengisu_akay import BengisuAkay
 from jaxbiped.scene._clearance import StanceRotation
 from jaxbiped.scene._ground import Ground
-from jaxbiped.scene._ristow_schafer import RistowSchafer
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._walker import Walker
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
 
 
 def seed_scene(

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.scene._linkage import Body, Joint, Linkage
+from jaxbiped.constraints._linkage import Body, Joint, Linkage
 from jaxbiped.scene._walker import Walker
 
 

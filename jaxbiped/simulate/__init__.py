@@ -1,1 +1,1 @@
-"""From a scene and a start to a motion, by either engine."""
+"""Simulation: from a scene and a start to a motion, by either engine."""

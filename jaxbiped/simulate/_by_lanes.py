@@ -1,4 +1,4 @@
-"""Simulations run by the lane engine."""
+"""Simulation by lanes."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -12,22 +12,22 @@ from jaxtyping import Array
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._state import State
-from jaxbiped.lanes._adaptive import Solve, Solved
-from jaxbiped.lanes._end_of_solve import almost
-from jaxbiped.lanes._saved import Saved
-from jaxbiped.lanes._solve import (
-    Setting,
-    compiled_solve,
-    expressible,
-    solved,
-    solved_and_saved,
-    solved_step_by_step,
-)
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._recorded_steps import recorded_steps
-from jaxbiped.solve._footstep_limit import PATIENCE
-from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+from jaxbiped.solve._adaptive_program import Solve, Solved
+from jaxbiped.solve._final_step import just_before_end
+from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve.controllers._footstep_limit import PATIENCE
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._differentiable_solve import (
+    Setting,
+    compiled_solve,
+    is_expressible,
+    solve_and_save,
+    solve_scene,
+    solve_step_by_step,
+)
 
 if TYPE_CHECKING:
     from jaxbiped.simulate._simulate import Simulation
@@ -44,15 +44,15 @@ def by_lanes(run: "Simulation") -> Trajectory:
         ended, t, state, dense = _step_by_step(run, setting)
     elif not setting.saved.within:
         if run.extremes is None:
-            ended = solved(_solve(run), setting)
+            ended = solve_scene(_solve(run), setting)
         else:
-            ended, _ = solved_and_saved(_solve(run), setting)
+            ended, _ = solve_and_save(_solve(run), setting)
         t = jnp.reshape(ended.t, (1,))
         state = jtu.tree_map(lambda leaf: jnp.reshape(leaf, (1,)), ended.state)
     else:
         times = None if run.times is None else np.asarray(run.times)
         room = 0 if run.section is None else run.most_arrivals
-        ended, recorded = solved_and_saved(_solve(run), setting, times=times, room=room)
+        ended, recorded = solve_and_save(_solve(run), setting, times=times, room=room)
         assert recorded is not None
         # As diffrax has it: infinite where the solve ended before.
         reached = jnp.arange(recorded.values.shape[0]) < recorded.counts
@@ -75,10 +75,10 @@ def by_lanes(run: "Simulation") -> Trajectory:
 
 def can_by_lanes(run: "Simulation") -> bool:
     """Whether lanes have all operations that a request needs."""
-    return expressible(_setting(run), jtu.tree_structure(run.scene))
+    return is_expressible(_setting(run), jtu.tree_structure(run.scene))
 
 
-def prepared_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
+def prepare_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
     """`by_lanes`, with all compiled that it needs for one simulation.
 
     Where only the end is asked for, what JAX does around it is compiled as well.
@@ -94,7 +94,7 @@ _compiled = eqx.filter_jit(by_lanes)
 def _step_by_step(
     run: "Simulation", setting: Setting
 ) -> tuple[Solved, Array, State, diffrax.DenseInterpolation]:
-    ended, rows = solved_step_by_step(_solve(run), setting, most=run.max_solver_steps)
+    ended, rows = solve_step_by_step(_solve(run), setting, most=run.max_solver_steps)
     ended = jtu.tree_map(jnp.asarray, ended)
     return ended, *recorded_steps(run.state, rows, setting.solver)
 
@@ -121,7 +121,7 @@ def _solve(run: "Simulation") -> Solve:
         scene=run.scene,
         state=run.state,
         duration=run.duration,
-        almost=almost(run.duration),
+        almost=just_before_end(run.duration),
         rtol=run.rtol,
         atol=run.atol,
         units=run.units,

@@ -1,4 +1,4 @@
-"""Simulations run by diffrax, compiled by XLA."""
+"""Simulation by diffrax, compiled by XLA."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -7,16 +7,16 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
 
-from jaxbiped.dynamics._motion import vector_field
+from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._redundant_motion import redundant_field
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import Ending, ending_code, ending_events
-from jaxbiped.solve._extremes import Extremes
-from jaxbiped.solve._footstep_limit import PATIENCE, FootstepLimit
-from jaxbiped.solve._projected import projecting
-from jaxbiped.solve._step_control import first_step, step_control
+from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve.controllers._extremes import Extremes
+from jaxbiped.solve.controllers._footstep_limit import PATIENCE, FootstepLimit
+from jaxbiped.solve.controllers._step_control import first_step, step_control
 
 if TYPE_CHECKING:
     from jaxbiped.simulate._simulate import Simulation
@@ -38,7 +38,7 @@ def by_xla(run: "Simulation") -> Trajectory:
     solver: Any = run.solver
     if isinstance(run.scene, RedundantScene):
         field = redundant_field
-        solver = projecting(run.scene, solver, run.adjoint)
+        solver = with_projection(run.scene, solver, run.adjoint)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(field),
         solver,

@@ -1,4 +1,4 @@
-"""Constraint methods against each other: violation, error and time."""
+"""Comparison of constraint methods: violation, error and time."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -10,15 +10,15 @@ from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_positive, check_type
 from jaxbiped._progress import stage
+from jaxbiped.constraints._constraint_methods import CONSTRAINT_METHODS, method_named
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.scene._constraint_methods import CONSTRAINT_METHODS, method_named
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import Simulation
 from jaxbiped.solve._ending import Ending
-from jaxbiped.solve._solvers import SOLVERS
 from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve.solvers import SOLVERS
 
 ASTRAY = 0.05
 """Error of the state (SI units) from which a run that came to its end has still failed."""
@@ -168,7 +168,7 @@ def _run(
 ) -> ConstraintRun:
     # Not compiled by itself: another tolerance or step size runs the same program.
     request = request_of(scene, state, duration, integrator, save="end", extremes=violation)
-    found, seconds = timed(request, repeats)
+    found, seconds = time_run(request, repeats)
     final = np.array(minimal_state(scene, found.final))
     error = float(np.max(np.abs(final - truth)))
     outcome = found.outcome
@@ -187,7 +187,7 @@ def _run(
     )
 
 
-def timed(request: Simulation, repeats: int) -> tuple[Trajectory, float]:
+def time_run(request: Simulation, repeats: int) -> tuple[Trajectory, float]:
     """What a request gives, and the time of its fastest warm run [s]."""
     found = jax.block_until_ready(request())
     seconds = []

@@ -1,4 +1,4 @@
-"""Trajectories from the steps that the lane engine records."""
+"""Recorded steps of a solve by lanes, as a trajectory's."""
 
 from typing import Any, NamedTuple
 
@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Array
 
 from jaxbiped.dynamics._state import State
-from jaxbiped.solve._rosenbrock import AbstractRosenbrock
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 
 class RecordedSteps(NamedTuple):

@@ -17,13 +17,20 @@ from jaxbiped._checks import (
 )
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._state import checked_state
-from jaxbiped.lanes._rigid import rigid_walk_by_lanes
+from jaxbiped.dynamics._state import check_state
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._start import check_single_scene, in_one_precision, in_own_precision
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._engine import engine_for
-from jaxbiped.solve._rigid_steps import RigidProgress, RigidWalk, attempted, begun, ending_of, whole
+from jaxbiped.solve._rigid_program import rigid_walk_by_lanes
+from jaxbiped.solve._rigid_steps import (
+    RigidProgress,
+    RigidWalk,
+    attempt_step,
+    ending_of,
+    initial_progress,
+    state_with_hip,
+)
 
 RIGID_ACCURACIES = {"fast": 1e-4, "balanced": 1e-6, "tight": 1e-11}
 """Relative tolerance of each named accuracy; the absolute one (SI) is a hundredth of it."""
@@ -94,7 +101,7 @@ def rigid_walk(
     """
     check_type("scene", scene, RigidScene)
     scene = jtu.tree_map(as_float, scene)
-    state = in_one_precision(checked_state(in_own_precision(state), RigidState))
+    state = in_one_precision(check_state(in_own_precision(state), RigidState))
     check_single_scene(scene)
     check_unbatched("state", state, "one start")
     if duration is None and steps is None:
@@ -131,7 +138,7 @@ def rigid_walk(
 
 def _by_lanes(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
     found, recorded = rigid_walk_by_lanes(walk, room=room, waits=waits)
-    times, states = _nothing(walk, room)
+    times, states = _empty_walk(walk, room)
     if recorded is not None:
         reached = jnp.arange(room) < recorded.counts
         values = jnp.where(reached[:, None], recorded.values, jnp.inf)
@@ -148,10 +155,10 @@ def _by_lanes(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
 
 
 def _by_xla(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
-    end, strikes = _looped(walk, room)
+    end, strikes = _loop(walk, room)
     return RigidWalked(
         t=end.t,
-        state=whole(walk, end),
+        state=state_with_hip(walk, end),
         ending=ending_of(walk, end, jnp.asarray(waits)),
         footsteps=end.footsteps,
         attempts=end.attempts,
@@ -161,27 +168,27 @@ def _by_xla(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
 
 
 @eqx.filter_jit
-def _looped(walk: RigidWalk, room: int) -> tuple[RigidProgress, Any]:
+def _loop(walk: RigidWalk, room: int) -> tuple[RigidProgress, Any]:
     def advance(
         loop: tuple[RigidProgress, Any, Scalar],
     ) -> tuple[RigidProgress, Any, Scalar]:
         now, strikes, _ = loop
-        after, over = attempted(walk, now)
+        after, over = attempt_step(walk, now)
         if room:
             # Without a strike the place is past the end, and nothing is written.
             place = jnp.where(after.struck, now.footsteps, room)
             strikes = jtu.tree_map(
                 lambda kept, new: kept.at[place].set(new, mode="drop"),
                 strikes,
-                (after.t, whole(walk, after)),
+                (after.t, state_with_hip(walk, after)),
             )
         return after, strikes, over
 
-    begin = (begun(walk), _nothing(walk, room), jnp.asarray(False))
+    begin = (initial_progress(walk), _empty_walk(walk, room), jnp.asarray(False))
     end, strikes, _ = jax.lax.while_loop(lambda loop: ~loop[2], advance, begin)
     return end, strikes
 
 
-def _nothing(walk: RigidWalk, room: int) -> tuple[Scalar, RigidState]:
+def _empty_walk(walk: RigidWalk, room: int) -> tuple[Scalar, RigidState]:
     empty = jnp.full(room, jnp.inf, dtype=walk.state.theta_1.dtype)
     return empty, RigidState(*[empty] * 5)

@@ -1,4 +1,4 @@
-"""The times at which a simulation saves."""
+"""Saved times of a simulation."""
 
 from typing import Any
 

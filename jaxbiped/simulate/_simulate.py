@@ -1,4 +1,4 @@
-"""Simulating a scene from a start."""
+"""Simulation of a scene from a start."""
 
 from collections.abc import Callable
 from typing import Any, Literal
@@ -20,25 +20,25 @@ from jaxbiped._checks import (
     check_unbatched,
 )
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._bristles import BristleState
-from jaxbiped.dynamics._consistent import Consistent
+from jaxbiped.dynamics._bristle_state import BristleState
+from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.simulate._by_lanes import by_lanes, can_by_lanes, prepared_lanes
+from jaxbiped.simulate._by_lanes import by_lanes, can_by_lanes, prepare_lanes
 from jaxbiped.simulate._by_xla import by_xla
-from jaxbiped.simulate._engine import chosen_engine
+from jaxbiped.simulate._engine_choice import choose_engine
 from jaxbiped.simulate._saved_times import check_times
 from jaxbiped.simulate._start import check_steps, start_for
 from jaxbiped.simulate._start_height import check_start_height
 from jaxbiped.solve._accuracy import check_precision, tolerances
 from jaxbiped.solve._ending import WATCHES
-from jaxbiped.solve._footstep_limit import PATIENCE
-from jaxbiped.solve._projected import check_adjoint
-from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve._projected_solver import check_adjoint
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import Units, si_units, units_of
+from jaxbiped.solve.controllers._footstep_limit import PATIENCE
+from jaxbiped.solve.solvers import solver_named
 
 
 def simulate(
@@ -215,7 +215,7 @@ class Simulation(eqx.Module):
         units = units_of(scene, state)
         units = units if atol is None else si_units(units)
         save_steps = isinstance(save, str) and save == "steps"
-        chosen = chosen_engine(
+        chosen = choose_engine(
             engine,
             solver=method,
             save_steps=save_steps,
@@ -252,12 +252,12 @@ class Simulation(eqx.Module):
 
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
-        return by_lanes(self) if self._lanes_can() else _trimmed(by_xla(self))
+        return by_lanes(self) if self._lanes_can() else _trim(by_xla(self))
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
         if self._lanes_can():
-            return CompiledSimulation(prepared_lanes(self), self)
+            return CompiledSimulation(prepare_lanes(self), self)
         program = by_xla.lower(self).compile()  # type: ignore[attr-defined]
         return CompiledSimulation(program, self)
 
@@ -275,10 +275,10 @@ class CompiledSimulation:
 
     def __call__(self) -> Trajectory:
         """Runs the solve and waits for it."""
-        return _trimmed(jax.block_until_ready(self._program(self._request)))
+        return _trim(jax.block_until_ready(self._program(self._request)))
 
 
-def _trimmed(trajectory: Trajectory) -> Trajectory:
+def _trim(trajectory: Trajectory) -> Trajectory:
     """Cuts unused room off a single trajectory; one that is being traced keeps it."""
     if trajectory.dense is None or isinstance(trajectory.t, jax.core.Tracer):
         return trajectory

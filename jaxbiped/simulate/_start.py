@@ -8,16 +8,16 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_positive, check_unbatched, holds_somewhere
-from jaxbiped.dynamics._bristles import state_for
-from jaxbiped.dynamics._consistent import Consistent, consistent_state
-from jaxbiped.dynamics._independence import check_independent
+from jaxbiped.constraints._independence import check_independent
+from jaxbiped.dynamics._bristle_state import state_for
+from jaxbiped.dynamics._consistent_state import Consistent, consistent_state
 from jaxbiped.dynamics._redundant_motion import coordinates_of
-from jaxbiped.scene._catalogue import FRICTION_LAWS, NORMAL_LAWS
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._walker import Walker
+from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS
 
 
 def start_for(scene: Scene | RedundantScene, state: Any) -> tuple[Any, Consistent | None]:

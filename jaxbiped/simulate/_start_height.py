@@ -1,4 +1,4 @@
-"""Whether a start stands on the ground, or so deep in it that no contact law means it."""
+"""Height of a start: on the ground, or so deep in it that no contact law means it."""
 
 import math
 from typing import Any
@@ -10,7 +10,7 @@ import jax.tree_util as jtu
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.scene._clearance import AbstractClearance
-from jaxbiped.scene._law import AbstractNormalLaw
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 _DEEPEST = 0.25
 """Penetration of a foot that touches, in units of l, from which it starts below the ground."""
@@ -42,7 +42,7 @@ def check_start_height(scene: Any, state: Any) -> None:
     depths = [walker.r - hip_z + walker.hip_to_foot * math.cos(float(angle)) for angle in angles]
     if max(depths) <= 0.0:
         return
-    energies = _stored(scene.clearance, scene.normal, depths, rates)
+    energies = _contact_energies(scene.clearance, scene.normal, depths, rates)
     stored, depth, leg = max(zip(map(float, energies), depths, (1, 2), strict=True))
     if stored > 0.0 and (depth > _DEEPEST * walker.l or stored > _HIGHEST * lift > 0.0):
         raise ArgumentError(
@@ -53,7 +53,7 @@ def check_start_height(scene: Any, state: Any) -> None:
 
 
 @jax.jit
-def _stored(
+def _contact_energies(
     clearance: AbstractClearance, law: AbstractNormalLaw, depths: Any, rates: Any
 ) -> list[Scalar]:
     """The energy in the contact of each foot, 0 where it does not touch [J]."""

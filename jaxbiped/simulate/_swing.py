@@ -1,4 +1,4 @@
-"""Simulating a linkage in gravity."""
+"""Swing of a linkage in gravity."""
 
 from typing import Any
 
@@ -9,17 +9,17 @@ import jax.tree_util as jtu
 
 from jaxbiped._checks import ArgumentError, check_count, check_finite, check_positive, check_type
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._constraints import Constraints, constraints_of
-from jaxbiped.dynamics._independence import check_independent
+from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
+from jaxbiped.constraints._independence import check_independent
+from jaxbiped.constraints._linkage_constraints import Constraints, constraints_of
+from jaxbiped.constraints._projection import correct_step, nearest_consistent
 from jaxbiped.dynamics._linkage_motion import LinkageState, linkage_field
-from jaxbiped.dynamics._projection import nearest, stepped_back
-from jaxbiped.scene._constraint_method import AbstractProjectingMethod
 from jaxbiped.scene._linkage_scene import LinkageScene
 from jaxbiped.simulate._start import check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
-from jaxbiped.solve._projected import check_adjoint, wrapped
-from jaxbiped.solve._solvers import solver_named
-from jaxbiped.solve._step_control import first_step, step_control
+from jaxbiped.solve._projected_solver import check_adjoint, wrap_projected
+from jaxbiped.solve.controllers._step_control import first_step, step_control
+from jaxbiped.solve.solvers import solver_named
 
 
 class Swing(eqx.Module):
@@ -93,11 +93,11 @@ def swing(
     control = step_control(relative, absolute, rms_norm) if dt is None else None
     scene = jtu.tree_map(as_float, scene)
     chosen = diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint
-    return _swung(scene, state, times, method, control, dt, max_solver_steps, chosen)
+    return _solve(scene, state, times, method, control, dt, max_solver_steps, chosen)
 
 
 @eqx.filter_jit
-def _swung(
+def _solve(
     scene: LinkageScene,
     state: LinkageState,
     times: Scalar,
@@ -108,9 +108,9 @@ def _swung(
     adjoint: Any,
 ) -> Swing:
     if isinstance(scene.method, AbstractProjectingMethod):
-        solver = wrapped(solver, _stepped_back, adjoint)
+        solver = wrap_projected(solver, _correct_step, adjoint)
     off = _distance(constraints_of(scene.linkage, *state))
-    start = LinkageState(*map(tuple, nearest(scene.linkage, *state)))
+    start = LinkageState(*map(tuple, nearest_consistent(scene.linkage, *state)))
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(linkage_field),
         solver,
@@ -137,9 +137,9 @@ def _swung(
     )
 
 
-def _stepped_back(scene: LinkageScene, state: LinkageState) -> LinkageState:
+def _correct_step(scene: LinkageScene, state: LinkageState) -> LinkageState:
     assert isinstance(scene.method, AbstractProjectingMethod)
-    return LinkageState(*map(tuple, stepped_back(scene.linkage, scene.method, *state)))
+    return LinkageState(*map(tuple, correct_step(scene.linkage, scene.method, *state)))
 
 
 def _distance(at: Constraints) -> Scalar:

@@ -1,1 +1,1 @@
-"""Stiff stepping through diffrax. Public names are exported by `jaxbiped`."""
+"""Stiff solves through diffrax and by lanes."""

@@ -44,14 +44,14 @@ def tolerances(
         ArgumentError: an unknown name, or a tolerance that is not above zero.
     """
     check_choice("accuracy", accuracy, ACCURACIES)
-    relative = resolving(ACCURACIES[accuracy], scene) if rtol is None else rtol
+    relative = resolve_slip_speed(ACCURACIES[accuracy], scene) if rtol is None else rtol
     check_positive("rtol", relative)
     absolute = 1e-2 * relative if atol is None else atol
     check_positive("atol", absolute)
     return Tolerances(relative, absolute)
 
 
-def resolving(rtol: float, scene: Any) -> Any:
+def resolve_slip_speed(rtol: float, scene: Any) -> Any:
     """A relative tolerance, or the largest below it that resolves how friction builds up."""
     law = getattr(scene, "friction", None)
     name = getattr(law, "builds_up_over", None)

@@ -1,4 +1,4 @@
-"""How a simulation can end, and the events that end it."""
+"""Endings of a simulation, and the events that bring them."""
 
 import enum
 from collections.abc import Callable
@@ -11,13 +11,13 @@ import jax.tree_util as jtu
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import Foot, feet, touches
-from jaxbiped.dynamics._motion import accelerations
+from jaxbiped.dynamics._minimal_motion import accelerations
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._clearance import StanceRotation
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._fence import fenced
+from jaxbiped.solve._fusion_barrier import fusion_barrier
 
 _FALL_ANGLE = 1.0
 """A hip lower than a leg at this angle [rad] could carry it has fallen."""
@@ -95,7 +95,7 @@ def is_barred(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
         barred_2 = (off.alpha_2 < 0.0) & (on_2.alpha_2 > 0.0)
         return barred_1, barred_2
 
-    attracted_1, attracted_2 = fenced(turning_1 | turning_2, attracted)
+    attracted_1, attracted_2 = fusion_barrier(turning_1 | turning_2, attracted)
     barred_1, barred_2 = turning_1 & attracted_1, turning_2 & attracted_2
     first_ahead = foot_1.x > foot_2.x
     ahead = (barred_1 & first_ahead) | (barred_2 & ~first_ahead)

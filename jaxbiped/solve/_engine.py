@@ -1,4 +1,4 @@
-"""Names of the engines, and which of them "auto" stands for."""
+"""Engines by name, and which of them "auto" stands for."""
 
 import jax
 

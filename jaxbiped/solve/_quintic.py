@@ -1,4 +1,4 @@
-"""Hermite's quintic through both ends of a step."""
+"""Quintic Hermite interpolation through both ends of a step."""
 
 import functools
 import operator

@@ -12,7 +12,7 @@ from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.solve._ending import Ending, rigid_ending
 from jaxbiped.solve._quintic import Quintic
-from jaxbiped.solve._rolling_step import ORDER, Rates, accelerations, moved, rolling_step
+from jaxbiped.solve._rolling_step import ORDER, Rates, accelerations, advance, rolling_step
 
 _SAFETY, _MOST_SHRINK, _MOST_GROWTH = 0.8, 0.2, 5.0
 _FIRST_STEP = 0.03
@@ -54,7 +54,7 @@ class RigidProgress(NamedTuple):
 
     Attributes:
         t, state: so far; hip_x is where the hip is, was or would be with the stance leg upright,
-            which changes at strikes alone. `whole` gives the hip's own.
+            which changes at strikes alone. `state_with_hip` gives the hip's own.
         rates: angular accelerations of both legs there [rad/s²].
         step: to attempt next [s]; negative while a heel strike is landed on from beyond.
         pace: the last free step, with which the next footstep begins.
@@ -82,7 +82,7 @@ class RigidProgress(NamedTuple):
     code: Scalar
 
 
-def begun(walk: RigidWalk) -> RigidProgress:
+def initial_progress(walk: RigidWalk) -> RigidProgress:
     """Before the first step."""
     zero = jnp.zeros_like(walk.duration)
     none = jnp.zeros((), dtype=jnp.int64)
@@ -90,7 +90,9 @@ def begun(walk: RigidWalk) -> RigidProgress:
     step = jnp.minimum(step, walk.duration)
     no = jnp.asarray(False)
     rates = accelerations(walk.scene, walk.state)
-    upright = walk.state._replace(hip_x=walk.state.hip_x + _rolled(walk, walk.state.theta_2))
+    upright = walk.state._replace(
+        hip_x=walk.state.hip_x + _rolled_distance(walk, walk.state.theta_2)
+    )
     never = jnp.full_like(zero, jnp.inf)
     return RigidProgress(
         t=zero,
@@ -109,26 +111,26 @@ def begun(walk: RigidWalk) -> RigidProgress:
     )
 
 
-def whole(walk: RigidWalk, now: RigidProgress) -> RigidState:
+def state_with_hip(walk: RigidWalk, now: RigidProgress) -> RigidState:
     """The state with the hip where it is."""
     state = now.state
-    return state._replace(hip_x=state.hip_x - _rolled(walk, state.theta_2))
+    return state._replace(hip_x=state.hip_x - _rolled_distance(walk, state.theta_2))
 
 
-def _rolled(walk: RigidWalk, angle: Scalar) -> Scalar:
+def _rolled_distance(walk: RigidWalk, angle: Scalar) -> Scalar:
     """How far the hip goes from a stance leg at this angle to one that is upright [m]."""
     walker = walk.scene.walker
     return walker.hip_to_foot * sine_cosine(angle)[0] + walker.r * angle
 
 
-def attempted(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Scalar]:
+def attempt_step(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Scalar]:
     """One attempted step further, and whether the walk is over (boolean)."""
     trial, error, roughly = rolling_step(walk.scene, now.state, now.rates, now.step, walk.rtol)
     strike = _strike(walk, trial, roughly)
-    free, kept = _free(walk, now, trial, error, roughly, strike)
+    free, kept = _after_free_step(walk, now, trial, error, roughly, strike)
     landing = now.landing > 0
     after = _where(landing, _landing(walk, now, trial, strike), free)
-    after = _where(after.struck, _struck(walk, after, strike), after)
+    after = _where(after.struck, _after_strike(walk, after, strike), after)
     # The last stage is the first one of the next step, after an impact from the new state.
     rates = accelerations(walk.scene, _where(after.struck, strike.state, trial))
     rates = _where(landing | kept, rates, now.rates)
@@ -165,15 +167,15 @@ def _strike(walk: RigidWalk, trial: RigidState, rates: Rates) -> _Strike:
     """`rates` are those of the trial, roughly."""
     opening, rate = _opening(trial)
     rest = -opening / jnp.where(rate == 0.0, 1.0, rate)
-    nearer = moved(trial, rest, [1.0], [rates])
+    nearer = advance(trial, rest, [1.0], [rates])
     # The hip stays where it is, over another leg.
-    rolled = _rolled(walk, nearer.theta_1) - _rolled(walk, nearer.theta_2)
+    rolled = _rolled_distance(walk, nearer.theta_1) - _rolled_distance(walk, nearer.theta_2)
     after = impact(walk.scene, nearer).state._replace(hip_x=nearer.hip_x + rolled)
     near = (jnp.abs(opening) <= _NEAR * jnp.sqrt(walk.rtol)) & (rate < 0.0)
     return _Strike(near, rest, after)
 
 
-def _struck(walk: RigidWalk, trial: RigidProgress, strike: _Strike) -> RigidProgress:
+def _after_strike(walk: RigidWalk, trial: RigidProgress, strike: _Strike) -> RigidProgress:
     """After the strike beside a trial. Where footsteps last alike, the next one is known."""
     t = trial.t + strike.rest
     period = t - trial.strike
@@ -199,7 +201,7 @@ def _step(walk: RigidWalk, t: Scalar, pace: Scalar, due: Scalar, period: Scalar)
     return jnp.minimum(jnp.where(hits, left, pace), walk.duration - t)
 
 
-def _free(
+def _after_free_step(
     walk: RigidWalk,
     now: RigidProgress,
     trial: RigidState,

@@ -1,4 +1,4 @@
-"""One step of the rigid walker in single support, by Dormand and Prince's method of order eight."""
+"""Rolling step: single support of the rigid walker by Dormand and Prince's method of order 8."""
 
 import functools
 import operator
@@ -33,9 +33,9 @@ def rolling_step(
     """
     stages: list[Rates] = [(state.omega_1, state.omega_2, *bends)]
     for row in _TABLEAU.a_lower[:-1]:
-        at = moved(state, step, row, stages)
+        at = advance(state, step, row, stages)
         stages.append((at.omega_1, at.omega_2, *accelerations(scene, at)))
-    end = moved(state, step, _TABLEAU.b_sol[:-1], stages)
+    end = advance(state, step, _TABLEAU.b_sol[:-1], stages)
     share = jnp.zeros_like(step)
     for i, (a, b) in enumerate(zip(state[1:], end[1:], strict=True)):
         error = step * _weighted(_TABLEAU.b_error[:-1], stages, i)
@@ -51,7 +51,7 @@ def accelerations(scene: RigidScene, state: RigidState) -> tuple[Scalar, Scalar]
     return motion.alpha_1, motion.alpha_2
 
 
-def moved(state: RigidState, step: Scalar, weights: Any, stages: list[Rates]) -> RigidState:
+def advance(state: RigidState, step: Scalar, weights: Any, stages: list[Rates]) -> RigidState:
     """The state a step further, at weighted rates of its angles and of their rates."""
     old = state[1:]
     new = (leaf + step * _weighted(weights, stages, i) for i, leaf in enumerate(old))

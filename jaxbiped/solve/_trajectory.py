@@ -1,4 +1,4 @@
-"""What a simulation returns."""
+"""Trajectory: the result of a simulation."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int, PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._state import State
-from jaxbiped.solve._between_steps import between_steps
+from jaxbiped.solve._dense_output import evaluate_dense
 from jaxbiped.solve._ending import Ending
 
 
@@ -72,7 +72,7 @@ class Trajectory(eqx.Module):
         if traced or int(dense.ts_size) == 1:
             states = jax.vmap(dense.evaluate)(flat)
         else:
-            states = between_steps(dense, np.asarray(flat))
+            states = evaluate_dense(dense, np.asarray(flat))
         return jtu.tree_map(lambda leaf: jnp.reshape(leaf, np.shape(t)), states)
 
     def require_dense(self) -> diffrax.DenseInterpolation:

@@ -1,1 +1,1 @@
-"""Basins of attraction: starts, labels, sweeps and stores. Public names: see `jaxbiped`."""
+"""Sweeps: starts, labels, gaits over parameters, stores and executors."""

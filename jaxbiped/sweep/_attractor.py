@@ -1,4 +1,4 @@
-"""Gaits as attractors: in which metric a gait draws starts in, and how far that reaches."""
+"""Attractors: the metric in which a gait draws starts in, and how far that reaches."""
 
 from typing import Any, NamedTuple
 
@@ -9,11 +9,11 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._feet import feet
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._search import Search
-from jaxbiped.gait._system import checked_section
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.variational._hybrid_system import section_of
 
 
 class Attractor(NamedTuple):
@@ -50,7 +50,7 @@ class Attractor(NamedTuple):
         return np.linalg.norm((states - self.point) @ self.metric.T, axis=1)
 
 
-def unmeasured_attractor(scene: Scene | RigidScene, gait: Gait, period: int) -> Attractor:
+def attractor_without_radius(scene: Scene | RigidScene, gait: Gait, period: int) -> Attractor:
     """A gait's metric, from its return map's derivative; its radius is not known yet.
 
     The metric is Lyapunov's for the derivative A on the section: with a contraction q between the
@@ -91,7 +91,7 @@ def section_tangents(scene: Scene | RigidScene, state: Any) -> np.ndarray:
     """Orthonormal directions in which the section extends at a state, shape (m, m − 1)."""
     import scipy.linalg
 
-    section = checked_section(scene, None)
+    section = section_of(scene, None)
     slope = jax.grad(lambda y: section.value(scene, y))(jtu.tree_map(jnp.asarray, state))
     normal = np.array([float(leaf) for leaf in slope[1:]])
     return scipy.linalg.null_space(normal[None])

@@ -1,4 +1,4 @@
-"""One value for each of many starts."""
+"""Broadcasting of one value to many starts."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 
-def repeated(tree: Any, count: int) -> Any:
+def broadcast_leaves(tree: Any, count: int) -> Any:
     """The tree with every leaf repeated along a new first axis, without copies of it."""
 
     def repeat(leaf: Any) -> np.ndarray:

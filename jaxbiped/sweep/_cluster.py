@@ -7,8 +7,8 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from typing import Any
 
 from jaxbiped._checks import ArgumentError, check_positive
-from jaxbiped.lanes._engine import THREADS_VARIABLE, default_threads
-from jaxbiped.sweep._arguments import check_whole
+from jaxbiped.basins._arguments import check_whole
+from jaxbiped.compiler import THREADS_VARIABLE, default_threads
 
 _RETRIES = 3
 """Times that a chunk is labelled again where its worker died."""
@@ -62,10 +62,10 @@ def local_executor(workers: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(
         workers,
         mp_context=multiprocessing.get_context("spawn"),
-        initializer=_limited,
+        initializer=_limit_threads,
         initargs=(max(1, default_threads() // workers),),
     )
 
 
-def _limited(threads: int) -> None:
+def _limit_threads(threads: int) -> None:
     os.environ[THREADS_VARIABLE] = str(threads)

@@ -1,4 +1,4 @@
-"""The gaits of a scene, and how they change with its parameters."""
+"""Family of a scene's gaits, and how they change with its parameters."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.sweep._attractor import Attractor
-from jaxbiped.sweep._broadcast import repeated
+from jaxbiped.sweep._broadcast import broadcast_leaves
 from jaxbiped.sweep._goals import NO_GAIT, Goals
 
 
@@ -53,7 +53,7 @@ class Family(NamedTuple):
             own = tables[0]
             if parameters:
                 own = own._replace(radii=np.full_like(own.radii, NO_GAIT))
-            return repeated(own, count), periods
+            return broadcast_leaves(own, count), periods
         rows = self.row_of(parameters)
         columns = zip(*tables, strict=True)
         return Goals(*[np.stack(column)[rows] for column in columns]), periods

@@ -1,4 +1,4 @@
-"""The search for the gaits that starts may converge to."""
+"""Search for the gaits that starts may converge to."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,9 +11,9 @@ from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.sweep._attractor import Attractor, component_scales, unmeasured_attractor
+from jaxbiped.sweep._attractor import Attractor, attractor_without_radius, component_scales
 from jaxbiped.sweep._family import Family
-from jaxbiped.sweep._follow import Effort
+from jaxbiped.sweep._follow_start import Effort
 from jaxbiped.sweep._radius import with_radius
 
 _SAME = 1e-5
@@ -94,7 +94,7 @@ def _found(
             radius_sensitivities=False,
         )
         if bool(gait.stable):
-            return (with_radius(scene, unmeasured_attractor(scene, gait, period), effort),)
+            return (with_radius(scene, attractor_without_radius(scene, gait, period), effort),)
     return ()
 
 

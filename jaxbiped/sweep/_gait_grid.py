@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._origin import FoundBy
-from jaxbiped.gait._search import Search
 from jaxbiped.sweep._same_store import ALSO, SETTINGS, check_same, check_writers
-from jaxbiped.sweep._store import consolidate, opened, unwritable
+from jaxbiped.sweep._zarr_store import consolidate, open_store, unwritable
 
 if TYPE_CHECKING:
     import xarray
@@ -70,7 +70,7 @@ class GaitGrid:
         if self._path is None:
             return self._dataset.drop_vars(_DONE)
         self._flush()
-        return opened(self._path).drop_vars(_DONE)
+        return open_store(self._path).drop_vars(_DONE)
 
     def _flush(self) -> None:
         import zarr
@@ -115,7 +115,7 @@ def open_gait_grid(
         if path.exists() and any(path.iterdir()):
             check_same(path, settings)
             new = check_writers(path, writer, any_version)
-            dataset = opened(path).load()
+            dataset = open_store(path).load()
             if new:
                 others = [*json.loads(dataset.attrs.get(ALSO, "[]")), dict(writer)]
                 _note(path, {ALSO: json.dumps(others)})

@@ -12,8 +12,8 @@ from tqdm import tqdm
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._search import Search
 from jaxbiped.scene._parameters import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -21,7 +21,7 @@ from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._gait_grid import open_gait_grid
 from jaxbiped.sweep._identity import identity
 from jaxbiped.sweep._provenance import provenance
-from jaxbiped.sweep._store import check_store
+from jaxbiped.sweep._zarr_store import check_store
 
 if TYPE_CHECKING:
     import xarray
@@ -66,7 +66,7 @@ def gait_sweep(
             other settings, or one that cannot be written.
     """
     check_type("scene", scene, Scene, RigidScene, RedundantScene)
-    values = _checked_values(scene, over)
+    values = _check_values(scene, over)
     if store is not None:
         check_store(Path(store))
     options = dict(
@@ -93,7 +93,7 @@ def gait_sweep(
         if again and not near:
             return None
         own = jtu.tree_map(as_float, with_parameters(scene, point))
-        return _found(own, near, options | {"engine": engine}, alone=not again)
+        return _find(own, near, options | {"engine": engine}, alone=not again)
 
     first = search(order[0], again=False)
     assert first is not None
@@ -112,7 +112,7 @@ def gait_sweep(
     return grid.dataset()
 
 
-def _found(scene: Any, near: list[Any], options: dict[str, Any], *, alone: bool) -> Gait:
+def _find(scene: Any, near: list[Any], options: dict[str, Any], *, alone: bool) -> Gait:
     """The gait that a neighbour's leads to; the search's own where that is none or not stable."""
     best: Gait | None = None
     for state in near[:2]:
@@ -128,7 +128,7 @@ def _found(scene: Any, near: list[Any], options: dict[str, Any], *, alone: bool)
     return best
 
 
-def _checked_values(scene: Any, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _check_values(scene: Any, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
     if not over:
         raise ArgumentError("over = {} is not allowed: name at least one parameter.")
     values = {}

@@ -1,4 +1,4 @@
-"""The gaits that starts may converge to, as numbers that a labelling loop reads."""
+"""Goals: gaits that starts may converge to, as numbers that a labelling loop reads."""
 
 import math
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""Labels as a function of coordinates, as analyses of basins ask for them."""
+"""Labels as a function of coordinates, as the analyses of basins ask for them."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped.sweep._ask import LabelOf
-from jaxbiped.sweep._coordinates import check_coordinates
-from jaxbiped.sweep._label import Label
+from jaxbiped.basins._label import Label
+from jaxbiped.basins._label_oracle import LabelOf
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._starts import batch_at
+from jaxbiped.sweep.starts._coordinates import check_coordinates
+from jaxbiped.sweep.starts._starts import batch_at
 
 
 def label_at(
@@ -21,7 +21,7 @@ def label_at(
     place: bool = False,
     follow: Callable[[Any, Any], Any] | None = None,
 ) -> LabelOf:
-    """The labelling as a function of points, for `refined_boundary`, `fatal_push` and so on.
+    """The labelling as a function of points, for the analyses in `jaxbiped.basins`.
 
     Args:
         labelling: see there.

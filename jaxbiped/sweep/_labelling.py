@@ -1,4 +1,4 @@
-"""The labelling of starts: what becomes of each."""
+"""Labelling of starts: what becomes of each."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -15,23 +15,23 @@ from jaxbiped._checks import (
     check_type,
 )
 from jaxbiped._types import as_float
-from jaxbiped.dynamics._bristles import BristleState, state_type
+from jaxbiped.basins._arguments import check_whole
+from jaxbiped.basins._label import Label, label_names
+from jaxbiped.dynamics._bristle_state import BristleState, state_type
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._parameters import parameter_values, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._rigid_walk import RIGID_ACCURACIES
-from jaxbiped.solve._accuracy import ACCURACIES, resolving
+from jaxbiped.solve._accuracy import ACCURACIES, resolve_slip_speed
 from jaxbiped.solve._engine import engine_for
-from jaxbiped.solve._rosenbrock import AbstractRosenbrock
-from jaxbiped.solve._solvers import solver_named
-from jaxbiped.sweep._arguments import check_whole
-from jaxbiped.sweep._broadcast import repeated
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.solve.solvers import solver_named
+from jaxbiped.sweep._broadcast import broadcast_leaves
 from jaxbiped.sweep._family import Family
-from jaxbiped.sweep._follow import Effort, follow
+from jaxbiped.sweep._follow_start import Effort, follow_starts
 from jaxbiped.sweep._identity import identity
-from jaxbiped.sweep._label import Label, label_names
 
 _GAP, _GAP_SHARE = 1e-4, 30.0
 """Gap between states that repeat each other, at least; and in units of the tolerance."""
@@ -105,14 +105,14 @@ class Labelling(eqx.Module):
             ArgumentError: a state of another kind, leaves of different shapes, a parameter that
                 is not allowed.
         """
-        states = _checked_states(self.scene, states)
+        states = _check_states(self.scene, states)
         count = len(states.hip_x)
         values = {} if parameters is None else dict(parameters)
         given = {name: _column(name, value, count) for name, value in values.items()}
         scene = with_parameters(self.scene, {k: jnp.asarray(v) for k, v in given.items()})
         scene = jtu.tree_map(lambda leaf: _spread(leaf, count), scene)
         goals, periods = self.family.goals(given, count)
-        outcome = follow(scene, states, goals, periods, self.effort)
+        outcome = follow_starts(scene, states, goals, periods, self.effort)
         label = outcome.label.astype(np.int8)
         if given and not self.family.names:
             # No gait is known to compare with: a cycle that repeats itself has to do.
@@ -138,7 +138,7 @@ class Labelling(eqx.Module):
         """
         states = self.family.states
         if not self.family.names:
-            return repeated(states[0], count)
+            return broadcast_leaves(states[0], count)
         rows = self.family.row_of(parameters)
         columns = zip(*states, strict=True)
         leaves = [np.array([float(leaf) for leaf in column]) for column in columns]
@@ -159,7 +159,7 @@ class Labelling(eqx.Module):
         }
 
 
-def checked_effort(
+def effort_of(
     scene: Scene | RigidScene,
     *,
     footsteps: int = 30,
@@ -184,7 +184,7 @@ def checked_effort(
         )
     names = RIGID_ACCURACIES if isinstance(scene, RigidScene) else ACCURACIES
     check_choice("accuracy", accuracy, names)
-    tolerance = resolving(names[accuracy], scene) if rtol is None else rtol
+    tolerance = resolve_slip_speed(names[accuracy], scene) if rtol is None else rtol
     check_positive("rtol", tolerance)
     method = solver_named(solver)
     if not isinstance(method, AbstractRosenbrock):
@@ -201,7 +201,7 @@ def checked_effort(
     )
 
 
-def _checked_states(scene: Scene | RigidScene, states: Any) -> Any:
+def _check_states(scene: Scene | RigidScene, states: Any) -> Any:
     kind: Any = RigidState if isinstance(scene, RigidScene) else state_type(scene)
     if kind is BristleState and isinstance(states, State):
         straight: Any = np.zeros_like(np.asarray(states.hip_x))
@@ -228,4 +228,4 @@ def _column(name: str, value: Any, count: int) -> np.ndarray:
 
 def _spread(leaf: Any, count: int) -> np.ndarray:
     array = np.asarray(as_float(leaf))
-    return array if array.shape == (count,) else repeated(array, count)
+    return array if array.shape == (count,) else broadcast_leaves(array, count)

@@ -1,4 +1,4 @@
-"""The nearest start that does not return to the gait: how small a push is fatal."""
+"""Nearest failure: the nearest start that does not return to the gait."""
 
 from typing import Any
 
@@ -7,13 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped.basins._label import Label
+from jaxbiped.basins._minimal_fatal_shock import FatalShock, minimal_fatal_shock
+from jaxbiped.basins._ray_descent import Normal
 from jaxbiped.gait._return_map import return_map
 from jaxbiped.sweep._attractor import Attractor
-from jaxbiped.sweep._fatal_push import FatalPush, fatal_push
 from jaxbiped.sweep._find_family import scene_with
-from jaxbiped.sweep._label import Label
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._ray_turning import Normal
 
 _MOST_FOOTSTEPS = 6
 """After which the distance from the gait is differentiated."""
@@ -28,7 +28,7 @@ def nearest_failure(
     farthest: float = 1.0,
     tolerance: float = 1e-5,
     **options: Any,
-) -> FatalPush:
+) -> FatalShock:
     """The smallest push off the first gait, on its section, after which a start fails.
 
     Coordinates are all of the state's but hip_x, in the order of its leaves, m of them; distances
@@ -41,10 +41,10 @@ def nearest_failure(
             or by differences of the distances along nearby rays.
         farthest: distance up to which to look.
         tolerance: of the distance.
-        options: others of `fatal_push`.
+        options: others of `minimal_fatal_shock`.
 
     Raises:
-        ArgumentError: no gait is known, or an argument of `fatal_push` that is not allowed.
+        ArgumentError: no gait is known, or an argument of `minimal_fatal_shock` is not allowed.
     """
     check_type("labelling", labelling, Labelling)
     family = labelling.family
@@ -63,7 +63,7 @@ def nearest_failure(
         found = labelling(states, parameters=parameters)
         return (found.label != int(Label.WALKING)).astype(int)
 
-    return fatal_push(
+    return minimal_fatal_shock(
         fails,
         attractor.point,
         scales=family.scales[0],

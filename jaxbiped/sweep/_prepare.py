@@ -1,4 +1,4 @@
-"""A labelling made ready: its gaits found, from a start or from what the starts themselves do."""
+"""Preparation of a labelling: its gaits found, from a start or from the starts themselves."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
-from jaxbiped.gait._seed_start import seed_start
+from jaxbiped.basins._arguments import check_whole
+from jaxbiped.basins._label import Label
+from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.scene._parameters import parameter_names, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._rosenbrock import AbstractRosenbrock
-from jaxbiped.sweep._arguments import check_whole
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._find_family import find_family, with_gaits
-from jaxbiped.sweep._label import Label
-from jaxbiped.sweep._labelling import Labelling, checked_effort
-from jaxbiped.sweep._starts import AbstractStarts
+from jaxbiped.sweep._labelling import Labelling, effort_of
+from jaxbiped.sweep.starts._starts import AbstractStarts
 
 _ALIKE = 0.05
 """Distance of two starts' last states, in the components' scales, that count as one guess."""
@@ -53,7 +53,7 @@ def labelling(
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
     """
-    effort = checked_effort(
+    effort = effort_of(
         scene,
         footsteps=footsteps,
         accuracy=accuracy,
@@ -71,7 +71,7 @@ def labelling(
                 f"{name} has values of shape {np.shape(column)}: it must be (k,), k at least 1."
             )
         with_parameters(scene, {name: np.asarray(column, dtype=np.float64)})
-    start = seed_start(scene) if guess is None else guess
+    start = default_guess(scene) if guess is None else guess
     family = find_family(scene, effort, parameters=values, guess=start)
     return Labelling(scene, family, effort)
 

@@ -1,4 +1,4 @@
-"""What made some results."""
+"""Provenance of results."""
 
 import functools
 import hashlib

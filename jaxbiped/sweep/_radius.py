@@ -1,17 +1,17 @@
-"""How far a gait's attraction reaches for certain."""
+"""Radius of certain attraction about a gait."""
 
 from typing import Any
 
 import numpy as np
 
+from jaxbiped.basins._label import Label
+from jaxbiped.basins._spherical_points import spread_directions
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._attractor import Attractor, component_scales, section_tangents
-from jaxbiped.sweep._broadcast import repeated
-from jaxbiped.sweep._follow import Effort, follow
+from jaxbiped.sweep._broadcast import broadcast_leaves
+from jaxbiped.sweep._follow_start import Effort, follow_starts
 from jaxbiped.sweep._goals import Goals
-from jaxbiped.sweep._label import Label
-from jaxbiped.sweep._sphere import spread_directions
 
 _SHELLS = 1e-5 * 1.5 ** np.arange(30)
 """Distances that are tried."""
@@ -36,11 +36,11 @@ def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort)
     tangents = section_tangents(scene, attractor.state)
     back = tangents @ np.linalg.inv(attractor.metric @ tangents)
     offsets = (_SHELLS[:, None, None] * directions).reshape(-1, size - 1) @ back.T
-    states = _moved(attractor.state, offsets)
+    states = _displace(attractor.state, offsets)
     count = len(offsets)
     strikes = attractor.period + (0 if isinstance(scene, RigidScene) else 1)
-    outcome = follow(
-        repeated(scene, count),
+    outcome = follow_starts(
+        broadcast_leaves(scene, count),
         states,
         _no_goals(scene, attractor, count),
         (attractor.period,),
@@ -56,7 +56,7 @@ def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort)
     return attractor._replace(radius=_SHARE * float(_SHELLS[good - 1]) if good else -1.0)
 
 
-def _moved(state: Any, offsets: np.ndarray) -> Any:
+def _displace(state: Any, offsets: np.ndarray) -> Any:
     leaves = [np.full(len(offsets), float(state[0]))]
     leaves += [float(leaf) + offsets[:, i] for i, leaf in enumerate(state[1:])]
     return type(state)(*leaves)
@@ -67,4 +67,4 @@ def _no_goals(scene: Scene | RigidScene, attractor: Attractor, count: int) -> Go
     goals = Goals(
         attractor.point[None], attractor.metric[None], np.full(1, -1.0), np.asarray(scales)
     )
-    return repeated(goals, count)
+    return broadcast_leaves(goals, count)

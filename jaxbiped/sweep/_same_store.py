@@ -1,4 +1,4 @@
-"""Whether a store can be continued: what made it, compared with what would go on."""
+"""Sameness of stores: what made one, compared with what would go on."""
 
 import json
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""How far the feet slide along the ground."""
+"""Sliding of the feet along the ground."""
 
 import jax.numpy as jnp
 
@@ -8,7 +8,7 @@ from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
 
 
-def rolled(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
+def contact_places(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
     """For each foot, the place [m] that changes by what it slips: its rate is the slip speed."""
     both = feet(scene, state)
     return (
@@ -17,7 +17,7 @@ def rolled(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
     )
 
 
-def slid_since(
+def slip_distances(
     scene: Scene, state: State, landed: tuple[Scalar, Scalar]
 ) -> tuple[tuple[Scalar, Scalar], Scalar]:
     """The places at which the feet last came down, and how far the worse one has slid since [m].
@@ -25,9 +25,9 @@ def slid_since(
     Args:
         scene: with the ground.
         state: now.
-        landed: the places a step ago; see `rolled`.
+        landed: the places a step ago; see `contact_places`.
     """
-    both, places = feet(scene, state), rolled(scene, state)
+    both, places = feet(scene, state), contact_places(scene, state)
     kept = [
         jnp.where(touches(foot), old, new)
         for foot, old, new in zip(both, landed, places, strict=True)

@@ -10,17 +10,17 @@ import numpy as np
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped.sweep._arguments import check_whole
-from jaxbiped.sweep._label import Label
+from jaxbiped.basins._arguments import check_whole
+from jaxbiped.basins._label import Label
+from jaxbiped.sweep._array_layout import FIELDS, Layout, fields_of
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._layout import FIELDS, Layout, fields_of
-from jaxbiped.sweep._memory import Memory
+from jaxbiped.sweep._memory_store import Memory
 from jaxbiped.sweep._prepare import Guesses, guesses_among, with_gaits_met, with_guesses
 from jaxbiped.sweep._provenance import provenance
 from jaxbiped.sweep._same_store import GAITS
-from jaxbiped.sweep._starts import AbstractStarts
-from jaxbiped.sweep._store import Store, check_store
-from jaxbiped.sweep._workers import computed
+from jaxbiped.sweep._workers import compute_chunks
+from jaxbiped.sweep._zarr_store import Store, check_store
+from jaxbiped.sweep.starts._starts import AbstractStarts
 
 if TYPE_CHECKING:
     import xarray
@@ -99,11 +99,11 @@ def sweep(
     fresh = int(sizes[missing].sum())
     with tqdm(total=starts.size, unit="starts", disable=not progress, smoothing=0.05) as bar:
         bar.update(starts.size - fresh)
-        for number, fields in computed(known, layout, missing, executor, int(workers)):
+        for number, fields in compute_chunks(known, layout, missing, executor, int(workers)):
             sink.write(number, fields)
             bar.update(int(sizes[number]))
     if look_for_gaits:
-        known = _resolved(known, layout, sink)
+        known = _resolve(known, layout, sink)
     sink.note(
         {
             GAITS: json.dumps(known.family.described()),
@@ -116,7 +116,7 @@ def sweep(
     return dataset
 
 
-def _resolved(labelling: Labelling, layout: Layout, sink: Any) -> Labelling:
+def _resolve(labelling: Labelling, layout: Layout, sink: Any) -> Labelling:
     """Seeks gaits from starts that are unresolved but repeat a cycle; labels the unresolved anew.
 
     Where they were sought is noted first: a run that is killed here finds the same ones again,

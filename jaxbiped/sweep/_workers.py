@@ -1,4 +1,4 @@
-"""Chunks of a sweep labelled here or by an executor's workers."""
+"""Workers: chunks of a sweep labelled here or by an executor."""
 
 import itertools
 import pickle
@@ -16,10 +16,10 @@ from concurrent.futures import (
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.sweep._given_starts import GivenStarts
+from jaxbiped.sweep._array_layout import Layout, fields_of
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._layout import Layout, fields_of
-from jaxbiped.sweep._starts import AbstractStarts
+from jaxbiped.sweep.starts._given_starts import GivenStarts
+from jaxbiped.sweep.starts._starts import AbstractStarts
 
 _AHEAD = 2
 """Chunks handed out for each worker, so that none waits for the next."""
@@ -27,7 +27,7 @@ _AHEAD = 2
 Fields = dict[str, np.ndarray]
 
 
-def computed(
+def compute_chunks(
     labelling: Labelling,
     layout: Layout,
     chunks: np.ndarray,
@@ -41,7 +41,7 @@ def computed(
     """
     if executor is None:
         for chunk in map(int, chunks):
-            yield chunk, label_some(labelling, *_part(layout, chunk))
+            yield chunk, label_range(labelling, *_part(layout, chunk))
         return
     _check_sent(executor, labelling, layout)
     queue = map(int, chunks)
@@ -49,7 +49,7 @@ def computed(
     try:
         while True:
             for chunk in itertools.islice(queue, _AHEAD * workers - len(running)):
-                running[_submitted(executor, labelling, layout, chunk)] = chunk
+                running[_submit(executor, labelling, layout, chunk)] = chunk
             if not running:
                 return
             ready, _ = wait(running, return_when=FIRST_COMPLETED)
@@ -61,7 +61,7 @@ def computed(
             future.cancel()
 
 
-def label_some(labelling: Labelling, starts: AbstractStarts, first: int, last: int) -> Fields:
+def label_range(labelling: Labelling, starts: AbstractStarts, first: int, last: int) -> Fields:
     """The fields of the starts from `first` up to `last`, flat: what a worker computes."""
     batch = starts.batch(labelling, first, last)
     return fields_of(starts, labelling(batch.states, parameters=batch.parameters), batch)
@@ -75,11 +75,9 @@ def _part(layout: Layout, chunk: int) -> tuple[AbstractStarts, int, int]:
     return layout.starts, first, last
 
 
-def _submitted(
-    executor: Executor, labelling: Labelling, layout: Layout, chunk: int
-) -> Future[Fields]:
+def _submit(executor: Executor, labelling: Labelling, layout: Layout, chunk: int) -> Future[Fields]:
     try:
-        return executor.submit(label_some, labelling, *_part(layout, chunk))
+        return executor.submit(label_range, labelling, *_part(layout, chunk))
     except (BrokenExecutor, RuntimeError) as error:
         raise _lost(executor, error) from None
 

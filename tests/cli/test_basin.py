@@ -66,7 +66,7 @@ def test_picture_and_results(basin, numbers):
     assert found.theta_swing.attrs["units"] == "rad"
     stored = xr.open_zarr(basin / "store")
     assert np.array_equal(stored.label, found.label)
-    walks = int((found.label == jb.Label.WALKING).sum())
+    walks = int((found.label == jb.basins.Label.WALKING).sum())
     assert walks == numbers["counts"]["walking period-1"]
 
 

@@ -46,9 +46,9 @@ def test_compares_methods_and_integrators(capsys, tmp_path):
 def test_flags_build_the_scene():
     scene = SceneOptions(formulation="redundant", method="baumgarte", orientation="euler").scene()
     assert isinstance(scene, jb.RedundantScene)
-    assert isinstance(scene.method, jb.Baumgarte)
+    assert isinstance(scene.method, jb.constraints.Baumgarte)
     assert scene.orientation == "euler"
-    assert isinstance(SceneOptions(formulation="redundant").scene().method, jb.Index1)
+    assert isinstance(SceneOptions(formulation="redundant").scene().method, jb.constraints.Index1)
 
 
 @pytest.mark.parametrize(

@@ -17,12 +17,12 @@ def test_the_seed_s_scene_starts_as_the_seed_to_the_last_bit(slope):
     assert jax.tree.leaves(start) == jax.tree.leaves(jb.seed_state())
     seed = jb.seed_scene(slope=slope)
     rolling = default_start(jb.RigidScene(seed.walker, seed.ground))
-    assert jax.tree.leaves(rolling) == jax.tree.leaves(jb.rigid_state(jb.seed_state()))
+    assert jax.tree.leaves(rolling) == jax.tree.leaves(jb.dynamics.rigid_state(jb.seed_state()))
 
 
 def _load(scene, start):
     """The elastic force under the standing foot, in units of the weight."""
-    foot = jb.feet(scene, start).foot_2
+    foot = jb.dynamics.feet(scene, start).foot_2
     force = scene.normal.elastic_force(foot.penetration)
     return float(force / (scene.walker.total_mass * scene.ground.g))
 
@@ -33,8 +33,10 @@ SCENES = {
     "longer": jb.seed_scene(l=0.8, d=0.3),
     "heavier": jb.seed_scene(m=3.0, hip_mass=2.0),
     "on the moon": jb.seed_scene(g=1.6),
-    "linear": dataclasses.replace(jb.seed_scene(), normal=jb.KelvinVoigt(3e4, 100.0)),
-    "smooth": dataclasses.replace(jb.seed_scene(), normal=jb.SmoothRistowSchafer(K=1e7, c=1e7)),
+    "linear": dataclasses.replace(jb.seed_scene(), normal=jb.laws.KelvinVoigt(3e4, 100.0)),
+    "smooth": dataclasses.replace(
+        jb.seed_scene(), normal=jb.laws.SmoothRistowSchafer(K=1e7, c=1e7)
+    ),
 }
 
 
@@ -46,7 +48,7 @@ def test_another_scene_is_loaded_as_the_seed_s(name):
 
 def test_a_ground_too_soft_to_stand_on_is_started_near_its_surface():
     scene = jb.seed_scene(K=2.0)
-    foot = jb.feet(scene, default_start(scene)).foot_2
+    foot = jb.dynamics.feet(scene, default_start(scene)).foot_2
     assert float(foot.penetration) == pytest.approx(0.04, rel=1e-6)
 
 

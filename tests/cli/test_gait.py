@@ -112,7 +112,7 @@ def test_a_search_that_fails_says_so(gait, tmp_path, capsys, monkeypatch):
     unknown = np.asarray(np.nan)
     lost = dataclasses.replace(
         gait[2],
-        ending=np.asarray(int(jb.Search.NOT_CONVERGED)),
+        ending=np.asarray(int(jb.gait.Search.NOT_CONVERGED)),
         walk_ending=np.asarray(int(jb.Ending.FELL_FORWARD)),
         residual=np.asarray(0.0123),
         measures=gait[2].measures._replace(period=unknown),

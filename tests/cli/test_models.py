@@ -22,8 +22,8 @@ def _run(*arguments):
 def test_lists_every_law_with_units_and_cost(capsys):
     assert _run("models", "--json", "-") == 0
     listed = json.loads(capsys.readouterr().out)
-    assert {law["name"] for law in listed["normal"]} == set(jb.NORMAL_LAWS)
-    assert {law["name"] for law in listed["friction"]} == set(jb.FRICTION_LAWS)
+    assert {law["name"] for law in listed["normal"]} == set(jb.laws.NORMAL_LAWS)
+    assert {law["name"] for law in listed["friction"]} == set(jb.laws.FRICTION_LAWS)
     assert [rung["name"] for rung in listed["rungs"]] == list(jb.ladder())
     for law in listed["normal"] + listed["friction"]:
         assert law["operations"] > 0
@@ -60,8 +60,8 @@ def test_flags_build_the_scene():
     scene = SceneOptions(
         normal="hunt-crossley", friction="coulomb", set=("hysteresis=2.5",)
     ).scene()
-    assert isinstance(scene.normal, jb.HuntCrossley)
-    assert isinstance(scene.friction, jb.RegularisedCoulomb)
+    assert isinstance(scene.normal, jb.laws.HuntCrossley)
+    assert isinstance(scene.friction, jb.laws.RegularisedCoulomb)
     assert float(scene.normal.hysteresis) == 2.5
     rigid = SceneOptions(model="rigid", slope=0.03, hip_mass=1.0).scene()
     assert isinstance(rigid, jb.RigidScene)
@@ -107,9 +107,9 @@ def test_rigid_walk_and_gait(tmp_path, capsys):
     assert _run("gait", "--model", "rigid", "--json", str(gait)) == 0
     numbers = json.loads(gait.read_text())
     assert numbers["period_s"] == pytest.approx(0.44378, abs=5e-6)
-    assert set(numbers["state"]) == set(jb.RigidState._fields)
+    assert set(numbers["state"]) == set(jb.dynamics.RigidState._fields)
     # By multipliers of Lagrange for the rolling foot, along an integration of their own.
-    state = jb.RigidState(**numbers["state"])
+    state = jb.dynamics.RigidState(**numbers["state"])
     needed = needed_friction(SceneOptions(model="rigid").scene(), state)
     assert numbers["assumptions"]["needed_friction"] == pytest.approx(needed, rel=1e-9)
     said = f"a real foot needs a friction coefficient of {needed:.3f}"

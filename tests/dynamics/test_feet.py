@@ -10,21 +10,21 @@ import jaxbiped as jb
 
 def test_foot_at_the_seed_start():
     """Leg 2 stands, slightly indented and all but rolling; leg 1 hangs clear of the ground."""
-    swing, stance = jb.feet(jb.seed_scene(), jb.seed_state())
+    swing, stance = jb.dynamics.feet(jb.seed_scene(), jb.seed_state())
     assert float(stance.penetration) == pytest.approx(0.08 - 0.395 + 0.32 * np.cos(0.1655))
-    assert bool(jb.touches(stance))
+    assert bool(jb.dynamics.touches(stance))
     assert float(swing.penetration) < 0.0
-    assert not bool(jb.touches(swing))
+    assert not bool(jb.dynamics.touches(swing))
     assert abs(float(stance.slip_speed)) < 1e-3
 
 
 def test_velocities_are_derivatives_of_positions():
     scene, state = jb.seed_scene(), jb.seed_state()._replace(omega_1=jnp.asarray(2.0))
-    rate = jb.vector_field(0.0, state, scene)
+    rate = jb.dynamics.vector_field(0.0, state, scene)
     for i in (0, 1):
-        position = lambda s, i=i: (jb.feet(scene, s)[i].x, jb.feet(scene, s)[i].z)
+        position = lambda s, i=i: (jb.dynamics.feet(scene, s)[i].x, jb.dynamics.feet(scene, s)[i].z)
         vx, vz = jax.jvp(position, (state,), (rate,))[1]
-        foot = jb.feet(scene, state)[i]
+        foot = jb.dynamics.feet(scene, state)[i]
         np.testing.assert_allclose((foot.vx, foot.vz), (vx, vz), rtol=1e-12)
         assert float(foot.penetration_rate) == pytest.approx(-float(vz))
 
@@ -34,11 +34,13 @@ def test_a_rolling_foot_does_not_slip():
     state = jb.seed_state()._replace(
         theta_2=jnp.asarray(0.0), omega_2=jnp.asarray(-1.0), hip_vx=jnp.asarray(0.4)
     )
-    assert float(jb.feet(jb.seed_scene(), state).foot_2.slip_speed) == pytest.approx(0.0)
+    assert float(jb.dynamics.feet(jb.seed_scene(), state).foot_2.slip_speed) == pytest.approx(0.0)
 
 
 def test_standing_height():
     scene = jb.seed_scene()
-    height = jb.standing_height(scene, jnp.asarray(0.3), 1e-3)
+    height = jb.dynamics.standing_height(scene, jnp.asarray(0.3), 1e-3)
     state = jb.seed_state()._replace(theta_2=jnp.asarray(0.3), hip_z=height)
-    assert float(jb.feet(scene, state).foot_2.penetration) == pytest.approx(1e-3, abs=1e-12)
+    assert float(jb.dynamics.feet(scene, state).foot_2.penetration) == pytest.approx(
+        1e-3, abs=1e-12
+    )

@@ -21,7 +21,7 @@ WALKERS = [rigid_seed(0.03), compass_gait(), jb.RigidScene(
 )]  # fmt: skip
 floats = lambda low, high: st.floats(low, high, allow_subnormal=False)
 states = st.builds(
-    lambda a, b, p, q: jb.RigidState(*map(jnp.asarray, (0.3, a, b, p, q))),
+    lambda a, b, p, q: jb.dynamics.RigidState(*map(jnp.asarray, (0.3, a, b, p, q))),
     floats(-0.9, 0.9), floats(-0.9, 0.9), floats(-4.0, 4.0), floats(-4.0, 4.0),
 )  # fmt: skip
 
@@ -32,7 +32,7 @@ states = st.builds(
 def test_rolling_solves_the_equations_with_multipliers(scene, state):
     _, theta, rates = coordinates(scene, state)
     solved = rolling_solution(scene, theta, rates)
-    motion = jb.rolling(scene, state)
+    motion = jb.dynamics.rolling(scene, state)
     got = [motion.alpha_1, motion.alpha_2, motion.force.tangential, motion.force.normal]
     scale = np.abs(solved).max()
     np.testing.assert_allclose(np.array(got), solved[2:], rtol=1e-10, atol=1e-12 * scale)
@@ -46,7 +46,7 @@ def test_an_impact_keeps_two_angular_momenta_and_stops_the_new_contact(scene, st
     walker, reach = scene.walker, float(scene.walker.hip_to_foot)
     state = state._replace(theta_2=-state.theta_1)
     whole, theta, before = coordinates(scene, state)
-    found = jb.impact(scene, state)
+    found = jb.dynamics.impact(scene, state)
     _, after_theta, after = coordinates(scene, found.state)
     np.testing.assert_allclose(after_theta, theta[::-1], rtol=0.0, atol=0.0)
     after = np.array([after[0], after[1], after[3], after[2]])  # by the old names
@@ -85,8 +85,10 @@ def test_the_simplest_walkers_equations():
     gamma = 0.009
     scene = simplest_walker(gamma)
     for theta, rate, phi, turn in ((0.2, -0.2, 0.4, -0.01), (-0.1, -0.3, -0.3, 0.5)):
-        state = jb.RigidState(*map(jnp.asarray, (0.0, theta - phi, theta, rate - turn, rate)))
-        motion = jb.rolling(scene, state)
+        state = jb.dynamics.RigidState(
+            *map(jnp.asarray, (0.0, theta - phi, theta, rate - turn, rate))
+        )
+        motion = jb.dynamics.rolling(scene, state)
         stance = np.sin(theta - gamma)
         swing = stance + np.sin(phi) * (rate**2 - np.cos(theta - gamma))
         np.testing.assert_allclose(motion.alpha_2, stance, rtol=1e-11)
@@ -95,7 +97,7 @@ def test_the_simplest_walkers_equations():
 
 def energy(scene, state):
     walker, ground = scene.walker, scene.ground
-    whole = jb.whole_state(scene, state)
+    whole = jb.dynamics.whole_state(scene, state)
     down = jnp.array([jnp.sin(ground.slope), -jnp.cos(ground.slope)])
     hip = jnp.array([whole.hip_x, whole.hip_z])
     speed = jnp.array([whole.hip_vx, whole.hip_vz])
@@ -110,8 +112,8 @@ def energy(scene, state):
 
 @pytest.mark.parametrize("scene", WALKERS)
 def test_rolling_keeps_energy(scene):
-    state = jb.RigidState(*map(jnp.asarray, (0.1, -0.3, 0.2, 0.4, -0.9)))
-    rates = jb.rolling_field(0.0, state, scene)
+    state = jb.dynamics.RigidState(*map(jnp.asarray, (0.1, -0.3, 0.2, 0.4, -0.9)))
+    rates = jb.dynamics.rolling_field(0.0, state, scene)
     _, power = jax.jvp(lambda y: energy(scene, y), (state,), (rates,))
     assert abs(float(power)) < 1e-12 * float(jnp.abs(energy(scene, state)) + 1.0)
 
@@ -119,7 +121,7 @@ def test_rolling_keeps_energy(scene):
 @pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-11])
 def test_a_swing_keeps_energy_to_the_tolerance(rtol):
     scene = WALKERS[0]
-    start = jb.RigidState(*map(jnp.asarray, (0.0, -0.24, 0.24, -1.09, -1.64)))
+    start = jb.dynamics.RigidState(*map(jnp.asarray, (0.0, -0.24, 0.24, -1.09, -1.64)))
     swing = jb.rigid_walk(scene, start, duration=0.3, rtol=rtol)
     assert int(swing.footsteps) == 0
     before, after = float(energy(scene, start)), float(energy(scene, swing.state))
@@ -129,10 +131,10 @@ def test_a_swing_keeps_energy_to_the_tolerance(rtol):
 
 def test_checks_name_what_a_real_foot_would_do():
     scene = rigid_seed()
-    fast = jb.RigidState(*map(jnp.asarray, (0.0, -0.2, 0.2, 0.0, -12.0)))
+    fast = jb.dynamics.RigidState(*map(jnp.asarray, (0.0, -0.2, 0.2, 0.0, -12.0)))
     still = fast._replace(omega_2=jnp.asarray(0.0), theta_1=jnp.asarray(0.1))
     two = jax.tree.map(lambda a, b: jnp.stack([a, b]), fast, still)
-    checks = jb.rigid_checks(scene, two)
+    checks = jb.dynamics.rigid_checks(scene, two)
     assert checks.flies.tolist() == [True, False]  # centripetal: 12² × 0.3 m/s² lifts it
     assert checks.scuffs.tolist() == [False, True]  # the swing leg is the more upright one
     assert checks.slips(0.01).tolist() == [True, True]

@@ -17,7 +17,7 @@ def test_many_starts_find_a_stable_and_an_unstable_gait():
     assert period[stable] == pytest.approx([0.4408349], abs=1e-6)
     assert period[~stable] == pytest.approx([0.3910974], abs=1e-6)
     # One start leads to an orbit whose feet swing 9 mm underground.
-    assert np.sum(np.asarray(found.ending) == int(jb.Search.NO_WALK)) == 1
+    assert np.sum(np.asarray(found.ending) == int(jb.gait.Search.NO_WALK)) == 1
     assert int(np.sum(found.reached)) == int(np.sum(np.asarray(found.which) >= 0))
     assert np.all((np.asarray(found.ending) == 0) == (np.asarray(found.which) >= 0))
     assert np.all(np.diff(np.asarray(found.reached)) <= 0)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.lanes._engine import CompiledProgram
+from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 
 pytestmark = pytest.mark.slow
 
@@ -16,8 +16,8 @@ def found():
 
 
 def test_seed_gait(found):
-    assert found.outcome == jb.Search.FOUND
-    assert found.critical == jb.Bifurcation.NONE
+    assert found.outcome == jb.gait.Search.FOUND
+    assert found.critical == jb.gait.Bifurcation.NONE
     assert bool(found.stable)
     assert float(found.measures.period) == pytest.approx(0.4408349, abs=1e-7)
     assert float(found.measures.step_length) == pytest.approx(0.1792270, abs=1e-7)
@@ -38,15 +38,15 @@ def test_no_turn_is_solved_twice(found, monkeypatch):
     monkeypatch.setattr(CompiledProgram, "run_table", counted)
     again = jb.find_gait(jb.seed_scene())
     # A run for each turn; the second derivatives' runs there, recorded, and back, which is not.
-    assert len(most) == int(again.turns) + 2
+    assert len(most) == int(again.evaluations) + 2
     assert [room > 0 for room in most] == [True] * (len(most) - 1) + [False]
     np.testing.assert_array_equal(again.orbit[0], found.orbit[0])
 
 
 def test_far_from_a_gait_only_the_state_is_differentiated_by(found):
     """By lanes: the return map's slopes are right there, of parameters nothing is claimed."""
-    gait = jb.find_gait(jb.seed_scene(), most_turns=2)
-    assert gait.outcome == jb.Search.NOT_CONVERGED
+    gait = jb.find_gait(jb.seed_scene(), max_evaluations=2)
+    assert gait.outcome == jb.gait.Search.NOT_CONVERGED
     assert np.isnan(gait.sensitivities.period).all()
     start, h = gait.measures.state, 1e-6
     moved = [
@@ -61,7 +61,7 @@ def test_far_from_a_gait_only_the_state_is_differentiated_by(found):
 def test_a_start_that_falls_gives_no_gait():
     state = jb.seed_state()._replace(omega_2=jnp.asarray(-3.0), hip_vx=jnp.asarray(1.5))
     gait = jb.find_gait(jb.seed_scene(), state)
-    assert gait.outcome == jb.Search.NO_RETURN
+    assert gait.outcome == jb.gait.Search.NO_RETURN
     assert gait.walk_outcome != jb.Ending.WALKING
     assert not np.isfinite(float(gait.residual))
     assert np.isnan(float(gait.measures.period))
@@ -71,7 +71,7 @@ def test_a_start_that_falls_gives_no_gait():
 def test_no_gait_on_the_level():
     """A slope of nothing feeds no energy: the search says so, with what it had."""
     gait = jb.find_gait(jb.seed_scene(slope=0.0))
-    assert gait.outcome in (jb.Search.NO_RETURN, jb.Search.NOT_CONVERGED)
+    assert gait.outcome in (jb.gait.Search.NO_RETURN, jb.gait.Search.NOT_CONVERGED)
     assert not bool(gait.stable)
 
 
@@ -99,7 +99,7 @@ def test_vmap_over_scenes_changes_nothing(found):
         (dict(period=1.5), "period"),
         (dict(parameters=("K", "stiffness")), "parameters"),
         (dict(method="secant"), "method"),
-        (dict(most_turns=0), "most_turns"),
+        (dict(max_evaluations=0), "max_evaluations"),
         (dict(solver="euler"), "solver"),
     ],
 )

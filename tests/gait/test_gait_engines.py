@@ -20,7 +20,7 @@ def gaits():
 def test_both_find_the_same_gait_and_the_same_derivatives(gaits):
     ours, theirs = gaits["lanes"], gaits["xla"]
     assert (ours.engine, theirs.engine) == ("lanes", "xla")
-    assert ours.outcome == theirs.outcome == jb.Search.FOUND
+    assert ours.outcome == theirs.outcome == jb.gait.Search.FOUND
     for name in ("period", "step_length", "speed", "peak_normal", "spectral_radius"):
         a, b = (float(getattr(gait.measures, name)) for gait in (ours, theirs))
         assert a == pytest.approx(b, rel=5e-5)
@@ -90,7 +90,7 @@ def test_a_large_batch_of_gaits_ends():
         return gait.measures.spectral_radius, gait.ending
 
     radii, endings = jax.jit(jax.vmap(radius))(jnp.linspace(0.0195, 0.0205, 256))
-    assert np.all(np.asarray(endings) == int(jb.Search.FOUND))
+    assert np.all(np.asarray(endings) == int(jb.gait.Search.FOUND))
     assert np.all(np.abs(np.diff(radii)) < 1e-3)
 
 

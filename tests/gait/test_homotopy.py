@@ -16,8 +16,10 @@ SCENES = {
     "other laws": jb.Scene(
         walker=jb.seed_scene().walker,
         ground=jb.Ground(slope=0.03),
-        normal=jb.normal_law_like("tsuji", K=1e5, c=1e6, n=1.5, mass=2.0, g=9.8),
-        friction=jb.friction_law_like("lugre", mu_static=0.6, mu_kinetic=0.5, v0=1e-3, xi=10.0),
+        normal=jb.laws.normal_law_like("tsuji", K=1e5, c=1e6, n=1.5, mass=2.0, g=9.8),
+        friction=jb.laws.friction_law_like(
+            "lugre", mu_static=0.6, mu_kinetic=0.5, v0=1e-3, xi=10.0
+        ),
     ),
 }
 
@@ -47,6 +49,6 @@ def test_positive_parameters_go_geometrically_and_slopes_are_derivatives():
 def test_laws_resemble_the_seeds_at_the_beginning():
     seed = jb.seed_scene()
     begin = homotopy_to(SCENES["other laws"]).first
-    like = jb.normal_law_like("tsuji", K=1e6, c=1e7, n=1.5, mass=2.0, g=9.8)
+    like = jb.laws.normal_law_like("tsuji", K=1e6, c=1e7, n=1.5, mass=2.0, g=9.8)
     assert float(begin.normal.K) == pytest.approx(float(like.K))
     assert float(begin.friction.mu_static) == float(seed.friction.mu_static)

@@ -34,7 +34,7 @@ def gaits():
 
 def test_gait_multipliers_and_sensitivities_agree(gaits):
     minimal, redundant = gaits
-    assert redundant.outcome is jb.Search.FOUND
+    assert redundant.outcome is jb.gait.Search.FOUND
     assert redundant.engine == "xla"
     assert redundant.multipliers.shape == (6,)
     ours, expected = redundant.measures, minimal.measures

@@ -12,16 +12,16 @@ from scipy.optimize import brentq
 
 import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
+from jaxbiped.gait._fixed_point_search import search
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._orbit import orbit_of
 from jaxbiped.gait._precision import precision_of
-from jaxbiped.gait._search import search
-from jaxbiped.gait._turn import Turning
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 
 pytestmark = pytest.mark.slow
 
 
-class Smooth(jb.AbstractSystem):
+class Smooth(jb.gait.AbstractSystem):
     """Without switches, endings or load."""
 
     def switches(self, args, y):
@@ -37,7 +37,7 @@ class Smooth(jb.AbstractSystem):
 class Flowing(Smooth):
     """Nothing is done to the state at an arrival."""
 
-    def renew(self, args, y):
+    def reset_map(self, args, y):
         return y
 
 
@@ -61,7 +61,7 @@ class Ball(Smooth):
         drag, _, _ = args
         return y[1], -9.8 - drag * y[1]
 
-    def renew(self, args, y):
+    def reset_map(self, args, y):
         _, restitution, paddle = args
         return y[0], -restitution * y[1] + paddle
 
@@ -175,9 +175,9 @@ def test_every_solver_carries_derivatives(solver, engine):
     assert float(slope) == pytest.approx(factor, rel=1e-4)
 
 
-def _orbit(turning, args, guess):
-    found = search(turning, args, (0,), guess, precision_of("tight"), Method(None, 40, 1e-10))
-    return orbit_of(turning, args, (0,), guess, found, radius=True)
+def _orbit(spec, args, guess):
+    found = search(spec, args, (0,), guess, precision_of("tight"), Method(None, 40, 1e-10))
+    return orbit_of(spec, args, (0,), guess, found, radius=True)
 
 
 def test_van_der_pol_multiplier_and_its_sensitivities():
@@ -199,8 +199,8 @@ def test_van_der_pol_multiplier_and_its_sensitivities():
             y, total, period = s.y_events[0][k][:2], s.y_events[0][k][2], s.t_events[0][k]
         return np.array([y[0], period, math.exp(total)])
 
-    turning = Turning(VanDerPol(), TURNING_POINT, jb.Rodas4(), 20.0, 1, 32768, "xla")
-    orbit = jax.jit(lambda mu: _orbit(turning, mu, (jnp.asarray(-2.1), jnp.asarray(0.1))))(
+    spec = ReturnMapSpec(VanDerPol(), TURNING_POINT, jb.solvers.Rodas4(), 20.0, 1, 32768, "xla")
+    orbit = jax.jit(lambda mu: _orbit(spec, mu, (jnp.asarray(-2.1), jnp.asarray(0.1))))(
         jnp.asarray(1.0)
     )
     expected = reference(1.0)
@@ -220,9 +220,9 @@ def test_bouncing_ball_in_a_cycle_of_two():
     args = tuple(jnp.asarray(value) for value in (0.3, 0.8, 1.0))
     found = []
     for steps in (1, 2):
-        turning = Turning(Ball(), DOWN, jb.Rodas4(), 20.0, steps, 32768, "xla")
+        spec = ReturnMapSpec(Ball(), DOWN, jb.solvers.Rodas4(), 20.0, steps, 32768, "xla")
         guess = (jnp.asarray(0.0), jnp.asarray(4.0))
-        found.append(_orbit(turning, args, guess))
+        found.append(_orbit(spec, args, guess))
     once, twice = found
     assert float(twice.found.last.period) == pytest.approx(2 * float(once.found.last.period))
     one, two = (float(orbit.found.last.jacobian[1, 1]) for orbit in found)

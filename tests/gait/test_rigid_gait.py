@@ -29,7 +29,7 @@ def test_fixed_points_of_the_simplest_walker(published):
     theta, rate = published
     start = simplest_state(theta + 2e-4, rate - 1e-4)
     gait = jb.find_gait(simplest_walker(0.009), start, accuracy="tight", **PLAIN)
-    assert gait.outcome is jb.Search.FOUND
+    assert gait.outcome is jb.gait.Search.FOUND
     state = gait.measures.state
     found = [float(state.theta_2), float(state.omega_2)]
     np.testing.assert_allclose(found, published, rtol=0.0, atol=1e-12)
@@ -51,7 +51,7 @@ def test_first_period_doubling_of_the_simplest_walker():
 
     def multiplier_above_minus_one(slope):
         gait = jb.find_gait(simplest_walker(slope), seen["state"], accuracy="tight", **PLAIN)
-        assert gait.outcome is jb.Search.FOUND
+        assert gait.outcome is jb.gait.Search.FOUND
         seen["state"] = gait.measures.state
         return float(np.min(np.asarray(gait.multipliers).real)) + 1.0
 
@@ -60,7 +60,7 @@ def test_first_period_doubling_of_the_simplest_walker():
     doubling = brentq(multiplier_above_minus_one, 0.0145, 0.0155, xtol=1e-12)
     assert abs(doubling - FIRST_DOUBLING) < 1e-9
     at = jb.find_gait(simplest_walker(doubling), seen["state"], accuracy="tight", **PLAIN)
-    assert at.critical is jb.Bifurcation.PERIOD_DOUBLING
+    assert at.critical is jb.gait.Bifurcation.PERIOD_DOUBLING
 
 
 def test_compass_gait_converges_and_is_stable():
@@ -84,7 +84,7 @@ def assert_returns(scene, state, period):
 
 def test_the_seeds_walker_in_the_rigid_limit():
     gait = jb.find_gait(rigid_seed())
-    assert gait.outcome is jb.Search.FOUND
+    assert gait.outcome is jb.gait.Search.FOUND
     assert bool(gait.stable)
     assert float(gait.measures.period) == pytest.approx(0.44378, abs=5e-6)
     assert float(gait.measures.step_length) == pytest.approx(0.19041, abs=5e-6)
@@ -97,7 +97,7 @@ def test_the_seeds_walker_in_the_rigid_limit():
         assert abs(values[index("m")] + values[index("J")]) < 1e-6
     assert float(elasticities.period[index("g")]) == pytest.approx(-0.5, abs=1e-7)
     assert abs(float(elasticities.spectral_radius[index("g")])) < 1e-6
-    checks = jb.rigid_checks(rigid_seed(), gait.orbit[1])
+    checks = jb.dynamics.rigid_checks(rigid_seed(), gait.orbit[1])
     assert not bool(checks.flies.any())
     assert not bool(checks.slips(0.4).any())
 

@@ -7,7 +7,7 @@ import jaxbiped as jb
 def test_rolling_starts_do_not_slip_and_begin_with_the_seeds():
     scene = jb.seed_scene(l=0.5)
     starts = jb.rolling_starts(scene, 5)
-    both = jb.feet(scene, starts)
+    both = jb.dynamics.feet(scene, starts)
     np.testing.assert_allclose(both.foot_2.slip_speed, 0.0, atol=1e-14)
     np.testing.assert_allclose(both.foot_2.penetration_rate, 0.0, atol=1e-14)
     np.testing.assert_allclose(both.foot_2.penetration, both.foot_2.penetration[0], atol=1e-14)

@@ -19,7 +19,7 @@ TRUTH = {0.01: 0.43236, 0.012: 0.43554, 0.03: 0.44644, 0.04: 0.45210, 0.06: 0.46
 @pytest.mark.parametrize("slope", TRUTH)
 def test_the_stable_gait_is_found_on_every_slope(slope):
     gait = jb.find_gait(jb.seed_scene(slope=slope), **PLAIN)
-    assert gait.outcome is jb.Search.FOUND
+    assert gait.outcome is jb.gait.Search.FOUND
     assert bool(gait.stable)
     assert float(gait.measures.period) == pytest.approx(TRUTH[slope], abs=1e-5)
 
@@ -27,7 +27,7 @@ def test_the_stable_gait_is_found_on_every_slope(slope):
 def test_the_unstable_gait_that_was_seen_is_told():
     scene = jb.seed_scene(slope=0.03)
     gait = jb.find_gait(scene, **PLAIN)
-    assert gait.found_by is jb.FoundBy.WALKING
+    assert gait.found_by is jb.gait.FoundBy.WALKING
     (other,) = gait.others
     assert other.period == pytest.approx(0.38827, abs=1e-5)
     assert other.spectral_radius == pytest.approx(2.39, abs=0.01)
@@ -43,7 +43,7 @@ def test_with_a_guess_the_gait_near_it_is_returned():
     scene = jb.seed_scene(slope=0.03)
     other = jax.tree.map(jnp.asarray, jb.find_gait(scene, **PLAIN).others[0].state)
     gait = jb.find_gait(scene, other, **PLAIN)
-    assert gait.found_by is jb.FoundBy.GUESS
+    assert gait.found_by is jb.gait.FoundBy.GUESS
     assert not bool(gait.stable)
     assert gait.others == []
 
@@ -54,7 +54,7 @@ def test_with_a_guess_the_gait_near_it_is_returned():
         (jb.seed_scene(slope=0.005), ("fold", "slope = 0.0095")),
         (jb.seed_scene(slope=0.3), ("ends at slope = 0.26", "stops")),
         (
-            eqx.tree_at(lambda s: s.friction, jb.seed_scene(), jb.Frictionless()),
+            eqx.tree_at(lambda s: s.friction, jb.seed_scene(), jb.laws.Frictionless()),
             ("seed's walker has no gait under these laws",),
         ),
     ],
@@ -62,7 +62,7 @@ def test_with_a_guess_the_gait_near_it_is_returned():
 )
 def test_where_there_is_no_gait_the_end_of_the_branch_is_told(scene, words):
     gait = jb.find_gait(scene, **PLAIN)
-    assert gait.outcome is not jb.Search.FOUND
+    assert gait.outcome is not jb.gait.Search.FOUND
     said = jb.explain_search(scene, gait)
     assert said.startswith("no gait found: ")
     for word in words:
@@ -71,11 +71,11 @@ def test_where_there_is_no_gait_the_end_of_the_branch_is_told(scene, words):
 
 def test_the_nearest_scene_on_the_branch_has_a_gait():
     gait = jb.find_gait(jb.seed_scene(slope=0.005), **PLAIN)
-    assert jb.BranchEnd(int(gait.origin.branch_end)) is jb.BranchEnd.FOLD
+    assert jb.gait.BranchEnd(int(gait.origin.branch_end)) is jb.gait.BranchEnd.FOLD
     near = jb.find_gait(
         jb.seed_scene(slope=float(gait.origin.nearest.ground.slope) + 1e-4), **PLAIN
     )
-    assert near.outcome is jb.Search.FOUND
+    assert near.outcome is jb.gait.Search.FOUND
 
 
 def test_under_vmap_a_branch_is_followed_and_each_lane_says_how():
@@ -89,19 +89,19 @@ def test_under_vmap_a_branch_is_followed_and_each_lane_says_how():
     np.testing.assert_allclose(
         gaits.measures.period[:3], [0.4408348, 0.4464368, 0.4521010], atol=1e-6
     )
-    by = [jb.FoundBy(int(code)) for code in gaits.origin.found_by[:3]]
-    assert by == [jb.FoundBy.START, jb.FoundBy.CONTINUATION, jb.FoundBy.CONTINUATION]
-    assert int(gaits.ending[3]) != int(jb.Search.FOUND)
-    ends = [jb.BranchEnd(int(code)) for code in gaits.origin.branch_end]
-    reached = jb.BranchEnd.REACHED
-    assert ends == [jb.BranchEnd.NOT_FOLLOWED, reached, reached, jb.BranchEnd.WALK_ENDS]
+    by = [jb.gait.FoundBy(int(code)) for code in gaits.origin.found_by[:3]]
+    assert by == [jb.gait.FoundBy.START, jb.gait.FoundBy.CONTINUATION, jb.gait.FoundBy.CONTINUATION]
+    assert int(gaits.ending[3]) != int(jb.gait.Search.FOUND)
+    ends = [jb.gait.BranchEnd(int(code)) for code in gaits.origin.branch_end]
+    reached = jb.gait.BranchEnd.REACHED
+    assert ends == [jb.gait.BranchEnd.NOT_FOLLOWED, reached, reached, jb.gait.BranchEnd.WALK_ENDS]
     assert 0.2 < float(gaits.origin.nearest.ground.slope[3]) < 0.3
 
 
 @pytest.mark.parametrize("slope", [0.005, 0.05, 0.1])
 def test_rigid_gaits_are_found(slope):
     gait = jb.find_gait(rigid_seed(slope), **PLAIN)
-    assert gait.outcome is jb.Search.FOUND
+    assert gait.outcome is jb.gait.Search.FOUND
     walk = jb.rigid_walk(
         rigid_seed(slope), gait.measures.state, steps=100, accuracy="tight", most_arrivals=100
     )
@@ -121,14 +121,14 @@ def test_the_simplest_walker_is_found_with_its_cycles():
 
 
 def test_a_search_that_may_take_few_cycles_stays_at_its_start():
-    gait = jb.find_gait(jb.seed_scene(slope=0.03), most_turns=3, **PLAIN)
-    assert gait.outcome is jb.Search.NOT_CONVERGED
-    assert gait.found_by is jb.FoundBy.START
+    gait = jb.find_gait(jb.seed_scene(slope=0.03), max_evaluations=3, **PLAIN)
+    assert gait.outcome is jb.gait.Search.NOT_CONVERGED
+    assert gait.found_by is jb.gait.FoundBy.START
 
 
 def test_a_scene_with_bristles_is_searched_in_stages_too():
     """LuGre's bristles on the slope where Newton's method alone comes to an unstable gait."""
-    like = jb.friction_law_like("lugre", mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1e3)
+    like = jb.laws.friction_law_like("lugre", mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1e3)
     scene = eqx.tree_at(lambda s: s.friction, jb.seed_scene(slope=0.03), like)
     gait = jb.find_gait(scene, **PLAIN)
     assert bool(gait.stable)

@@ -41,7 +41,7 @@ def _nothing_is_cut_off(figure):
 
 def test_cells_have_their_labels_colours_and_places():
     (ax,) = basin(CODES, X, Y, **AXES).axes
-    expected = [[label_colour(str(jb.Label(code))) for code in row] for row in CODES]
+    expected = [[label_colour(str(jb.basins.Label(code))) for code in row] for row in CODES]
     np.testing.assert_array_equal(_colours(ax), expected)
     assert ax.get_xlim() == (0.5, 3.5)
     assert ax.get_ylim() == (-2.0, 2.0)
@@ -57,7 +57,7 @@ def test_names_of_coordinates_say_words_symbol_and_unit():
 
 def test_edges_and_names_draw_the_same():
     by_code = basin(CODES, X, Y, period=1, **AXES).axes[0]
-    names = jb.label_names(CODES, 1)
+    names = jb.basins.label_names(CODES, 1)
     by_name = basin(names, [0.5, 1.5, 2.5, 3.5], [-2.0, 0.0, 2.0], **AXES).axes[0]
     np.testing.assert_array_equal(_colours(by_code), _colours(by_name))
     assert _legend(by_code) == _legend(by_name)
@@ -96,8 +96,8 @@ def test_pending_cells_are_hatched_and_the_gait_is_marked():
 
 
 def test_a_label_has_one_colour_everywhere_and_no_other_has_it():
-    names = [str(label) for label in jb.Label if label != jb.Label.WALKING]
-    names += [jb.label_name(jb.Label.WALKING, period) for period in range(1, 7)]
+    names = [str(label) for label in jb.basins.Label if label != jb.basins.Label.WALKING]
+    names += [jb.basins.label_name(jb.basins.Label.WALKING, period) for period in range(1, 7)]
     assert len({label_colour(name) for name in names}) == len(names)
     assert len({(label_colour(name), label_marker(name)) for name in names}) == len(names)
     alone = basin(np.full((1, 2), "stopped"), [0.0, 1.0], [0.0, 1.0], **AXES).axes[0]
@@ -120,7 +120,9 @@ def test_all_labels_at_once_and_nothing_is_cut_off():
     assert isinstance(figure, Figure)
     assert len(_legend(figure.axes[0])) == 9 + 6 + 1
     _nothing_is_cut_off(figure)
-    names = [jb.label_name(label, k) for label, k in zip(labels.flat, period.flat, strict=True)]
+    names = [
+        jb.basins.label_name(label, k) for label, k in zip(labels.flat, period.flat, strict=True)
+    ]
     known = labels.ravel() >= 0
     expected = np.where(known, [label_colour(name) for name in names], "")
     np.testing.assert_array_equal(_colours(figure.axes[0]).ravel()[known], expected[known])
@@ -131,7 +133,7 @@ def _disc(points):
 
 
 def test_refined_cells_are_drawn_where_they_are():
-    refined = jb.refined_boundary(_disc, (-1.0, -1.0), (1.0, 2.0), (4, 6), levels=3)
+    refined = jb.basins.refined_boundary(_disc, (-1.0, -1.0), (1.0, 2.0), (4, 6), levels=3)
     figure = refined_basin(refined, mark=(0.0, 0.0), **AXES)
     (ax,) = figure.axes
     outlines = [one for one in ax.collections if isinstance(one, PolyCollection)]
@@ -149,7 +151,7 @@ def test_refined_cells_are_drawn_where_they_are():
 
 
 def test_refined_labels_may_have_names_of_their_own():
-    refined = jb.refined_boundary(_disc, (-1.0, -1.0), (1.0, 1.0), (4, 4), levels=2)
+    refined = jb.basins.refined_boundary(_disc, (-1.0, -1.0), (1.0, 1.0), (4, 4), levels=2)
     names = {0: "walking period-3", 1: "stopped"}
     (ax,) = refined_basin(refined, codes=names, cells=False, **AXES).axes
     assert set(_colours(ax).flat) == {label_colour(name) for name in names.values()}
@@ -160,7 +162,7 @@ def test_refined_labels_may_have_names_of_their_own():
 
 def _fractions():
     walks, falls = ["walking period-1"] * 30, ["fell forward"] * 10
-    return [jb.basin_fractions(names) for names in (falls, walks + falls, [*walks, "stopped"])]
+    return [jb.basins.fractions(names) for names in (falls, walks + falls, [*walks, "stopped"])]
 
 
 def test_fractions_along_a_parameter_lie_in_wilsons_bands():
@@ -170,7 +172,7 @@ def test_fractions_along_a_parameter_lie_in_wilsons_bands():
     assert list(lines) == ["walking period-1", "fell forward", "stopped"]
     np.testing.assert_allclose(lines["walking period-1"], [0.0, 0.75, 30 / 31])
     np.testing.assert_allclose(lines["stopped"], [0.0, 0.0, 1 / 31])
-    low, high = jb.wilson_interval([0, 30, 30], [10, 40, 31])
+    low, high = jb.basins.wilson_interval([0, 30, 30], [10, 40, 31])
     corners = ax.collections[0].get_paths()[0].vertices
     for x, a, b in zip((1.0, 10.0, 1e3), low, high, strict=True):
         at = corners[corners[:, 0] == x, 1]
@@ -231,7 +233,7 @@ def test_bad_arguments_are_named(call, words):
 
 
 def test_a_boundary_of_three_dimensions_is_refused():
-    refined = jb.refined_boundary(
+    refined = jb.basins.refined_boundary(
         lambda points: (points[:, 0] > 0.1).astype(int), (-1,) * 3, (1,) * 3, (2,) * 3, levels=1
     )
     with pytest.raises(jb.ArgumentError, match="3 dimensions"):

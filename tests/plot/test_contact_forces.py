@@ -16,7 +16,7 @@ def test_whole_walk_shows_the_peaks_of_both_feet(seed_walk):
     scene, walk = seed_walk
     figure = contact_forces(scene, walk)
     normal_axes, strike_axes, tangential_axes, _ = figure.axes
-    forces = jb.foot_forces(scene, walk.state)
+    forces = jb.dynamics.foot_forces(scene, walk.state)
     for leg, force in enumerate(forces, start=1):
         _, normal = _curve(normal_axes, leg)
         assert normal.max() == pytest.approx(float(force.normal.max()), rel=1e-3)
@@ -64,7 +64,7 @@ def test_strikes_are_counted(seed_walk):
 
 def test_no_friction_no_tangential_panel(seed_walk):
     scene, walk = seed_walk
-    slippery = eqx.tree_at(lambda s: s.friction, scene, jb.Frictionless())
+    slippery = eqx.tree_at(lambda s: s.friction, scene, jb.laws.Frictionless())
     whole, strike = contact_forces(slippery, walk).axes
     assert "F_N" in whole.get_ylabel()
     assert "(s)" in whole.get_xlabel()

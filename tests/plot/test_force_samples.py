@@ -6,7 +6,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.gait._samples import observed
+from jaxbiped.measure._samples import evaluate_at
 from jaxbiped.plot._force_samples import sampled_forces
 
 
@@ -32,7 +32,7 @@ def test_peaks_are_those_of_a_much_finer_sampling(walk):
     for foot, near, normal, tangential in _peaks(scene, trajectory, t, found):
         for drawn, name, sign in ((normal, "normal", 1.0), (tangential, "tangential", -1.0)):
             fine = near[np.argmax(drawn)] + np.linspace(-1e-6, 1e-6, 20_001)
-            finest = getattr(observed(scene, trajectory, contacts, fine).forces[foot - 1], name)
+            finest = getattr(evaluate_at(scene, trajectory, contacts, fine).forces[foot - 1], name)
             assert drawn.max() == pytest.approx(float(np.max(sign * finest)), rel=2e-5)
 
 
@@ -51,7 +51,7 @@ def test_peaks_do_not_vary_from_step_to_step(walk):
 
 def test_between_two_times_and_without_friction(walk):
     scene, trajectory = walk
-    slippery = eqx.tree_at(lambda s: s.friction, scene, jb.Frictionless())
+    slippery = eqx.tree_at(lambda s: s.friction, scene, jb.laws.Frictionless())
     t, found = sampled_forces(slippery, trajectory, start=0.3, stop=0.5)
     assert (t[0], t[-1]) == (0.3, 0.5)
     assert found.forces.foot_1.tangential is None

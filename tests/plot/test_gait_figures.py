@@ -17,7 +17,7 @@ FIGURES = [multipliers, elasticities, gait_orbit]
 
 def _measures(shape=()):
     ones = np.ones(shape)
-    return jb.Measures(*([ones] * 5), jb.State(*([ones] * 8)))
+    return jb.gait.Measures(*([ones] * 5), jb.State(*([ones] * 8)))
 
 
 def _orbit(passes, m=200):

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 import jaxbiped as jb
 from jaxbiped import plot
 from tests.drawn import assert_is_drawn
-from tests.scene.drop import restitutions
+from tests.scene.laws.drop import restitutions
 
 SEED = dict(K=1e6, c=2e5, n=1.5, mass=2.0)
 FRICTION = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
@@ -16,7 +16,7 @@ def _curves(ax):
 
 
 def test_forces_at_each_rate():
-    law = jb.HuntCrossley(K=1e6, hysteresis=3.0)
+    law = jb.laws.HuntCrossley(K=1e6, hysteresis=3.0)
     figure = plot.normal_law(law, depth=5e-4, rates=(-0.1, 0.2))
     left, right = figure.axes
     (depth, slow), (_, fast) = _curves(left)
@@ -31,7 +31,7 @@ def test_forces_at_each_rate():
 
 @pytest.mark.parametrize("name", ["kelvin-voigt", "tsuji"])
 def test_the_loop_has_the_area_of_the_energy_lost(name):
-    law, mass, speed = jb.normal_law_like(name, **SEED), 2, 0.1
+    law, mass, speed = jb.laws.normal_law_like(name, **SEED), 2, 0.1
     figure = plot.normal_law(law, mass=mass, approach_speed=speed)
     right = figure.axes[1]
     (expected,) = restitutions(law, [speed], mass=mass)
@@ -45,7 +45,7 @@ def test_the_loop_has_the_area_of_the_energy_lost(name):
 
 
 def test_an_elastic_law_has_one_curve_and_gives_all_back():
-    left, right = plot.normal_law(jb.Hertz(K=1e6)).axes
+    left, right = plot.normal_law(jb.laws.Hertz(K=1e6)).axes
     assert len(left.lines) == 1
     assert right.get_title(loc="left").endswith("restitution 1.000")
 
@@ -53,9 +53,9 @@ def test_an_elastic_law_has_one_curve_and_gives_all_back():
 BRISTLES = ("dahl", "lugre")
 
 
-@pytest.mark.parametrize("name", [name for name in jb.FRICTION_LAWS if name not in BRISTLES])
+@pytest.mark.parametrize("name", [name for name in jb.laws.FRICTION_LAWS if name not in BRISTLES])
 def test_friction_over_load_against_slip(name):
-    law = jb.friction_law_like(name, **FRICTION)
+    law = jb.laws.friction_law_like(name, **FRICTION)
     figure = plot.friction_law(law)
     (ax,) = figure.axes
     _, (slip, ratio) = _curves(ax)
@@ -70,9 +70,9 @@ def test_friction_over_load_against_slip(name):
 
 
 def test_a_range_and_axes_may_be_given():
-    figure = plot.friction_law(jb.Viscous(k=3.0))
+    figure = plot.friction_law(jb.laws.Viscous(k=3.0))
     (ax,) = figure.axes
-    assert plot.friction_law(jb.Viscous(k=2.0), fastest=0.3, ax=ax) is figure
+    assert plot.friction_law(jb.laws.Viscous(k=2.0), fastest=0.3, ax=ax) is figure
     assert ax.get_xlim() == (-0.3, 0.3)
     _, first, _, second = _curves(ax)
     np.testing.assert_allclose(first[1], -3.0 * first[0])
@@ -81,19 +81,19 @@ def test_a_range_and_axes_may_be_given():
     assert_is_drawn(figure)
     whole = Figure()
     half, _ = whole.subfigures(1, 2)
-    assert plot.normal_law(jb.Hertz(K=1e6), figure=half) is whole
+    assert plot.normal_law(jb.laws.Hertz(K=1e6), figure=half) is whole
 
 
 @pytest.mark.parametrize(
     ("draw", "match"),
     [
-        (lambda: plot.normal_law(jb.Viscous(k=1.0)), "law = "),
-        (lambda: plot.friction_law(jb.Hertz(K=1.0)), "law = "),
-        (lambda: plot.normal_law(jb.Hertz(K=1.0), depth=0.0), "depth = 0"),
-        (lambda: plot.normal_law(jb.Hertz(K=1.0), mass=-1.0), "mass = -1"),
-        (lambda: plot.normal_law(jb.Hertz(K=1.0), approach_speed=0.0), "approach_speed = 0"),
-        (lambda: plot.friction_law(jb.Viscous(k=1.0), load=0.0), "load = 0"),
-        (lambda: plot.friction_law(jb.Viscous(k=1.0), fastest=-1.0), "fastest = -1"),
+        (lambda: plot.normal_law(jb.laws.Viscous(k=1.0)), "law = "),
+        (lambda: plot.friction_law(jb.laws.Hertz(K=1.0)), "law = "),
+        (lambda: plot.normal_law(jb.laws.Hertz(K=1.0), depth=0.0), "depth = 0"),
+        (lambda: plot.normal_law(jb.laws.Hertz(K=1.0), mass=-1.0), "mass = -1"),
+        (lambda: plot.normal_law(jb.laws.Hertz(K=1.0), approach_speed=0.0), "approach_speed = 0"),
+        (lambda: plot.friction_law(jb.laws.Viscous(k=1.0), load=0.0), "load = 0"),
+        (lambda: plot.friction_law(jb.laws.Viscous(k=1.0), fastest=-1.0), "fastest = -1"),
     ],
 )
 def test_bad_arguments_are_named(draw, match):
@@ -103,7 +103,7 @@ def test_bad_arguments_are_named(draw, match):
 
 @pytest.mark.parametrize("name", BRISTLES)
 def test_bristles_make_a_loop(name):
-    law = jb.friction_law_like(name, **FRICTION)
+    law = jb.laws.friction_law_like(name, **FRICTION)
     figure = plot.bristle_law(law, slip_speed=1e-5)
     (ax,) = figure.axes
     _, first, back, again = _curves(ax)
@@ -119,4 +119,4 @@ def test_bristles_make_a_loop(name):
     with pytest.raises(jb.ArgumentError, match="slip_speed = 0"):
         plot.bristle_law(law, slip_speed=0.0)
     with pytest.raises(jb.ArgumentError, match="law = Viscous"):
-        plot.bristle_law(jb.Viscous(k=1.0))
+        plot.bristle_law(jb.laws.Viscous(k=1.0))

@@ -3,13 +3,13 @@ import numpy as np
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.gait._samples import applied
-from jaxbiped.plot._samples import sampled, state_at
+from jaxbiped.measure._samples import evaluate_along
+from jaxbiped.plot._samples import sample, state_at
 
 
 def test_samples_hold_every_step_of_the_solver(seed_walk):
     _, walk = seed_walk
-    t, state = sampled(walk)
+    t, state = sample(walk)
     assert np.all(np.diff(t) > 0.0)
     steps = np.asarray(walk.t)
     assert np.isin(steps[1:-1], t).all()
@@ -19,18 +19,18 @@ def test_samples_hold_every_step_of_the_solver(seed_walk):
 
 def test_samples_between_two_times(seed_walk):
     _, walk = seed_walk
-    t, state = sampled(walk, start=0.5, stop=0.51)
+    t, state = sample(walk, start=0.5, stop=0.51)
     assert (t[0], t[-1]) == (0.5, 0.51)
     np.testing.assert_allclose(state.theta_2, np.asarray(walk.at(t).theta_2), rtol=1e-12)
-    t, _ = sampled(walk, start=-1.0, stop=9.0)
+    t, _ = sample(walk, start=-1.0, stop=9.0)
     assert (t[0], t[-1]) == (0.0, 2.0)
 
 
 def test_contacts_are_feet_and_forces(seed_walk):
     scene, walk = seed_walk
     state = state_at(walk, np.linspace(0.0, 2.0, 11))
-    found = applied(scene, state, contacts)
-    forces = jb.foot_forces(scene, jb.State(*(jnp.asarray(leaf) for leaf in state)))
+    found = evaluate_along(scene, state, contacts)
+    forces = jb.dynamics.foot_forces(scene, jb.State(*(jnp.asarray(leaf) for leaf in state)))
     np.testing.assert_allclose(found.forces.foot_1.normal, np.asarray(forces.foot_1.normal))
     np.testing.assert_allclose(found.forces.foot_2.tangential, np.asarray(forces.foot_2.tangential))
     assert found.touching[0].shape == (11,)

@@ -6,11 +6,11 @@ from matplotlib.figure import Figure
 import jaxbiped as jb
 from jaxbiped.plot._symbols import QUANTITIES, axis_label, law_name, row_label
 
-LAWS = {**jb.NORMAL_LAWS, **jb.FRICTION_LAWS}
+LAWS = {**jb.laws.NORMAL_LAWS, **jb.laws.FRICTION_LAWS}
 
 
 def test_every_coordinate_and_parameter_has_words_a_symbol_and_a_unit():
-    names = set(jb.State._fields) | set(jb.coordinate_names(jb.seed_scene()))
+    names = set(jb.State._fields) | set(jb.starts.coordinate_names(jb.seed_scene()))
     for law in LAWS.values():
         names |= {field.name for field in dataclasses.fields(law)}
     assert names <= set(QUANTITIES)
@@ -27,8 +27,8 @@ def test_every_coordinate_and_parameter_has_words_a_symbol_and_a_unit():
 
 
 def test_symbols_of_one_scene_differ():
-    for normal in jb.NORMAL_LAWS.values():
-        for friction in jb.FRICTION_LAWS.values():
+    for normal in jb.laws.NORMAL_LAWS.values():
+        for friction in jb.laws.FRICTION_LAWS.values():
             own = {f.name for law in (normal, friction) for f in dataclasses.fields(law)}
             own |= {"m", "J", "l", "d", "r", "hip_mass", "slope", "g"}
             symbols = [QUANTITIES[name].symbol for name in own]
@@ -53,5 +53,7 @@ def test_rows_and_titles():
     assert row_label("friction.mu_static") == r"static friction, $\mu_0$"
     assert row_label("strangeness") == "strangeness"
     for law in LAWS.values():
-        assert " " in law_name(object.__new__(law)) or law.__name__.istitle() or law is jb.LuGre
-    assert law_name(jb.Frictionless()) == "Frictionless"
+        assert (
+            " " in law_name(object.__new__(law)) or law.__name__.istitle() or law is jb.laws.LuGre
+        )
+    assert law_name(jb.laws.Frictionless()) == "Frictionless"

@@ -20,7 +20,7 @@ def test_rungs_model_one_walker():
 
 
 def test_a_scene_without_the_seeds_friction_is_refused():
-    scene = dataclasses.replace(jb.seed_scene(), friction=jb.Frictionless())
+    scene = dataclasses.replace(jb.seed_scene(), friction=jb.laws.Frictionless())
     with pytest.raises(jb.ArgumentError, match=r"scene\.friction = Frictionless"):
         jb.ladder(scene)
 

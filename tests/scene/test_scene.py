@@ -24,7 +24,7 @@ def test_every_leaf_is_differentiable_and_vmappable():
     scene = jb.seed_scene(hip_mass=0.5)
 
     def hip_acceleration(scene):
-        return jb.accelerations(scene, state).hip_ax
+        return jb.dynamics.accelerations(scene, state).hip_ax
 
     gradient = jax.grad(hip_acceleration)(scene)
     leaves = dict(zip(PARAMETERS, _leaves(gradient), strict=True))
@@ -45,15 +45,15 @@ def _broadcast(tree, n):
 
 
 def _primitives(scene):
-    program = jax.make_jaxpr(lambda state: jb.accelerations(scene, state))(jb.seed_state())
+    program = jax.make_jaxpr(lambda state: jb.dynamics.accelerations(scene, state))(jb.seed_state())
     return str(program)
 
 
 def test_what_a_scene_leaves_out_is_not_in_the_program():
     seed = jb.seed_scene()
-    without = jb.Scene(seed.walker, seed.ground, seed.normal, jb.Frictionless())
+    without = jb.Scene(seed.walker, seed.ground, seed.normal, jb.laws.Frictionless())
     coulomb = jb.Scene(
-        seed.walker, seed.ground, seed.normal, jb.RegularisedCoulomb(mu=0.4, v_d=1e-4)
+        seed.walker, seed.ground, seed.normal, jb.laws.RegularisedCoulomb(mu=0.4, v_d=1e-4)
     )
     assert _primitives(seed).count(" exp ") == 4
     assert _primitives(without).count(" exp ") == 2
@@ -65,14 +65,14 @@ def test_what_a_scene_leaves_out_is_not_in_the_program():
 
 def test_frictionless_forces_have_no_tangential_part():
     seed = jb.seed_scene()
-    scene = jb.Scene(seed.walker, seed.ground, seed.normal, jb.Frictionless())
-    assert jb.foot_forces(scene, jb.seed_state()).foot_1.tangential is None
+    scene = jb.Scene(seed.walker, seed.ground, seed.normal, jb.laws.Frictionless())
+    assert jb.dynamics.foot_forces(scene, jb.seed_state()).foot_1.tangential is None
 
 
-@pytest.mark.parametrize("rule", [jb.StanceRotation(), jb.AlwaysTouching()])
+@pytest.mark.parametrize("rule", [jb.laws.StanceRotation(), jb.laws.AlwaysTouching()])
 def test_clearance_rules(rule):
     forward, backward = rule.admits(1, jnp.asarray(1.0)), rule.admits(1, jnp.asarray(-1.0))
-    if isinstance(rule, jb.AlwaysTouching):
+    if isinstance(rule, jb.laws.AlwaysTouching):
         assert forward is None
     else:
         assert not bool(forward)

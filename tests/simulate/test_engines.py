@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.lanes._emit import UnknownPrimitiveError
+from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.simulate._recorded_steps import recorded_steps
 from tests.reference import reference_states
 
@@ -21,9 +21,9 @@ SCENES = {
     "frictionless": jb.Scene(
         walker=jb.seed_scene().walker,
         ground=jb.seed_scene().ground,
-        normal=jb.Hertz(K=1e6),
-        friction=jb.Frictionless(),
-        clearance=jb.AlwaysTouching(),
+        normal=jb.laws.Hertz(K=1e6),
+        friction=jb.laws.Frictionless(),
+        clearance=jb.laws.AlwaysTouching(),
     ),
 }
 
@@ -44,7 +44,7 @@ def test_random_scenes_and_starts_end_alike(noise, slope, factor):
     scene = jb.Scene(
         walker=seed.walker,
         ground=seed.ground,
-        normal=jb.RistowSchafer(K=seed.normal.K * factor, c=seed.normal.c / factor),
+        normal=jb.laws.RistowSchafer(K=seed.normal.K * factor, c=seed.normal.c / factor),
         friction=seed.friction,
     )
     state = jax.tree.map(lambda leaf, n: leaf * (1.0 + n), jb.seed_state(), jb.State(*noise))
@@ -158,13 +158,13 @@ def test_every_step_ends_where_the_end_alone_does():
 
 def test_without_a_step_there_is_the_start():
     start = jb.seed_state()
-    walk = recorded_steps(start, np.zeros((0, 25)), jb.Rodas4())
+    walk = recorded_steps(start, np.zeros((0, 25)), jb.solvers.Rodas4())
     assert walk.state.hip_z == walk.dense.evaluate(0.0).hip_z == start.hip_z
     assert np.isnan(walk.dense.evaluate(0.1).hip_z)
 
 
 def test_bristles_are_saved_step_by_step():
-    law = jb.LuGre(mu_static=0.5, mu_kinetic=0.4, v_s=1e-3, sigma_0=5e4, sigma_1=100.0)
+    law = jb.laws.LuGre(mu_static=0.5, mu_kinetic=0.4, v_s=1e-3, sigma_0=5e4, sigma_1=100.0)
     scene = eqx.tree_at(lambda s: s.friction, SCENES["seed"], law)
     times = jnp.linspace(0.0, 0.1, 31)
     steps, timed = (_end(jb.seed_state(), "lanes", scene, save=s) for s in ("steps", times))
@@ -230,8 +230,8 @@ def test_lanes_compute_in_64_bits():
     soft = jb.Scene(
         walker=jb.seed_scene().walker,
         ground=jb.seed_scene().ground,
-        normal=jb.Hertz(K=1e3),
-        friction=jb.Frictionless(),
+        normal=jb.laws.Hertz(K=1e3),
+        friction=jb.laws.Frictionless(),
     )
     with pytest.raises(jb.ArgumentError, match="it computes in 64 bits"):
         _end(state, "lanes", soft)
@@ -239,7 +239,7 @@ def test_lanes_compute_in_64_bits():
     assert run.engine == "xla"
 
 
-class ErrorFunction(jb.AbstractFrictionLaw):
+class ErrorFunction(jb.laws.AbstractFrictionLaw):
     """Of an operation that lanes do not have."""
 
     mu: float
@@ -264,7 +264,7 @@ def test_memory_is_asked_for_by_the_steps_taken(monkeypatch):
     scene, start = jb.seed_scene(), jb.seed_state()
     few = jb.simulate(scene, start, duration=0.1)
     capped = jb.simulate(scene, start, duration=0.1, max_solver_steps=1 << 50)
-    monkeypatch.setattr("jaxbiped.lanes._solve._ROOM", 16)
+    monkeypatch.setattr("jaxbiped.variational._differentiable_solve._ROOM", 16)
     again = jb.simulate(scene, start, duration=0.1)
     assert int(few.accepted) > 16
     for walk in (capped, again):

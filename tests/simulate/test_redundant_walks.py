@@ -46,7 +46,7 @@ def long_walks():
 
     def walks(name):
         scene = jb.RedundantScene(jb.seed_scene(), name)
-        how = dict(save="end", watch=(), extremes=jb.violation)
+        how = dict(save="end", watch=(), extremes=jb.dynamics.violation)
         return [
             jb.simulate(scene, jb.seed_state(), duration=t, **how) for t in (0.1 * HUNDRED, HUNDRED)
         ]
@@ -71,7 +71,7 @@ def test_all_walk_at_the_minimal_ones_pace(long_walks):
     for walks in long_walks.values():
         assert walks[1].outcome is jb.Ending.WALKING
         assert walks[1].correction is not None
-        final = jb.minimal_state(jb.RedundantScene(jb.seed_scene()), walks[1].final)
+        final = jb.dynamics.minimal_state(jb.RedundantScene(jb.seed_scene()), walks[1].final)
         assert float(final.hip_x) == pytest.approx(float(truth.hip_x), rel=1e-3)
         # A step's length lost or won over all of them would be 1e-2 of each.
         assert abs(float(final.theta_2 - truth.theta_2)) < 1e-2

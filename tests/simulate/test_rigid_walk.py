@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from tests.rigid_walkers import STABLE, UNSTABLE, rigid_seed, simplest_state, simplest_walker
 
-GAIT = jb.RigidState(
+GAIT = jb.dynamics.RigidState(
     *map(jnp.asarray, (0.0, -0.23985297893, 0.23985297893, -1.08917987007, -1.64274847822))
 )
 
@@ -50,7 +50,7 @@ def test_a_walker_at_rest_waits_in_vain(engine):
     """Upright on level ground, on feet that carry it there: no footstep comes in 50 √(l/g)."""
     walker = jb.Walker(m=1.0, J=0.01, l=0.4, d=0.3, r=0.35)
     scene = jb.RigidScene(walker=walker, ground=jb.Ground(slope=0.0))
-    state = jb.RigidState(*map(jnp.asarray, (0.0,) * 5))
+    state = jb.dynamics.RigidState(*map(jnp.asarray, (0.0,) * 5))
     walk = jb.rigid_walk(scene, state, steps=1, engine=engine)
     assert walk.outcome is jb.Ending.OUT_OF_STEPS
     assert int(walk.footsteps) == 0
@@ -61,7 +61,9 @@ def test_a_walker_at_rest_waits_in_vain(engine):
 @settings(deadline=None, max_examples=8)
 @given(st.lists(st.floats(-0.3, 0.3, allow_subnormal=False), min_size=4, max_size=4))
 def test_engines_agree(moves):
-    state = jb.RigidState(GAIT.hip_x, *[leaf + d for leaf, d in zip(GAIT[1:], moves, strict=True)])
+    state = jb.dynamics.RigidState(
+        GAIT.hip_x, *[leaf + d for leaf, d in zip(GAIT[1:], moves, strict=True)]
+    )
     first, second = (
         jb.rigid_walk(rigid_seed(), state, steps=2, accuracy="tight", engine=engine)
         for engine in ("lanes", "xla")

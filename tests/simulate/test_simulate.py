@@ -83,12 +83,16 @@ def test_energy_is_kept_without_damper_and_friction():
     """The seed's walker bouncing on Hertz feet, frictionless."""
     seed = jb.seed_scene()
     scene = jb.Scene(
-        seed.walker, seed.ground, jb.Hertz(K=1e5), jb.Frictionless(), jb.AlwaysTouching()
+        seed.walker,
+        seed.ground,
+        jb.laws.Hertz(K=1e5),
+        jb.laws.Frictionless(),
+        jb.laws.AlwaysTouching(),
     )
     start = jb.seed_state()._replace(hip_z=jnp.asarray(0.45))
     motion = jb.simulate(scene, start, duration=0.6, accuracy="tight", watch=())
-    assert float(jnp.max(jb.foot_forces(scene, motion.state).foot_2.normal)) > 50.0
-    total = jb.energies(scene, motion.state).total
+    assert float(jnp.max(jb.dynamics.foot_forces(scene, motion.state).foot_2.normal)) > 50.0
+    total = jb.dynamics.energies(scene, motion.state).total
     np.testing.assert_allclose(total, total[0], atol=2e-6)
 
 
@@ -101,12 +105,16 @@ def test_a_drop_on_the_hertz_law():
     """Largest penetration and rebound speed from the balance of energy, both feet at once."""
     seed = jb.seed_scene(slope=0.0)
     scene = jb.Scene(
-        seed.walker, seed.ground, jb.Hertz(K=1e6), jb.Frictionless(), jb.AlwaysTouching()
+        seed.walker,
+        seed.ground,
+        jb.laws.Hertz(K=1e6),
+        jb.laws.Frictionless(),
+        jb.laws.AlwaysTouching(),
     )
     drop = jb.simulate(scene, _upright(speed_z=-0.5), duration=0.05, accuracy="tight", watch=())
     times = np.linspace(0.0, 0.05, 20001)
     states = drop.at(times)
-    depth = float(jnp.max(jb.feet(scene, states).foot_1.penetration))
+    depth = float(jnp.max(jb.dynamics.feet(scene, states).foot_1.penetration))
     # ½·2·v² + 2 g δ = 2·K δ^2.5/2.5
     assert depth**2.5 * 1e6 / 2.5 - 9.8 * depth == pytest.approx(0.5 * 0.5**2, rel=1e-6)
     leaving = int(np.flatnonzero(np.asarray(states.hip_z) > 0.4)[0])
@@ -116,8 +124,8 @@ def test_a_drop_on_the_hertz_law():
 def _block(friction, slope):
     """Legs too heavy to turn slide like one block on two feet."""
     walker = jb.Walker(m=1.0, J=1e9, l=0.4, d=0.0, r=0.08)
-    normal = jb.RistowSchafer(K=1e6, c=1e6)
-    return jb.Scene(walker, jb.Ground(slope=slope), normal, friction, jb.AlwaysTouching())
+    normal = jb.laws.RistowSchafer(K=1e6, c=1e6)
+    return jb.Scene(walker, jb.Ground(slope=slope), normal, friction, jb.laws.AlwaysTouching())
 
 
 BLOCK = dict(accuracy="tight", watch=(), save="end")
@@ -130,7 +138,7 @@ def _settled(scene, speed):
 
 
 def test_a_block_without_friction_slides_down_freely():
-    scene = _block(jb.Frictionless(), 0.1)
+    scene = _block(jb.laws.Frictionless(), 0.1)
     end = jb.simulate(scene, _settled(scene, 0.2), duration=0.5, **BLOCK).final
     assert float(end.hip_vx) == pytest.approx(0.2 + 9.8 * np.sin(0.1) * 0.5, rel=1e-8)
 
@@ -138,13 +146,13 @@ def test_a_block_without_friction_slides_down_freely():
 def test_a_block_on_regularised_coulomb_friction():
     """v' = −μ g tanh(v/v_d) on the level: sinh(v/v_d) decays exponentially."""
     v_d, mu, t = 0.05, 0.4, 0.06
-    scene = _block(jb.RegularisedCoulomb(mu=mu, v_d=v_d), 0.0)
+    scene = _block(jb.laws.RegularisedCoulomb(mu=mu, v_d=v_d), 0.0)
     end = jb.simulate(scene, _settled(scene, 0.3), duration=t, **BLOCK).final
     expected = v_d * np.arcsinh(np.sinh(0.3 / v_d) * np.exp(-mu * 9.8 * t / v_d))
     assert float(end.hip_vx) == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.parametrize("law", [jb.BengisuAkay, jb.SmoothBengisuAkay])
+@pytest.mark.parametrize("law", [jb.laws.BengisuAkay, jb.laws.SmoothBengisuAkay])
 def test_a_block_on_bengisu_akay_friction(law):
     """Fast: the kinetic coefficient brakes it. On a slope: it creeps where F = m g sin α."""
     friction = law(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
@@ -153,7 +161,7 @@ def test_a_block_on_bengisu_akay_friction(law):
     assert float(end.hip_vx) == pytest.approx(0.5 - 0.4 * 9.8 * 0.1, rel=1e-6)
     tilted = _block(friction, 0.1)
     end = jb.simulate(tilted, _settled(tilted, 0.0), duration=0.1, **BLOCK).final
-    if law is jb.BengisuAkay:
+    if law is jb.laws.BengisuAkay:
         creep = 1e-4 * (1 - np.sqrt(1 - np.tan(0.1) / 0.5))
         assert float(end.hip_vx) == pytest.approx(creep, rel=1e-4)
     force = friction.force(jnp.asarray(9.8 * np.cos(0.1)), end.hip_vx)

@@ -28,7 +28,7 @@ def _start(**values):
     ],
 )
 def test_refused(scene, start, words):
-    for state in (start, jb.BristleState(*start, jnp.zeros(()), jnp.zeros(()))):
+    for state in (start, jb.dynamics.BristleState(*start, jnp.zeros(()), jnp.zeros(()))):
         with pytest.raises(jb.ArgumentError) as caught:
             check_start_height(scene, state)
         assert all(word in str(caught.value) for word in words)
@@ -42,7 +42,7 @@ def test_the_foot_that_would_just_touch_is_named_by_a_height_at_which_it_does():
     with pytest.raises(jb.ArgumentError) as caught:
         check_start_height(SEED, _start(hip_z=0.2))
     height = float(str(caught.value).split("hip_z = ")[-1].rstrip("."))
-    foot = jb.feet(SEED, _start(hip_z=height)).foot_2
+    foot = jb.dynamics.feet(SEED, _start(hip_z=height)).foot_2
     assert float(foot.penetration) == pytest.approx(0.0, abs=1e-9)
 
 
@@ -54,7 +54,7 @@ def test_the_foot_that_would_just_touch_is_named_by_a_height_at_which_it_does():
         (jb.seed_scene(K=1e9), _start()),
         # The foot that passes below the surface is the swinging one, which nothing touches.
         (jb.seed_scene(K=1e12), _start(hip_z=0.3957, theta_1=0.0, omega_1=0.5)),
-        (dataclasses.replace(SEED, clearance=jb.OneFoot(1)), _start(hip_z=0.37, theta_1=-0.5)),
+        (dataclasses.replace(SEED, clearance=jb.laws.OneFoot(1)), _start(hip_z=0.37, theta_1=-0.5)),
     ],
 )
 def test_allowed(scene, start):

@@ -41,7 +41,7 @@ def swings():
         name: jb.swing(
             jb.LinkageScene(pinned_pendulum(), kind()), START, times=TIMES, solver="euler", dt=1e-4
         )
-        for name, kind in jb.CONSTRAINT_METHODS.items()
+        for name, kind in jb.constraints.CONSTRAINT_METHODS.items()
     }
 
 
@@ -59,7 +59,7 @@ def test_the_pendulum_by_seven_methods(swings, angles):
 
 
 def test_projected_steps_agree_with_scipy(angles):
-    scene = jb.LinkageScene(pinned_pendulum("euler"), jb.Index1())
+    scene = jb.LinkageScene(pinned_pendulum("euler"), jb.constraints.Index1())
     found = jb.swing(scene, with_euler_parameters(START), times=TIMES, solver="dopri5", rtol=1e-8)
     for k, expected in enumerate(angles):
         cosine, sine = (found.state.q[4 * k + i][-1] for i in (2, 3))
@@ -68,7 +68,7 @@ def test_projected_steps_agree_with_scipy(angles):
 
 def test_a_four_bar_keeps_its_energy_and_its_joints():
     linkage = four_bar()
-    scene = jb.LinkageScene(linkage, jb.DirectCorrection())
+    scene = jb.LinkageScene(linkage, jb.constraints.DirectCorrection())
     found = jb.swing(scene, four_bar_state(1.1, 3.0), times=TIMES, solver="dopri5", rtol=1e-9)
     assert float(jnp.max(found.violation[-1])) < 1e-14
     energy = jnp.zeros_like(found.t)
@@ -80,18 +80,18 @@ def test_a_four_bar_keeps_its_energy_and_its_joints():
     assert float(jnp.ptp(found.state.q[2])) > 1.0
 
 
-@pytest.mark.parametrize("name", jb.CONSTRAINT_METHODS)
+@pytest.mark.parametrize("name", jb.constraints.CONSTRAINT_METHODS)
 def test_a_joint_said_twice(name, angles):
     """Singular: methods with a penalty share the load between the two, the others say so."""
-    method = jb.CONSTRAINT_METHODS[name]()
+    method = jb.constraints.CONSTRAINT_METHODS[name]()
     scene = jb.LinkageScene(pinned_pendulum(twice=True), method)
     how = dict(times=TIMES[:11], solver="euler", dt=1e-3)
     if method.needs_independent:
         with pytest.raises(jb.ArgumentError, match="2 of 6 constraints say what others say"):
             jb.swing(scene, START, **how)
         return
-    once = jb.linkage_motion(jb.LinkageScene(pinned_pendulum(), method), as_arrays(START))
-    twice = jb.linkage_motion(scene, as_arrays(START))
+    once = jb.dynamics.linkage_motion(jb.LinkageScene(pinned_pendulum(), method), as_arrays(START))
+    twice = jb.dynamics.linkage_motion(scene, as_arrays(START))
     np.testing.assert_allclose(
         np.array(twice.accelerations), np.array(once.accelerations), rtol=1e-5, atol=1e-5
     )
@@ -107,10 +107,13 @@ def as_arrays(state):
 
 def end_of(distance, adjoint):
     """A leg's angle after projected Runge–Kutta steps, by where the pin is in it."""
-    joint = jb.Joint((0.0, distance), (0.0, 0.0), 0)
-    scene = jb.LinkageScene(jb.Linkage((jb.Body(1.0, 0.0096),), (joint,)), jb.Index1())
+    joint = jb.constraints.Joint((0.0, distance), (0.0, 0.0), 0)
+    scene = jb.LinkageScene(
+        jb.constraints.Linkage((jb.constraints.Body(1.0, 0.0096),), (joint,)),
+        jb.constraints.Index1(),
+    )
     # A start that has to be put on the constraints of the length.
-    start = jb.LinkageState(START.q[:3], START.v[:3])
+    start = jb.dynamics.LinkageState(START.q[:3], START.v[:3])
     how = dict(times=TIMES[:51:50], solver="runge2", dt=1e-2, max_solver_steps=64)
     return jb.swing(scene, start, adjoint=adjoint, **how).state.q[2][-1]
 
@@ -146,11 +149,11 @@ def test_adjoints_that_see_no_projection_are_refused(kind):
         (dict(dt=-1e-3), "dt = -0.001 is not allowed"),
         (dict(dt=1e-9), "more than max_solver_steps"),
         (dict(times=jnp.asarray([0.0, jnp.nan])), "times = nan"),
-        (dict(state=jb.LinkageState((0.0,), (0.0,))), "this linkage has 6 coordinates"),
+        (dict(state=jb.dynamics.LinkageState((0.0,), (0.0,))), "this linkage has 6 coordinates"),
     ],
 )
 def test_what_is_not_allowed_is_one_sentence(change, said):
-    scene = jb.LinkageScene(pinned_pendulum(), jb.Standard())
+    scene = jb.LinkageScene(pinned_pendulum(), jb.constraints.Standard())
     options = dict(state=START, times=TIMES, solver="euler", dt=1e-3) | change
     with pytest.raises(jb.ArgumentError) as refused:
         jb.swing(scene, options.pop("state"), **options)

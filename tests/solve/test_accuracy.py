@@ -42,8 +42,8 @@ def test_a_walker_that_all_but_sticks_walks_at_balanced(v0):
     assert off < 1e-4
 
 
-@pytest.mark.parametrize("name", jb.FRICTION_LAWS)
+@pytest.mark.parametrize("name", jb.laws.FRICTION_LAWS)
 def test_every_law_names_a_parameter_of_its_own(name):
-    law = jb.FRICTION_LAWS[name]
+    law = jb.laws.FRICTION_LAWS[name]
     parameter = getattr(law, "builds_up_over", None)
     assert parameter is None or parameter in law.__dataclass_fields__

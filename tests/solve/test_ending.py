@@ -49,7 +49,7 @@ def _state(**values):
 def test_fell_back():
     """Both feet far ahead of a hip that moves uphill, on ground that always holds."""
     seed = jb.seed_scene()
-    scene = jb.Scene(seed.walker, seed.ground, seed.normal, seed.friction, jb.AlwaysTouching())
+    scene = jb.Scene(seed.walker, seed.ground, seed.normal, seed.friction, jb.laws.AlwaysTouching())
     start = _state(
         theta_1=0.6, theta_2=0.65, omega_1=1.5, omega_2=1.5, hip_vx=-0.5, hip_vz=-0.3,
         hip_z=0.08 + 0.32 * 0.8253,
@@ -62,11 +62,11 @@ def test_fell_back():
 def test_stopped_on_ground_that_always_holds():
     """Let down on both feet, legs astride, it comes to rest and is told so."""
     seed = jb.seed_scene(slope=0.0)
-    coulomb = jb.RegularisedCoulomb(mu=0.8, v_d=1e-3)
-    scene = jb.Scene(seed.walker, seed.ground, seed.normal, coulomb, jb.AlwaysTouching())
+    coulomb = jb.laws.RegularisedCoulomb(mu=0.8, v_d=1e-3)
+    scene = jb.Scene(seed.walker, seed.ground, seed.normal, coulomb, jb.laws.AlwaysTouching())
     start = _state(
         theta_1=0.3, theta_2=-0.3, omega_1=0.0, omega_2=0.0, hip_vx=0.0, hip_vz=0.0,
-        hip_z=float(jb.standing_height(scene, jnp.asarray(0.3), 4e-4)),
+        hip_z=float(jb.dynamics.standing_height(scene, jnp.asarray(0.3), 4e-4)),
     )  # fmt: skip
     rest = jb.simulate(scene, start, duration=50.0, save="end")
     assert rest.outcome == Ending.STOPPED
@@ -76,7 +76,7 @@ def test_stopped_on_ground_that_always_holds():
 def test_a_scuffing_foot_is_a_stumble():
     """Without the clearance rule the swinging foot catches the ground at mid-stance."""
     seed = jb.seed_scene()
-    scene = jb.Scene(seed.walker, seed.ground, seed.normal, seed.friction, jb.AlwaysTouching())
+    scene = jb.Scene(seed.walker, seed.ground, seed.normal, seed.friction, jb.laws.AlwaysTouching())
     walk = jb.simulate(scene, jb.seed_state(), duration=2.0, save="end")
     assert walk.outcome == Ending.STUMBLED
     unwatched = jb.simulate(scene, jb.seed_state(), duration=0.3, save="end", watch=("fall",))

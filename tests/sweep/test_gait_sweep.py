@@ -24,15 +24,15 @@ def test_one_stable_branch_is_followed(swept):
         swept.period.sel(K=1e6).data[1:], [0.4355445, 0.4408348, 0.4464368], atol=1e-6
     )
     assert np.all(swept.spectral_radius.data[1:] < 1.0)
-    assert np.all(swept.ending.data[1:] == int(jb.Search.FOUND))
+    assert np.all(swept.ending.data[1:] == int(jb.gait.Search.FOUND))
 
 
 def test_where_there_is_no_gait_numbers_are_nan(swept):
     flat = swept.sel(slope=0.005)
-    assert np.all(flat.ending != int(jb.Search.FOUND))
+    assert np.all(flat.ending != int(jb.gait.Search.FOUND))
     assert np.all(np.isnan(flat.period))
     assert np.all(np.isnan(flat.elasticity_period))
-    assert np.all(flat.branch_end == int(jb.BranchEnd.FOLD))
+    assert np.all(flat.branch_end == int(jb.gait.BranchEnd.FOLD))
 
 
 def test_elasticities_promise_the_neighbour(swept):

@@ -22,11 +22,11 @@ def _settings(**parts):
     return gaitless(_scene(**parts), jb.seed_state()).settings()
 
 
-class RistowSchafer(jb.RistowSchafer):
+class RistowSchafer(jb.laws.RistowSchafer):
     """A user's law of a name that is taken."""
 
 
-class Wide(jb.AlwaysTouching):
+class Wide(jb.laws.AlwaysTouching):
     """A user's rule with a choice that is no number."""
 
     how: str = eqx.field(static=True)
@@ -35,11 +35,11 @@ class Wide(jb.AlwaysTouching):
 @pytest.mark.parametrize(
     ("one", "other"),
     [
-        (dict(clearance=jb.OneFoot(1)), dict(clearance=jb.OneFoot(2))),
-        (dict(clearance=jb.OneFoot(1)), dict(clearance=jb.AlwaysTouching())),
+        (dict(clearance=jb.laws.OneFoot(1)), dict(clearance=jb.laws.OneFoot(2))),
+        (dict(clearance=jb.laws.OneFoot(1)), dict(clearance=jb.laws.AlwaysTouching())),
         (dict(clearance=Wide("left")), dict(clearance=Wide("right"))),
         (
-            dict(normal=jb.RistowSchafer(K=1e6, c=1e7, n=1.5)),
+            dict(normal=jb.laws.RistowSchafer(K=1e6, c=1e7, n=1.5)),
             dict(normal=RistowSchafer(K=1e6, c=1e7, n=1.5)),
         ),
     ],
@@ -65,11 +65,11 @@ def test_functions_are_known_by_module_name_and_what_is_bound():
 
 
 def test_only_the_code_of_a_user_is_digested():
-    assert code_digests(SEED, jb.grid(SEED, {"theta_swing": [0.0]})) == {}
+    assert code_digests(SEED, jb.starts.grid(SEED, {"theta_swing": [0.0]})) == {}
     found = code_digests(_scene(normal=RistowSchafer(K=1e6, c=1e7, n=1.5), clearance=Wide("a")))
     assert [name.rpartition(".")[2] for name in found] == ["RistowSchafer", "Wide"]
     assert all(len(digest) == 16 for digest in found.values())
-    follow = code_digests(jb.grid(SEED, {"theta_swing": [0.0]}, follow=_kept))
+    follow = code_digests(jb.starts.grid(SEED, {"theta_swing": [0.0]}, follow=_kept))
     assert list(follow) == [f"{__name__}._kept"]
 
 

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.sweep._by_xla import labelled_by_xla
+from jaxbiped.sweep._labelling_by_xla import label_by_xla
+from tests.basins.truth import rigid_fate, seed_fate
 from tests.rigid_walkers import FIRST_DOUBLING, STABLE, simplest_state, simplest_walker
-from tests.sweep.truth import rigid_fate, seed_fate
 from tests.sweep.walkers import gaitless, rows, same, simplest_grid, stacked
 
 pytestmark = pytest.mark.slow
@@ -24,7 +24,7 @@ SEED_STARTS = [
 
 def _seed_batch(labelling):
     parts = [
-        jb.grid(labelling.scene, {"theta_stance": [a], "omega_stance": [w]}, place=True)
+        jb.starts.grid(labelling.scene, {"theta_stance": [a], "omega_stance": [w]}, place=True)
         for a, w in SEED_STARTS
     ]
     return stacked([rows(part.batch(labelling, 0, 1).states, 0) for part in parts])
@@ -37,7 +37,7 @@ def test_the_seed_by_radau(seed):
     fates = []
     for i in range(len(SEED_STARTS)):
         start = np.array([leaf[i] for leaf in states])
-        walks = found.label[i] == jb.Label.WALKING
+        walks = found.label[i] == jb.basins.Label.WALKING
         fate, time, met = seed_fate(start, 3.0 if walks else found.time[i] + 1.0)
         fates.append(fate)
         assert found.names[i] == ("walking period-1" if fate == "walking" else fate)
@@ -74,14 +74,14 @@ def test_a_walker_without_friction_slides():
     scene = jb.Scene(
         walker=seed.walker,
         ground=seed.ground,
-        normal=jb.Hertz(K=1e6),
-        friction=jb.Frictionless(),
-        clearance=jb.AlwaysTouching(),
+        normal=jb.laws.Hertz(K=1e6),
+        friction=jb.laws.Frictionless(),
+        clearance=jb.laws.AlwaysTouching(),
     )
     labelling = gaitless(scene, jb.seed_state(), accuracy="fast")
     axes = {"theta_stance": [0.0], "theta_swing": [0.0], "omega_stance": [0.0], "hip_vx": [4.0]}
     axes["omega_swing"] = [0.0]
-    found = labelling(jb.grid(scene, axes, place=True).batch(labelling, 0, 1).states)
+    found = labelling(jb.starts.grid(scene, axes, place=True).batch(labelling, 0, 1).states)
     assert found.names[0] == "slid"
     # It is over as soon as a foot has slid by a leg's length.
     assert found.distance[0] == pytest.approx(float(scene.walker.l), rel=0.3)
@@ -124,7 +124,7 @@ def test_starts_just_within_the_radius_converge(simplest, seed):
         final = walked(states)
         assert np.all(final.footsteps == 30)
         assert np.all(gait.distance(final.final) < 1e-2 * gait.radius)
-        assert np.all(labelling(states).label == jb.Label.WALKING)
+        assert np.all(labelling(states).label == jb.basins.Label.WALKING)
 
 
 POISON = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-310, 50.0]
@@ -142,7 +142,7 @@ def test_a_poisoned_lane_changes_no_other(seed, value, leaf, lane, everything):
     found = seed(jb.State(*bad))
     others = np.arange(16) != lane
     same(rows(found, others), rows(good, others))
-    assert int(found.label[lane]) in set(jb.Label) - {jb.Label.PENDING}
+    assert int(found.label[lane]) in set(jb.basins.Label) - {jb.basins.Label.PENDING}
     if not np.isfinite(value) and leaf > 0:
         assert found.names[lane] == "solver failed"
 
@@ -163,7 +163,7 @@ def test_a_lone_start_is_labelled_as_in_any_batch(seed, simplest, monkeypatch):
 
 
 def test_both_engines_give_the_same_labels(simplest, monkeypatch):
-    monkeypatch.setattr(labelled_by_xla, "__kwdefaults__", {"slots": 24})
+    monkeypatch.setattr(label_by_xla, "__kwdefaults__", {"slots": 24})
     effort = simplest.effort._replace(engine="xla")
     # More starts than slots, so that slots are filled anew.
     states = simplest_grid(simplest.scene, 7).batch(simplest, 0, 49).states
@@ -171,7 +171,7 @@ def test_both_engines_give_the_same_labels(simplest, monkeypatch):
     ours, theirs = simplest(states), jb.Labelling(simplest.scene, simplest.family, effort)(states)
     for name in ("label", "gait", "period", "footsteps"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name), err_msg=name)
-    walks = ours.label == jb.Label.WALKING
+    walks = ours.label == jb.basins.Label.WALKING
     assert walks.sum() > 3
     np.testing.assert_allclose(ours.time[walks], theirs.time[walks], rtol=1e-6)
     np.testing.assert_allclose(ours.closest[walks], theirs.closest[walks], rtol=1e-3)
@@ -191,7 +191,7 @@ def test_a_gait_of_two_footsteps_is_met_and_named(beyond_doubling):
     states = stacked([simplest_state(0.23 + 0.001 * i, -0.23 - 0.001 * i) for i in range(3)])
     before = beyond_doubling(states)
     assert (before.names[0], before.period[0]) == ("unresolved", 2)
-    known = jb.with_gaits_met(beyond_doubling, jb.GivenStarts(states))
+    known = jb.with_gaits_met(beyond_doubling, jb.starts.GivenStarts(states))
     (gait,) = known.family.rows[0]
     assert gait.period == 2
     radius = abs(gait.multipliers[0])
@@ -213,21 +213,21 @@ def test_gaits_are_those_of_each_parameter(simplest):
     low, high = (row[0] for row in own.family.rows)
     np.testing.assert_allclose(high.point, simplest.family.rows[0][0].point, atol=1e-7)
     assert low.point[1] < high.point[1] - 5e-3
-    starts = jb.grid(simplest.scene, {"slope": slopes, "omega_swing": [-0.17, -0.18]})
+    starts = jb.starts.grid(simplest.scene, {"slope": slopes, "omega_swing": [-0.17, -0.18]})
     found = jb.sweep(own, starts)
-    assert np.all(found.label == jb.Label.WALKING)
+    assert np.all(found.label == jb.basins.Label.WALKING)
     # Starts take from the gait of their own slope what they are not told.
     np.testing.assert_array_equal(
         starts.batch(own, 0, 4).states.theta_2,
         low.point[[1] * 2].tolist() + high.point[[1] * 2].tolist(),
     )
     with pytest.raises(jb.ArgumentError, match=r"slope = 0\.0085 is not allowed: no gait was"):
-        jb.sweep(own, jb.grid(simplest.scene, {"slope": [0.0085]}))
+        jb.sweep(own, jb.starts.grid(simplest.scene, {"slope": [0.0085]}))
     with pytest.raises(jb.ArgumentError, match="the gaits are known for"):
         own(starts.batch(own, 0, 4).states)
     # Without gaits for its parameters a sample is labelled by what repeats itself.
-    sampled = jb.sweep(simplest, jb.sample(simplest.scene, {"slope": (0.0085, 0.0095)}, 4))
-    assert np.all(sampled.label == jb.Label.WALKING)
+    sampled = jb.sweep(simplest, jb.starts.sample(simplest.scene, {"slope": (0.0085, 0.0095)}, 4))
+    assert np.all(sampled.label == jb.basins.Label.WALKING)
     assert np.all(sampled.gait == -1)
     assert np.all(sampled.period == 1)
 
@@ -256,9 +256,12 @@ def _states(*shapes):
         (lambda it: it(_states(*[2] * 8), parameters={"K": [1e6]}), r"parameters\['K'\] has shape"),
         (lambda it: it(_states(*[1] * 8), parameters={"K": [-1.0]}), "K = -1"),
         (lambda it: it(_states(*[1] * 8), parameters={"k": [1.0]}), "parameter = 'k' is not"),
-        (lambda it: jb.sweep(it, jb.grid(it.scene, {"hip_vx": [0.5]}), chunk=0), "chunk = 0"),
+        (
+            lambda it: jb.sweep(it, jb.starts.grid(it.scene, {"hip_vx": [0.5]}), chunk=0),
+            "chunk = 0",
+        ),
         (lambda it: jb.sweep(it, [1.0]), "starts = .* AbstractStarts"),
-        (lambda it: jb.sweep(it, jb.GivenStarts(_states(*[0] * 8))), "starts is empty"),
+        (lambda it: jb.sweep(it, jb.starts.GivenStarts(_states(*[0] * 8))), "starts is empty"),
         (lambda it: jb.with_gaits_met(it, None, count=0), "count = 0"),
     ],
 )  # fmt: skip
@@ -275,14 +278,14 @@ def test_bristles_start_straight():
         walker=seed.walker,
         ground=seed.ground,
         normal=seed.normal,
-        friction=jb.LuGre(mu_static=0.5, mu_kinetic=0.4, v_s=1e-3, sigma_0=5e4, sigma_1=100.0),
+        friction=jb.laws.LuGre(mu_static=0.5, mu_kinetic=0.4, v_s=1e-3, sigma_0=5e4, sigma_1=100.0),
         clearance=seed.clearance,
     )
-    straight = jb.BristleState(*jb.seed_state(), *[np.zeros(())] * 2)
+    straight = jb.dynamics.BristleState(*jb.seed_state(), *[np.zeros(())] * 2)
     labelling = gaitless(scene, straight, accuracy="fast", footsteps=1)
     short, full = (stacked([state] * 2) for state in (jb.seed_state(), straight))
     same(labelling(short), labelling(full))
-    found = jb.sweep(labelling, jb.GivenStarts(short), look_for_gaits=False)
+    found = jb.sweep(labelling, jb.starts.GivenStarts(short), look_for_gaits=False)
     assert found.start_hip_z.shape == (2,)
     assert jtu.tree_leaves(labelling.settings()["scene"])
 

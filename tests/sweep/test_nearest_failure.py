@@ -22,7 +22,9 @@ def found(labelling):
 def _fails(labelling, points):
     """By a plain walk of thirty footsteps, without any labelling."""
     walks = [
-        jb.rigid_walk(labelling.scene, jb.RigidState(0.0, *point), steps=30, accuracy="balanced")
+        jb.rigid_walk(
+            labelling.scene, jb.dynamics.RigidState(0.0, *point), steps=30, accuracy="balanced"
+        )
         for point in points
     ]
     return [walk.outcome is not jb.Ending.WALKING for walk in walks]
@@ -48,8 +50,8 @@ def test_no_shorter_push_in_a_random_direction_is_fatal(labelling, found):
     gait, scales = labelling.family.rows[0][0], labelling.family.scales[0]
     random = np.random.default_rng(1).standard_normal((2000, 4))
     random *= 0.97 * found[True].distance / np.linalg.norm(random, axis=1, keepdims=True)
-    states = jb.RigidState(np.zeros(2000), *(gait.point + random * scales).T)
-    assert (labelling(states).label == jb.Label.WALKING).all()
+    states = jb.dynamics.RigidState(np.zeros(2000), *(gait.point + random * scales).T)
+    assert (labelling(states).label == jb.basins.Label.WALKING).all()
 
 
 def test_labels_at_points(labelling):
@@ -57,7 +59,7 @@ def test_labels_at_points(labelling):
     names = ("omega_stance", "theta_swing")
     here = np.array([[gait.state.omega_2, gait.state.theta_1], [0.0, gait.state.theta_1]])
     codes = jb.label_at(labelling, names)(here)
-    assert list(codes) == [jb.Label.WALKING, jb.Label.FELL_BACK]
+    assert list(codes) == [jb.basins.Label.WALKING, jb.basins.Label.FELL_BACK]
     assert list(jb.label_at(labelling, names, failing=True)(here)) == [0, 1]
     with pytest.raises(jb.ArgumentError, match=r"points has shape \(2, 1\)"):
         jb.label_at(labelling, names)(here[:, :1])

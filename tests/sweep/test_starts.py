@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.sweep._points import points
+from jaxbiped.sweep.starts._sequences import sequence_points
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same
 
@@ -19,7 +19,7 @@ BOUNDS = {"theta_stance": (-0.1, 0.3), "omega_stance": (-2.0, 0.0), "hip_vx": (0
 
 def test_the_last_axis_of_a_grid_runs_fastest():
     axes = {"omega_stance": [-1.0, -2.0], "slope": [0.01, 0.02, 0.03]}
-    starts = jb.grid(SCENE, axes)
+    starts = jb.starts.grid(SCENE, axes)
     assert starts.shape == (2, 3)
     batch = starts.batch(LABELLING, 1, 5)
     np.testing.assert_array_equal(batch.states.omega_2, [-1.0, -1.0, -2.0, -2.0])
@@ -30,13 +30,15 @@ def test_the_last_axis_of_a_grid_runs_fastest():
 
 def test_placed_feet_are_as_deep_and_slip_as_slowly_as_in_the_gait():
     axes = {"theta_stance": np.linspace(-0.3, 0.4, 5), "omega_stance": np.linspace(-2.0, 0.3, 4)}
-    batch = jb.grid(SCENE, axes, place=True).batch(LABELLING, 0, 20)
-    ours, gait = (jb.feet(SCENE, state).foot_2 for state in (batch.states, jb.seed_state()))
+    batch = jb.starts.grid(SCENE, axes, place=True).batch(LABELLING, 0, 20)
+    ours, gait = (
+        jb.dynamics.feet(SCENE, state).foot_2 for state in (batch.states, jb.seed_state())
+    )
     np.testing.assert_allclose(ours.penetration, gait.penetration, atol=1e-15)
     np.testing.assert_allclose(ours.penetration_rate, gait.penetration_rate, atol=1e-13)
     np.testing.assert_allclose(ours.slip_speed, gait.slip_speed, atol=1e-13)
     # What is named stays as it was asked for.
-    named = jb.grid(SCENE, {"theta_stance": [0.0], "hip_vx": [0.7]}, place=True)
+    named = jb.starts.grid(SCENE, {"theta_stance": [0.0], "hip_vx": [0.7]}, place=True)
     assert float(named.batch(LABELLING, 0, 1).states.hip_vx[0]) == 0.7
 
 
@@ -45,15 +47,15 @@ def test_a_function_completes_the_starts_of_each_scene():
         return states._replace(theta_1=-states.theta_2, hip_vx=10.0 * scene.ground.slope)
 
     axes = {"theta_stance": [0.1, 0.2], "slope": [0.01, 0.03]}
-    states = jb.grid(SCENE, axes, follow=mirrored).batch(LABELLING, 0, 4).states
+    states = jb.starts.grid(SCENE, axes, follow=mirrored).batch(LABELLING, 0, 4).states
     np.testing.assert_array_equal(states.theta_1, [-0.1, -0.1, -0.2, -0.2])
     np.testing.assert_allclose(states.hip_vx, [0.1, 0.3, 0.1, 0.3])
 
 
-@given(st.sampled_from(jb.SAMPLINGS), st.integers(0, 2**31), st.lists(st.integers(0, 99)))
+@given(st.sampled_from(jb.starts.SAMPLINGS), st.integers(0, 2**31), st.lists(st.integers(0, 99)))
 @settings(max_examples=20, deadline=None)
 def test_a_sample_is_the_same_whichever_chunk_it_is_made_in(method, seed, cuts):
-    starts = jb.sample(SCENE, BOUNDS, 100, method=method, seed=seed)
+    starts = jb.starts.sample(SCENE, BOUNDS, 100, method=method, seed=seed)
     whole = starts.batch(LABELLING, 0, 100)
     edges = [0, *sorted(set(cuts) - {0}), 100]
     parts = [starts.batch(LABELLING, a, b) for a, b in itertools.pairwise(edges)]
@@ -63,27 +65,32 @@ def test_a_sample_is_the_same_whichever_chunk_it_is_made_in(method, seed, cuts):
         assert np.all((joined >= low) & (joined <= high))
     some = np.array(sorted(set(cuts)), dtype=int)
     same(starts.at(LABELLING, some).states, type(whole.states)(*[x[some] for x in whole.states]))
-    other = jb.sample(SCENE, BOUNDS, 100, method=method, seed=seed + 1).batch(LABELLING, 0, 100)
+    other = jb.starts.sample(SCENE, BOUNDS, 100, method=method, seed=seed + 1).batch(
+        LABELLING, 0, 100
+    )
     assert not np.array_equal(other.columns["hip_vx"], whole.columns["hip_vx"])
 
 
 def test_low_discrepancy_samples_fill_every_slice():
     numbers = np.arange(64)
     for method in ("sobol", "latin-hypercube"):
-        drawn = points(method, 3, 64, 5, numbers)
+        drawn = sequence_points(method, 3, 64, 5, numbers)
         for column in drawn.T:
             assert sorted(np.floor(64 * column).astype(int)) == list(range(64))
-    pairs = np.floor(8 * points("sobol", 2, 64, 5, numbers)).astype(int)
+    pairs = np.floor(8 * sequence_points("sobol", 2, 64, 5, numbers)).astype(int)
     assert len({tuple(pair) for pair in pairs}) == 64
 
 
 def test_given_starts_are_told_apart_by_all_their_numbers():
     state = jb.State(*[np.full(1000, float(leaf)) for leaf in jb.seed_state()])
     other = state._replace(hip_z=np.where(np.arange(1000) == 777, 0.4, state.hip_z))
-    first, second = jb.GivenStarts(state).described(), jb.GivenStarts(other).described()
+    first, second = (
+        jb.starts.GivenStarts(state).described(),
+        jb.starts.GivenStarts(other).described(),
+    )
     assert first != second
     assert len(str(first)) < 200
-    assert jb.GivenStarts(state).described() == first
+    assert jb.starts.GivenStarts(state).described() == first
 
 
 _STATE = jb.State(*[np.zeros(2)] * 8)
@@ -92,23 +99,32 @@ _STATE = jb.State(*[np.zeros(2)] * 8)
 @pytest.mark.parametrize(
     ("make", "reason"),
     [
-        (lambda: jb.grid(SCENE, {"theta": [0.1]}), "coordinate = 'theta' is not known"),
-        (lambda: jb.grid(SCENE, {}), "name at least one"),
-        (lambda: jb.grid(SCENE, {"hip_vx": []}), r"hip_vx has values of shape \(0,\)"),
-        (lambda: jb.grid(SCENE, {"hip_vx": [[0.1]]}), "must be"),
-        (lambda: jb.grid(SCENE, {"hip_vx": [0.1, np.nan]}), "hip_vx = nan .* a finite number"),
-        (lambda: jb.grid(SCENE, {"hip_vx": ["fast"]}), "hip_vx = .* is not a number"),
-        (lambda: jb.grid(SCENE, {"K": [1e6, -1.0]}), "K = -1 .* above 0"),
-        (lambda: jb.grid(simplest_walker(0.009), {"hip_z": [0.1]}), "'hip_z' is not known"),
-        (lambda: jb.sample(SCENE, {"hip_vx": (0.5, 0.1)}, 4), "hip_vx = 0.5:0.1 .* be less than"),
-        (lambda: jb.sample(SCENE, {"hip_vx": (0.5,)}, 4), "hip_vx = .* two numbers"),
-        (lambda: jb.sample(SCENE, {"hip_vx": (0.5, np.inf)}, 4), "hip_vx = inf"),
-        (lambda: jb.sample(SCENE, BOUNDS, 0), "count = 0 .* whole number of at least 1"),
-        (lambda: jb.sample(SCENE, BOUNDS, 4, method="best"), "method = 'best' .* sobol"),
-        (lambda: jb.sample(SCENE, {"c": (-5.0, 1.0)}, 4), "c = -5"),
-        (lambda: jb.GivenStarts([1.0]), "states = .* must be a State"),
-        (lambda: jb.GivenStarts(_STATE._replace(hip_z=np.zeros(3))), r"leaves of shapes \[\(2,\)"),
-        (lambda: jb.GivenStarts(simplest_state(*STABLE)), r"all of them must be \(n,\)"),
+        (lambda: jb.starts.grid(SCENE, {"theta": [0.1]}), "coordinate = 'theta' is not known"),
+        (lambda: jb.starts.grid(SCENE, {}), "name at least one"),
+        (lambda: jb.starts.grid(SCENE, {"hip_vx": []}), r"hip_vx has values of shape \(0,\)"),
+        (lambda: jb.starts.grid(SCENE, {"hip_vx": [[0.1]]}), "must be"),
+        (
+            lambda: jb.starts.grid(SCENE, {"hip_vx": [0.1, np.nan]}),
+            "hip_vx = nan .* a finite number",
+        ),
+        (lambda: jb.starts.grid(SCENE, {"hip_vx": ["fast"]}), "hip_vx = .* is not a number"),
+        (lambda: jb.starts.grid(SCENE, {"K": [1e6, -1.0]}), "K = -1 .* above 0"),
+        (lambda: jb.starts.grid(simplest_walker(0.009), {"hip_z": [0.1]}), "'hip_z' is not known"),
+        (
+            lambda: jb.starts.sample(SCENE, {"hip_vx": (0.5, 0.1)}, 4),
+            "hip_vx = 0.5:0.1 .* be less than",
+        ),
+        (lambda: jb.starts.sample(SCENE, {"hip_vx": (0.5,)}, 4), "hip_vx = .* two numbers"),
+        (lambda: jb.starts.sample(SCENE, {"hip_vx": (0.5, np.inf)}, 4), "hip_vx = inf"),
+        (lambda: jb.starts.sample(SCENE, BOUNDS, 0), "count = 0 .* whole number of at least 1"),
+        (lambda: jb.starts.sample(SCENE, BOUNDS, 4, method="best"), "method = 'best' .* sobol"),
+        (lambda: jb.starts.sample(SCENE, {"c": (-5.0, 1.0)}, 4), "c = -5"),
+        (lambda: jb.starts.GivenStarts([1.0]), "states = .* must be a State"),
+        (
+            lambda: jb.starts.GivenStarts(_STATE._replace(hip_z=np.zeros(3))),
+            r"leaves of shapes \[\(2,\)",
+        ),
+        (lambda: jb.starts.GivenStarts(simplest_state(*STABLE)), r"all of them must be \(n,\)"),
     ],
 )
 def test_what_cannot_be_a_start_is_refused(make, reason):

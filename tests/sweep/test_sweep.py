@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.sweep._store import Store
+from jaxbiped.sweep._zarr_store import Store
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same_results, simplest_grid
 
@@ -45,11 +45,11 @@ def test_labels_do_not_depend_on_the_chunks(late, monkeypatch):
 
 
 def test_starts_keep_their_numbers_in_the_results():
-    starts = jb.sample(SCENE, {"theta_stance": (0.15, 0.25)}, 12, method="halton", seed=4)
+    starts = jb.starts.sample(SCENE, {"theta_stance": (0.15, 0.25)}, 12, method="halton", seed=4)
     found = jb.sweep(LABELLING, starts, chunk=5, look_for_gaits=False)
     expected = starts.batch(LABELLING, 0, 12).columns["theta_stance"]
     np.testing.assert_array_equal(found.start_theta_stance, expected)
-    given = jb.GivenStarts(starts.batch(LABELLING, 0, 12).states)
+    given = jb.starts.GivenStarts(starts.batch(LABELLING, 0, 12).states)
     again = jb.sweep(LABELLING, given, chunk=7, look_for_gaits=False)
     np.testing.assert_array_equal(again.start_theta_2, expected)
     np.testing.assert_array_equal(again.time, found.time)
@@ -65,7 +65,7 @@ def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, write
     path = tmp_path / "store"
     monkeypatch.setattr(SWEEP, "with_gaits_met", _none_met)
     expected = jb.sweep(LABELLING, STARTS, chunk=8)
-    assert jb.Label.WALKING in expected.label
+    assert jb.basins.Label.WALKING in expected.label
     assert len(json.loads(expected.attrs["gaits"])[0]["gaits"]) == 1
     write, count = Store.write, []
 

@@ -14,9 +14,9 @@ import pytest
 import zarr
 
 import jaxbiped as jb
-from jaxbiped.lanes._engine import THREADS_VARIABLE, default_threads
-from jaxbiped.sweep._layout import Layout
-from jaxbiped.sweep._workers import _AHEAD, computed
+from jaxbiped.compiler import THREADS_VARIABLE, default_threads
+from jaxbiped.sweep._array_layout import Layout
+from jaxbiped.sweep._workers import _AHEAD, compute_chunks
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same, same_results, simplest_grid, with_attractor
 
@@ -48,7 +48,7 @@ def test_labellings_and_layouts_travel():
         assert jtu.tree_structure(copy) == jtu.tree_structure(thing)
         same(copy, thing)
     found = known(STARTS.batch(known, 0, 64).states)
-    assert jb.Label.WALKING in found.label
+    assert jb.basins.Label.WALKING in found.label
     same(pickle.loads(pickle.dumps(known))(STARTS.batch(known, 0, 64).states), found)
 
 
@@ -60,7 +60,7 @@ def _killing(scene, states):
 
 
 def test_spawned_processes_and_one_that_dies(tmp_path, expected):
-    killing = jb.grid(SCENE, STARTS.values, follow=_killing)
+    killing = jb.starts.grid(SCENE, STARTS.values, follow=_killing)
     with jb.local_executor(2) as pool:
         assert pool.submit(os.getenv, THREADS_VARIABLE).result() == str(
             max(1, default_threads() // 2)
@@ -78,7 +78,7 @@ def test_spawned_processes_and_one_that_dies(tmp_path, expected):
 
 
 def test_what_cannot_be_sent_to_processes_is_refused():
-    starts = jb.grid(SCENE, {"theta_stance": [0.2]}, follow=lambda scene, states: states)
+    starts = jb.starts.grid(SCENE, {"theta_stance": [0.2]}, follow=lambda scene, states: states)
     with (
         jb.local_executor(1) as pool,
         pytest.raises(jb.ArgumentError, match="must be a module's own"),
@@ -111,8 +111,8 @@ class _Counting(concurrent.futures.Executor):
 
 def test_chunks_in_hand_are_bounded():
     executor = _Counting()
-    layout = Layout.of(jb.grid(SCENE, {"theta_stance": np.linspace(0.1, 0.2, 100)}), 1)
-    for _ in computed(LABELLING, layout, np.arange(100), executor, 3):
+    layout = Layout.of(jb.starts.grid(SCENE, {"theta_stance": np.linspace(0.1, 0.2, 100)}), 1)
+    for _ in compute_chunks(LABELLING, layout, np.arange(100), executor, 3):
         executor.open -= 1
     assert executor.most == 3 * _AHEAD
     assert len(executor.sizes) == 100
@@ -120,8 +120,8 @@ def test_chunks_in_hand_are_bounded():
 
 def test_given_starts_travel_in_parts():
     executor = _Counting()
-    starts = jb.GivenStarts(jb.RigidState(*[np.zeros(10_000)] * 5))
-    list(computed(LABELLING, Layout.of(starts, 10), np.arange(1000), executor, 1))
+    starts = jb.starts.GivenStarts(jb.dynamics.RigidState(*[np.zeros(10_000)] * 5))
+    list(compute_chunks(LABELLING, Layout.of(starts, 10), np.arange(1000), executor, 1))
     assert max(executor.sizes) < 4000
 
 

@@ -5,7 +5,7 @@ import numpy as np
 
 import jaxbiped as jb
 from jaxbiped.sweep._attractor import component_scales
-from jaxbiped.sweep._labelling import checked_effort
+from jaxbiped.sweep._labelling import effort_of
 
 
 def gaitless(scene, state, **options):
@@ -14,7 +14,7 @@ def gaitless(scene, state, **options):
         footsteps=12, accuracy="balanced", rtol=None, solver="rodas4", max_solver_steps=65536,
         engine="lanes",
     )  # fmt: skip
-    effort = checked_effort(scene, **{**settings, **options})
+    effort = effort_of(scene, **{**settings, **options})
     state = jtu.tree_map(np.asarray, state)
     scales = component_scales(scene, state)[None]
     return jb.Labelling(scene, jb.Family((), np.zeros((1, 0)), ((),), (state,), scales), effort)
@@ -60,4 +60,4 @@ def simplest_grid(scene, count=8):
         "theta_stance": np.linspace(0.16, 0.24, count),
         "omega_stance": np.linspace(-0.25, -0.17, count),
     }
-    return jb.grid(scene, axes)
+    return jb.starts.grid(scene, axes)

@@ -1,0 +1,96 @@
+"""Fractions of the starts with each label, and their confidence intervals."""
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+
+from jaxbiped._checks import ArgumentError, check_at_least, check_not_negative
+from jaxbiped.basins._arguments import check_confidence, check_known
+from jaxbiped.basins._label import Label
+
+
+@dataclasses.dataclass(frozen=True)
+class Fraction:
+    """A fraction of the starts, with the ends of its confidence interval and its count."""
+
+    estimate: float
+    low: float
+    high: float
+    count: int
+
+
+def wilson_interval(
+    count: npt.ArrayLike, total: npt.ArrayLike, *, confidence: float = 0.95
+) -> tuple[np.ndarray, np.ndarray]:
+    """Wilson's score interval of a proportion; from 0 to 1 where nothing was counted.
+
+    Wilson, "Probable inference, the law of succession, and statistical inference", J. Am. Stat.
+    Assoc. 22 (1927) 209. It holds for starts drawn independently; on a regular grid, whose
+    starts are spread more evenly than that, it is usually too wide.
+
+    Args:
+        count: how many have the property, any shape.
+        total: of how many, a shape that broadcasts with it.
+        confidence: probability that the interval covers the proportion.
+
+    Returns:
+        The lower and the upper ends, of the broadcast shape.
+
+    Raises:
+        ArgumentError: a count below 0 or above its total, shapes that do not broadcast, or a
+            confidence not between 0 and 1.
+    """
+    from scipy.special import ndtri
+
+    check_confidence(confidence)
+    check_not_negative("count", count)
+    check_not_negative("total", total)
+    k, n = np.asarray(count, dtype=float), np.asarray(total, dtype=float)
+    try:
+        k, n = np.broadcast_arrays(k, n)
+    except ValueError:
+        raise ArgumentError(
+            f"count has shape {k.shape} and total {n.shape}: they must broadcast."
+        ) from None
+    check_at_least("total", n, "count", k)
+
+    z = ndtri(0.5 + 0.5 * confidence)
+    # Multiplied through by n, so that nothing counted is no exception.
+    failures = np.divide(k * (n - k), n, out=np.zeros_like(n), where=n > 0)
+    half = z * np.sqrt(failures + 0.25 * z**2) / (n + z**2)
+    centre = (k + 0.5 * z**2) / (n + z**2)
+    return np.where(k == 0, 0.0, centre - half), np.where(k == n, 1.0, centre + half)
+
+
+def fractions(labels: npt.ArrayLike, *, confidence: float = 0.95) -> dict[str, Fraction]:
+    """The fraction of the starts that has each label, the most frequent first.
+
+    Args:
+        labels: names (`label_names`) or codes of `Label`, any shape. Pending ones are not counted:
+            where all are, no fraction is known and the result is empty.
+        confidence: that of the intervals, see `wilson_interval`.
+
+    Raises:
+        ArgumentError: no entry, an unknown code, or a confidence not between 0 and 1.
+    """
+    check_confidence(confidence)
+    names = _names(np.asarray(labels))
+    distinct, counts = np.unique(names[names != str(Label.PENDING)], return_counts=True)
+    total = int(counts.sum())
+    low, high = wilson_interval(counts, total, confidence=confidence)
+    order = np.argsort(-counts, kind="stable")
+    return {
+        str(distinct[k]): Fraction(counts[k] / total, float(low[k]), float(high[k]), int(counts[k]))
+        for k in order
+    }
+
+
+def _names(labels: np.ndarray) -> np.ndarray:
+    if labels.size == 0:
+        raise ArgumentError(f"labels has shape {labels.shape}: it must have at least one entry.")
+    if labels.dtype.kind not in "iu":
+        return labels.astype(str).ravel()
+    check_known(labels)
+    codes, place = np.unique(labels.ravel(), return_inverse=True)
+    return np.asarray([str(Label(code)) for code in codes])[place]

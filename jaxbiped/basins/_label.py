@@ -1,0 +1,48 @@
+"""Labels: what became of a start."""
+
+import enum
+
+import numpy as np
+import numpy.typing as npt
+
+WALKING_NAME = "walking period-{period}"
+"""What a start that walks is called, by the footsteps in a cycle of its gait."""
+
+
+class Label(enum.IntEnum):
+    """What became of a start. `str(label)` is its name in words; codes 0 to 6 are an `Ending`'s.
+
+    - walking: it converges to a periodic gait; see the gait for its period.
+    - fell forward, fell back, stopped, stumbled: as in `Ending`.
+    - out of steps: the cap on the solver's steps was reached, or no footstep came in all the time
+      allowed for one.
+    - solver failed: the state is no longer a number.
+    - slid: a foot slid along the ground by more than a leg's length between two footsteps.
+    - unresolved: all the footsteps asked for were walked, and nothing was certain yet.
+    - pending: not labelled yet.
+    """
+
+    WALKING = 0
+    FELL_FORWARD = 1
+    FELL_BACK = 2
+    STOPPED = 3
+    STUMBLED = 4
+    OUT_OF_STEPS = 5
+    SOLVER_FAILED = 6
+    SLID = 7
+    UNRESOLVED = 8
+    PENDING = -1
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+
+def label_name(label: int, period: int = 0) -> str:
+    """A label in words, with the period [footsteps] of the gait where it walks."""
+    walks = label == Label.WALKING
+    return WALKING_NAME.format(period=period) if walks else str(Label(label))
+
+
+def label_names(label: npt.ArrayLike, period: npt.ArrayLike) -> np.ndarray:
+    """`label_name` of every entry; arrays of one shape."""
+    return np.asarray(np.vectorize(label_name, otypes=[object])(label, period))

@@ -1,0 +1,41 @@
+"""Label oracle: asks for labels in calls of bounded size and counts them."""
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped.basins._arguments import check_whole
+from jaxbiped.basins._label import Label
+
+LabelOf = Callable[[np.ndarray], npt.ArrayLike]
+"""Labels, shape (n,), of points, shape (n, d)."""
+
+
+class LabelOracle:
+    """Calls `label_of` with at most `batch` points at a time; keeps count of points and calls."""
+
+    def __init__(self, label_of: LabelOf, batch: int):
+        self.label_of = label_of
+        self.batch = check_whole("batch", batch, 1)
+        self.asked = 0
+        self.calls = 0
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Labels of points of shape (n, d), shape (n,)."""
+        parts = [points[k : k + self.batch] for k in range(0, len(points), self.batch)]
+        return np.concatenate([np.empty(0, dtype=int), *map(self._one_call, parts)])
+
+    def _one_call(self, points: np.ndarray) -> np.ndarray:
+        labels = np.asarray(self.label_of(points))
+        if labels.shape != (len(points),) or labels.dtype.kind not in "iu":
+            raise ArgumentError(
+                f"label_of returned {labels.dtype} of shape {labels.shape} for points of shape "
+                f"{points.shape}: it must return whole numbers of shape ({len(points)},)."
+            )
+        if (labels == Label.PENDING).any():
+            raise ArgumentError("label_of returned a pending label: each point must be labelled.")
+        self.asked += len(points)
+        self.calls += 1
+        return labels.astype(int)

@@ -1,0 +1,212 @@
+"""Minimal fatal shock: the nearest start about a gait with another label."""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from jaxbiped._checks import ArgumentError, check_finite, check_positive
+from jaxbiped.basins._arguments import check_vector, check_whole
+from jaxbiped.basins._label_oracle import LabelOf, LabelOracle
+from jaxbiped.basins._ray_descent import GivenNormals, Normal, SecantNormals, descend_rays
+from jaxbiped.basins._rays import Brackets, Surroundings, bisect_brackets, first_exits
+from jaxbiped.basins._spherical_points import normalise, spread_directions
+
+_APART = 0.5
+"""Angle [rad] between the rays that are improved, so that they lead to different places."""
+_ROUGHLY = 1.0 / 16.0
+"""To this part of a step of the march all rays are bisected."""
+
+
+class FatalShock(NamedTuple):
+    """The smallest push found that changes the label; distances are in scaled coordinates.
+
+    Attributes:
+        distance: of the failing start from the gait; infinite where none was found.
+        push: from the gait to that start, in the coordinates' units, shape (d,); NaN if none.
+        boundary_point: coordinates between the last start with the gait's label along the ray and
+            the failing one, at most the tolerance apart, shape (d,).
+        label: the failing start's; the gait's own where none was found.
+        direction: unit vector of the push in scaled coordinates, shape (d,).
+        angle: between direction and the boundary's normal there [rad]: 0 at a nearest point of
+            a smooth boundary. NaN where the normal is not known.
+        bisected_distance: the distance before any ray was turned.
+        origin_label: the gait's.
+        asked: how many labels were asked for.
+        calls: in how many calls.
+    """
+
+    distance: float
+    push: np.ndarray
+    boundary_point: np.ndarray
+    label: int
+    direction: np.ndarray
+    angle: float
+    bisected_distance: float
+    origin_label: int
+    asked: int
+    calls: int
+
+    @property
+    def found(self) -> bool:
+        """Whether any start within `farthest` has another label than the gait."""
+        return bool(np.isfinite(self.distance))
+
+
+def minimal_fatal_shock(
+    label_of: LabelOf,
+    origin: npt.ArrayLike,
+    *,
+    scales: npt.ArrayLike,
+    farthest: float,
+    tolerance: float,
+    directions: int | npt.ArrayLike | None = None,
+    steps: int = 32,
+    normal: Normal | None = None,
+    improved: int = 8,
+    batch: int = 1024,
+) -> FatalShock:
+    """Distance from a gait to the nearest start with another label, in scaled coordinates.
+
+    All rays march outward together, farthest / steps at a time, until half as far again as the
+    first of them that meets another label; those steps are bisected. A tongue of another basin
+    thinner than a step may be stepped over, and one between the rays is missed: the distance is
+    that of a start that was seen to fail, to within the tolerance along its ray, and a nearer one
+    may exist. Then the nearest rays are turned to the boundary's normal, found from `normal` or
+    from the distances along nearby rays, as long as they get shorter: this ends at a local
+    minimum; at an edge of the boundary, where it has no normal, only near one. (The least
+    distance to the edge of the basin is the "minimal fatal shock" of Halekotte and Feudel, Sci.
+    Rep. 10 (2020) 11783.)
+
+    Args:
+        label_of: labels, whole numbers of shape (n,), of points of shape (n, d). Every label
+            that differs from the origin's counts as fatal, "unresolved" too: map the codes first
+            where a difference should not count.
+        origin: coordinates of the gait, shape (d,).
+        scales: what counts as one unit of distance along each coordinate, shape (d,).
+        farthest: scaled distance up to which rays march.
+        tolerance: scaled distance to which the boundary is bisected.
+        directions: how many rays (both ways along every axis first, so at least 2 d, then evenly
+            over the sphere; d = 1 has two), 32 d unless given; or scaled directions of shape
+            (n, d).
+        steps: of the march.
+        normal: gradients, shape (n, d), at points of shape (n, d) near the boundary, in the units
+            of the points, of any function that is constant along the boundary; either sign. NaN
+            where it is not known: such a ray is not turned.
+        improved: how many rays are turned, the nearest ones at least 0.5 rad apart.
+        batch: the most points in a call.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, or labels or normals of a wrong shape.
+    """
+    around = _surroundings(LabelOracle(label_of, batch), origin, scales)
+    ways = _directions(directions, around.origin.size)
+    check_positive("farthest", farthest)
+    check_positive("tolerance", tolerance)
+    if not 1e-12 * farthest <= tolerance < farthest:
+        raise ArgumentError(
+            f"tolerance = {tolerance:g} is not allowed: it must be at least 1e-12 farthest = "
+            f"{1e-12 * farthest:g} and below farthest = {farthest:g}."
+        )
+    check_whole("improved", improved, 0)
+    marks = np.linspace(0.0, farthest, check_whole("steps", steps, 1) + 1)[1:]
+
+    rays = first_exits(around, ways, marks)
+    rays = rays.take(np.isfinite(rays.outside))
+    if not rays.inside.size:
+        return _without_failure(around)
+    rays = _nearest(around, rays, max(improved, 1), tolerance)
+    bisected = float(rays.outside.min())
+    normals_of = (
+        SecantNormals(around, tolerance) if normal is None else GivenNormals(around, normal)
+    )
+    angle = np.full(len(rays.inside), np.nan)
+    if improved:
+        rays, angle = descend_rays(around, rays, normals_of, tolerance)
+    return _result(around, rays, angle, bisected, tolerance)
+
+
+def _surroundings(ask: LabelOracle, origin: npt.ArrayLike, scales: npt.ArrayLike) -> Surroundings:
+    centre, units = check_vector("origin", origin), check_vector("scales", scales)
+    check_positive("scales", units)
+    if centre.shape != units.shape:
+        raise ArgumentError(
+            f"scales has shape {units.shape} and origin {centre.shape}: they must be the same."
+        )
+    return Surroundings(ask, centre, units, int(ask(centre[None])[0]))
+
+
+def _directions(directions: int | npt.ArrayLike | None, d: int) -> np.ndarray:
+    if directions is None:
+        return spread_directions(32 * d, d)
+    if np.ndim(directions) == 0:
+        return spread_directions(check_whole("directions", directions, 1), d)
+    check_finite("directions", directions)
+    given = np.asarray(directions, dtype=float)
+    if given.ndim != 2 or given.shape[1] != d or len(given) == 0:
+        raise ArgumentError(f"directions has shape {given.shape}: it must be (n, {d}), n above 0.")
+    if not given.any(axis=1).all():
+        raise ArgumentError("directions holds a row of zeros: each must point somewhere.")
+    return normalise(given)
+
+
+def _nearest(around: Surroundings, rays: Brackets, most: int, tolerance: float) -> Brackets:
+    """The nearest ray and others that point elsewhere, bisected to the tolerance.
+
+    Only those that may be among them are: to tell which, a few halvings of all brackets do.
+    """
+    widest = np.max(rays.outside - rays.inside)
+    rays = bisect_brackets(around, rays, max(tolerance, widest * _ROUGHLY))
+    may_be_nearest = rays.inside <= rays.outside.min()
+    may_be_nearest[_nearest_apart(rays, most)] = True
+    rays = bisect_brackets(around, rays.take(may_be_nearest), tolerance)
+    return rays.take(_nearest_apart(rays, most))
+
+
+def _nearest_apart(rays: Brackets, most: int) -> np.ndarray:
+    """The nearest ray, the nearest of those that point elsewhere, and so on."""
+    chosen: list[int] = []
+    for k in np.argsort(rays.outside, kind="stable"):
+        if len(chosen) < most and (
+            not chosen or np.max(rays.directions[chosen] @ rays.directions[k]) < np.cos(_APART)
+        ):
+            chosen.append(int(k))
+    return np.asarray(chosen)
+
+
+def _result(
+    around: Surroundings, rays: Brackets, angle: np.ndarray, bisected: float, tolerance: float
+) -> FatalShock:
+    # Among rays that are equally near, to the tolerance, the one best aligned.
+    near = rays.outside <= rays.outside.min() + tolerance
+    near &= rays.outside <= bisected
+    k = int(np.argmin(np.where(near, np.nan_to_num(angle, nan=np.pi), np.inf)))
+    direction, distance = rays.directions[k], rays.outside[k]
+    return FatalShock(
+        distance=float(distance),
+        push=around.scales * direction * distance,
+        boundary_point=around.points(direction, 0.5 * (rays.inside[k] + distance)),
+        label=int(rays.labels[k]),
+        direction=direction,
+        angle=float(angle[k]),
+        bisected_distance=bisected,
+        origin_label=around.label,
+        asked=around.ask.asked,
+        calls=around.ask.calls,
+    )
+
+
+def _without_failure(around: Surroundings) -> FatalShock:
+    unknown = np.full(around.origin.size, np.nan)
+    return FatalShock(
+        distance=np.inf,
+        push=unknown,
+        boundary_point=unknown,
+        label=around.label,
+        direction=unknown,
+        angle=np.nan,
+        bisected_distance=np.inf,
+        origin_label=around.label,
+        asked=around.ask.asked,
+        calls=around.ask.calls,
+    )

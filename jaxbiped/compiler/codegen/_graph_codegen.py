@@ -1,0 +1,265 @@
+"""Graph code generation: LLVM's text, each value one vector over the lanes."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from jaxbiped.compiler.codegen._instruction_selection import select_fused, select_instruction
+from jaxbiped.compiler.codegen._llvm_function import FunctionBuilder, literal, vector
+from jaxbiped.compiler.ir._graph import Block, Kind, Value
+from jaxbiped.compiler.passes._liveness import Liveness
+
+
+class Place(NamedTuple):
+    """Where a value lies in memory: `offset` vectors of the function's width behind `pointer`."""
+
+    pointer: str
+    offset: int
+
+
+class GraphWriter:
+    """Writes one function.
+
+    Attributes:
+        width: lanes of a vector, one simulation each.
+        inner: lanes of a vector over the entries of a map, where `width` is one.
+        scales: whether the CPU multiplies by powers of two in one instruction.
+        text: what is written so far.
+        padded_rooms: memory whose rows are whole vectors, for maps where `width` is one.
+        homes: values that lie in memory, loaded where they are used.
+        needed: what is to be computed.
+    """
+
+    def __init__(self, width: int, inner: int, scales: bool, needed: Liveness) -> None:
+        self.width, self.inner, self.scales, self.needed = width, inner, scales, needed
+        self.text = FunctionBuilder()
+        self.homes: dict[int, Place] = {}
+        self.padded_rooms: set[str] = set()
+        self._names: dict[int, tuple[str, int]] = {}
+
+    def room(self, kind: Kind, vectors: int) -> str:
+        """Memory of the function for a number of vectors."""
+        return self.text.room(kind, vectors * self.width)
+
+    def padded(self, length: int) -> int:
+        """Entries that a map over `length` of them has room for."""
+        step = self.inner if self.width == 1 else 1
+        return -(-length // step) * step
+
+    def name(self, value: Value, text: str, width: int | None = None) -> None:
+        """Says what a value is called."""
+        self._names[id(value)] = (text, self.width if width is None else width)
+
+    def use(self, value: Value, width: int | None = None) -> str:
+        """A value as an operand of an instruction of this width."""
+        width = self.width if width is None else width
+        constant = value.constant
+        if constant is not None:
+            return self.text.splat_constant(literal(constant, value.kind), value.kind, width)
+        text, known_width = self._named(value)
+        if known_width == width:
+            return text
+        return self.text.cached(
+            ("splat", text, width), lambda: self.text.splat(text, value.kind, width)
+        )
+
+    def write(
+        self,
+        block: Block,
+        width: int | None = None,
+        known: Callable[[Value], None] = lambda value: None,
+    ) -> None:
+        """Writes all of a block that is needed; `known` is told what has been computed."""
+        width = self.width if width is None else width
+        for value in block.values:
+            if value not in self.needed or id(value) in self.needed.absorbed:
+                continue
+            if id(value) in self.homes or value.op in ("const", "part", "input"):
+                continue
+            if value.op == "if":
+                self._write_if(value, width)
+            elif value.op == "repeat":
+                self._write_repeat(value, width)
+            elif value.op == "map":
+                self._write_map(value)
+            elif value.op not in ("held", "taken"):
+                self.name(value, self._operation(value, width), width)
+                known(value)
+
+    def _operation(self, value: Value, width: int) -> str:
+        place = self.needed.fused.get(id(value))
+        if place is not None:
+            factors = [self.use(factor, width) for factor in value.args[place].args]
+            other = self.use(value.args[1 - place], width)
+            return select_fused(self.text, value.op, value.kind, factors, other, place, width)
+        values = [arg for arg in value.args if isinstance(arg, Value)]
+        kinds = [value.kind, *(arg.kind for arg in values)]
+        operands = [self.use(arg, width) for arg in values]
+        return select_instruction(self.text, value.op, kinds, operands, width, scales=self.scales)
+
+    def _named(self, value: Value) -> tuple[str, int]:
+        place = self.homes.get(id(value))
+        if place is None:
+            return self._names[id(value)]
+        key = ("load", place)
+        found = self.text.cached(key, lambda: self._load_from(place, value.kind))
+        return found, self.width
+
+    def _load_from(self, place: Place, kind: Kind) -> str:
+        at = self.text.address(place.pointer, kind, place.offset * self.width)
+        return self.text.load(at, kind, self.width)
+
+    def _write_if(self, head: Value, width: int) -> None:
+        """The inner block runs where any lane wants it; each lane then takes its own."""
+        here, inside, values, defaults = head.args
+        parts = _parts_of(head)
+        wanted = [i for i, part in enumerate(parts) if part in self.needed]
+        mask = self.use(here, width)
+        before = [self.use(defaults[i], width) for i in wanted]
+        start, rare, after = self.text.label, self.text.fresh("some"), self.text.fresh("none")
+        self.text.line(f"br i1 {self.text.any_lane(mask, width)}, label %{rare}, label %{after}")
+        self.text.begin(rare)
+        chosen = []
+        with self.text.scope():
+            self.write(inside, width)
+            for i, old in zip(wanted, before, strict=True):
+                of, new = vector(values[i].kind, width), self.use(values[i], width)
+                text = f"select {vector(Kind.BOOL, width)} {mask}, {of} {new}, {of} {old}"
+                chosen.append(self.text.assign(text))
+        end = self.text.label
+        self.text.line(f"br label %{after}")
+        self.text.begin(after)
+        for i, old, new in zip(wanted, before, chosen, strict=True):
+            of = vector(values[i].kind, width)
+            text = f"phi {of} [ {old}, %{start} ], [ {new}, %{end} ]"
+            self.name(parts[i], self.text.assign(text), width)
+
+    def _write_repeat(self, head: Value, width: int) -> None:
+        length, inside, starts, held, ends = head.args
+        start, again, after = self.text.label, self.text.fresh("again"), self.text.fresh("done")
+        first = [self.use(v, width) for v in starts]
+        self.text.line(f"br label %{again}")
+        self.text.begin(again)
+        counter, following = "%" + self.text.fresh("i"), "%" + self.text.fresh("i")
+        at = len(self.text.lines)
+        names = ["%" + self.text.fresh("h") for _ in held]
+        for value, text in zip(held, names, strict=True):
+            self.name(value, text, width)
+        with self.text.scope():
+            self.write(inside, width)
+            last = [self.use(v, width) for v in ends]
+        end = self.text.label
+        phis = [f"  {counter} = phi i64 [ 0, %{start} ], [ {following}, %{end} ]"]
+        for value, text, a, b in zip(held, names, first, last, strict=True):
+            of = vector(value.kind, width)
+            phis.append(f"  {text} = phi {of} [ {a}, %{start} ], [ {b}, %{end} ]")
+        self.text.lines[at:at] = phis
+        self.text.line(f"{following} = add i64 {counter}, 1")
+        more = self.text.assign(f"icmp slt i64 {following}, {length}")
+        self.text.line(f"br i1 {more}, label %{again}, label %{after}")
+        self.text.begin(after)
+        for part, text in zip(_parts_of(head), last, strict=True):
+            self.name(part, text, width)
+
+    def _write_map(self, head: Value) -> None:
+        """A loop over entries; where a vector holds one simulation alone, over many at once."""
+        length, inside, taken, values = head.args
+        lanes = self.inner if self.width == 1 else self.width
+        step = self.inner if self.width == 1 else 1
+        padded = self.padded(length)
+        rows = [value for value in taken if value in self.needed]
+        sources = [self._row(value.args[0].args[0][value.args[1]], padded) for value in rows]
+        parts = _parts_of(head)
+        targets = self._targets(head, parts, padded)
+        start, again, after = self.text.label, self.text.fresh("each"), self.text.fresh("all")
+        self.text.line(f"br label %{again}")
+        self.text.begin(again)
+        counter, following = "%" + self.text.fresh("i"), "%" + self.text.fresh("i")
+        at = len(self.text.lines)
+        with self.text.scope():
+            entry = {
+                stride: self.text.assign(f"mul i64 {counter}, {stride * self.width}")
+                for stride in sorted({1, *(stride for _, stride in sources)})
+            }
+            for value, (pointer, stride) in zip(rows, sources, strict=True):
+                there = self.text.address(pointer, value.kind, entry[stride])
+                self.name(value, self.text.load(there, value.kind, lanes), lanes)
+            wanted = [(values[k], target) for k, target in targets.items()]
+            self._write_entry(inside, wanted, entry[1], lanes)
+        self.text.lines.insert(
+            at, f"  {counter} = phi i64 [ 0, %{start} ], [ {following}, %{self.text.label} ]"
+        )
+        self.text.line(f"{following} = add i64 {counter}, {step}")
+        more = self.text.assign(f"icmp slt i64 {following}, {length}")
+        self.text.line(f"br i1 {more}, label %{again}, label %{after}")
+        self.text.begin(after)
+        for k, target in targets.items():
+            for j, part in enumerate(parts[k * length : (k + 1) * length]):
+                self.homes[id(part)] = target._replace(offset=target.offset + j)
+
+    def _targets(self, head: Value, parts: list[Value], padded: int) -> dict[int, Place]:
+        """Where the needed values go: one memory for each kind, in which they lie regularly."""
+        length, _, _, values = head.args
+        needed: dict[Kind, list[int]] = {}
+        for k, value in enumerate(values):
+            if any(part in self.needed for part in parts[k * length : (k + 1) * length]):
+                needed.setdefault(value.kind, []).append(k)
+        targets: dict[int, Place] = {}
+        for kind, wanted in needed.items():
+            pointer = self.room(kind, len(wanted) * padded)
+            self.padded_rooms.add(pointer)
+            targets |= {k: Place(pointer, i * padded) for i, k in enumerate(wanted)}
+        return targets
+
+    def _write_entry(
+        self, inside: Block, wanted: Sequence[tuple[Value, Place]], entry: str, lanes: int
+    ) -> None:
+        """One entry of a map: what is known is stored at once, and takes no register any more."""
+        places: dict[int, list[Place]] = {}
+        for value, place in wanted:
+            places.setdefault(id(value), []).append(place)
+
+        def store(value: Value) -> None:
+            for place in places.pop(id(value), []):
+                row = self.text.address(place.pointer, value.kind, place.offset * self.width)
+                at = self.text.address(row, value.kind, entry)
+                self.text.store(self.use(value, lanes), at, value.kind, lanes)
+
+        self.write(inside, lanes, store)
+        for value, _ in wanted:
+            store(value)
+
+    def _row(self, row: Sequence[Value], padded: int) -> tuple[str, int]:
+        """Address of the first of some values, and how many vectors further each next one lies.
+
+        Values that lie irregularly are copied.
+        """
+        kind = row[0].kind
+        places = [self.homes.get(id(value)) for value in row]
+        first = places[0]
+        if first is not None and (self.width > 1 or first.pointer in self.padded_rooms):
+            second = places[1] if len(places) > 1 else None
+            stride = 1 if second is None else second.offset - first.offset
+            regular = all(
+                place == Place(first.pointer, first.offset + i * stride)
+                for i, place in enumerate(places)
+            )
+            # Many entries are one vector only where they lie side by side.
+            if regular and (stride == 1 or self.width > 1):
+                return self.text.address(first.pointer, kind, first.offset * self.width), stride
+        pointer = self.room(kind, padded)
+        for i, value in enumerate(row):
+            at = self.text.address(pointer, kind, i * self.width)
+            self.text.store(self.use(value), at, kind, self.width)
+        return pointer, 1
+
+
+def _parts_of(head: Value) -> list[Value]:
+    """A region's results: they follow it in its block."""
+    block = head.block.values
+    start = block.index(head) + 1
+    parts = []
+    for value in block[start:]:
+        if value.op != "part" or value.args[0] is not head:
+            break
+        parts.append(value)
+    return parts

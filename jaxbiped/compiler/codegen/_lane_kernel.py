@@ -1,0 +1,188 @@
+"""Lane kernel: the loop that keeps every lane busy, as LLVM's text."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from jaxbiped.compiler.codegen._graph_codegen import GraphWriter, Place
+from jaxbiped.compiler.codegen._lane_scheduler import LaneScheduler, Sizes
+from jaxbiped.compiler.codegen._llvm_function import BYTES, vector
+from jaxbiped.compiler.ir._elementwise_primitives import Array
+from jaxbiped.compiler.ir._graph import Block, Kind, Value
+from jaxbiped.compiler.passes._liveness import Liveness
+from jaxbiped.compiler.runtime._host_cpu import Host
+from jaxbiped.compiler.runtime._program import Graph
+
+ENTRY = "jaxbiped_run"
+
+
+def kernel_text(graph: Graph, width: int, host: Host) -> str:
+    """LLVM's text of a graph's loop over simulations, `width` at once.
+
+    Its entry takes the address of `FIELDS`. Simulations are taken from the queue, a counter that
+    every thread shares, until there are none left or `stop` is not zero.
+    """
+    return _Kernel(graph, width, host).text()
+
+
+class _Kernel:
+    def __init__(self, graph: Graph, width: int, host: Host) -> None:
+        self.graph, self.width = graph, width
+        self.needed = Liveness(graph.results())
+        self.writer = GraphWriter(width, host.width, host.scales, self.needed)
+        self.t = self.writer.text
+        sizes = Sizes(len(graph.inputs), len(graph.outputs), len(graph.recorded), len(graph.row))
+        self.lanes = LaneScheduler(self.t, width, sizes, scheduled=graph.scheduled)
+        self.kept: list[tuple[Value, Place]] = []
+
+    def text(self) -> str:
+        t = self.t
+        self._rooms()
+        t.line("br label %refill")
+        self._refill()
+        any_done = self._attempt()
+        self._records()
+        t.line(f"br i1 {any_done}, label %refill, label %attempt")
+        t.begin("leave")
+        t.line("ret void")
+        head = [*sorted(t.declarations), f"define void @{ENTRY}(ptr noalias %fields) {{", "entry:"]
+        return "\n".join([*head, *t.allocations, *t.lines, "}"]) + "\n"
+
+    def _rooms(self) -> None:
+        """Memory for what outlives an attempt."""
+        w, graph, rooms = self.writer, self.graph, self.lanes.rooms
+        for offset, value in enumerate(graph.inputs):
+            w.homes[id(value)] = Place(rooms.taken, offset)
+        for offset, value in enumerate(graph.row):
+            w.homes[id(value)] = Place(rooms.row, offset)
+        w.homes[id(graph.next_time)] = Place(rooms.next_time, 0)
+        for value in _values_to_compute(graph.prepare, self.needed):
+            self.kept.append((value, Place(w.room(value.kind, 1), 0)))
+        for array in graph.carried:
+            self._carry_room(array)
+
+    def _carry_room(self, array: Array) -> None:
+        """Memory for what is carried: along its first axis one behind the other, for maps."""
+        if not array.size:
+            return
+        w, t = self.writer, self.t
+        kind = next(iter(array.ravel())).kind
+        rows = np.moveaxis(array, 0, -1) if array.ndim else array.reshape(1)
+        padded = w.padded(rows.shape[-1]) if array.ndim else 1
+        flat = rows.reshape(-1, rows.shape[-1])
+        pointer = w.room(kind, padded * len(flat))
+        if array.ndim:
+            w.padded_rooms.add(pointer)
+        size = padded * len(flat) * self.width * BYTES[kind]
+        t.declarations.add("declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
+        t.line(f"call void @llvm.memset.p0.i64(ptr {pointer}, i8 0, i64 {size}, i1 false)")
+        for j, row in enumerate(flat):
+            for k, value in enumerate(row):
+                w.homes[id(value)] = Place(pointer, j * padded + k)
+
+    def _refill(self) -> None:
+        """Lanes that are done give their outputs and take the next simulations."""
+        w, t, graph, lanes = self.writer, self.t, self.graph, self.lanes
+        t.begin("refill")
+        self._keep(True)
+        with t.scope():
+            w.write(graph.end)
+            for offset, value in enumerate(graph.outputs):
+                self._store(w.use(value), value.kind, Place(lanes.rooms.given, offset))
+        none = t.splat_constant("0", Kind.BOOL, self.width)
+        t.store(none, lanes.bits["fresh"], Kind.BOOL, self.width)
+        lanes.visit_where("exchange", "done", lanes.exchange)
+        with t.scope():
+            live = t.any_lane(self._mark("live"), self.width)
+            t.line(f"br i1 {live}, label %prepare, label %leave")
+        t.begin("prepare")
+        self._keep(False)
+        with t.scope():
+            w.write(graph.prepare)
+            for value, place in self.kept:
+                self._store(w.use(value), value.kind, place)
+        self._keep(True)
+        with t.scope():
+            w.write(graph.begin)
+            self._begin()
+        t.line("br label %attempt")
+
+    def _keep(self, kept: bool) -> None:
+        """Whether what depends on the inputs alone is taken from memory, or being computed."""
+        for value, place in self.kept:
+            if kept:
+                self.writer.homes[id(value)] = place
+            else:
+                del self.writer.homes[id(value)]
+
+    def _begin(self) -> None:
+        """What is carried at first, in the lanes that took a new simulation."""
+        w, t, graph = self.writer, self.t, self.graph
+        fresh = self._mark("fresh")
+        for new, old in zip(graph.first, graph.carried, strict=True):
+            for a, b in zip(new.ravel(), old.ravel(), strict=True):
+                of = vector(b.kind, self.width)
+                mask = f"{vector(Kind.BOOL, self.width)} {fresh}"
+                chosen = t.assign(f"select {mask}, {of} {w.use(a)}, {of} {w.use(b)}")
+                self._store(chosen, b.kind, w.homes[id(b)])
+
+    def _attempt(self) -> str:
+        """An attempt in every lane; whether any lane is done."""
+        w, t, graph, lanes = self.writer, self.t, self.graph, self.lanes
+        t.begin("attempt")
+        stop = t.assign(f"load volatile i64, ptr {lanes.field['stop']}")
+        going = t.assign(f"icmp eq i64 {stop}, 0")
+        t.line(f"br i1 {going}, label %step, label %leave")
+        t.begin("step")
+        if graph.row:
+            lanes.visit_where("reading", "live", lanes.read)
+        with t.scope():
+            w.write(graph.body)
+            found = [
+                (w.use(a), b)
+                for new, old in zip(graph.following, graph.carried, strict=True)
+                for a, b in zip(new.ravel(), old.ravel(), strict=True)
+                if a is not b
+            ]
+            done = w.use(graph.done)
+            for text, value in found:
+                self._store(text, value.kind, w.homes[id(value)])
+            done = self._live(done)
+            t.store(done, lanes.bits["done"], Kind.BOOL, self.width)
+            return t.any_lane(done, self.width)
+
+    def _records(self) -> None:
+        """Records, once or as long as any lane has another."""
+        w, t, graph, lanes = self.writer, self.t, self.graph, self.lanes
+        if graph.recording is None:
+            return
+        t.line("br label %record")
+        t.begin("record")
+        with t.scope():
+            w.write(graph.notes)
+            wants = self._live(w.use(graph.recording))
+            t.store(wants, lanes.bits["wants"], Kind.BOOL, self.width)
+            t.line(f"br i1 {t.any_lane(wants, self.width)}, label %note, label %recorded")
+            t.begin("note")
+            for place, value in enumerate(graph.recorded):
+                self._store(w.use(value), value.kind, Place(lanes.rooms.noted, place))
+        lanes.visit_where("noting", "wants", lanes.note)
+        t.line(f"br label %{'record' if graph.scheduled else 'recorded'}")
+        t.begin("recorded")
+
+    def _mark(self, name: str) -> str:
+        return self.t.load(self.lanes.bits[name], Kind.BOOL, self.width)
+
+    def _live(self, mask: str) -> str:
+        return self.t.assign(f"and {vector(Kind.BOOL, self.width)} {mask}, {self._mark('live')}")
+
+    def _store(self, text: str, kind: Kind, place: Place) -> None:
+        at = self.t.address(place.pointer, kind, place.offset * self.width)
+        self.t.store(text, at, kind, self.width)
+
+
+def _values_to_compute(block: Block, needed: Liveness) -> Iterable[Value]:
+    for value in block.values:
+        stored = value in needed and id(value) not in needed.absorbed
+        if stored and value.op not in ("const", "input", "if"):
+            yield value

@@ -1,0 +1,228 @@
+"""Lane scheduler: lanes take simulations, read rows, give outputs and record one by one."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from jaxbiped.compiler.codegen._llvm_function import FunctionBuilder
+from jaxbiped.compiler.ir._graph import Kind
+
+FIELDS = (
+    "count",
+    "queue",
+    "stop",
+    "inputs",
+    "outputs",
+    "records",
+    "record_counts",
+    "record_room",
+    "schedule",
+    "schedule_length",
+    "tapes",
+    "tape_lengths",
+    "tape_stride",
+)
+"""What a kernel's entry takes: 64-bit numbers one behind the other, addresses among them."""
+_NUMBERS = ("count", "record_room", "schedule_length", "tape_stride")
+
+
+class Sizes(NamedTuple):
+    """How many numbers a simulation takes, gives, has in a record, and in a row of its tape."""
+
+    inputs: int
+    outputs: int
+    recorded: int
+    row: int
+
+
+class Rooms(NamedTuple):
+    """Where in memory the lanes' inputs, outputs, records, rows of the tape and next times are."""
+
+    taken: str
+    given: str
+    noted: str
+    row: str
+    next_time: str
+
+
+_MARKS = {"done": 1, "live": 1, "fresh": 0, "wants": 0}
+"""Marks of each lane, and what they are at first."""
+
+
+class LaneScheduler:
+    """Writes what is done for one lane at a time.
+
+    Attributes:
+        text: where to.
+        width: number of lanes.
+        sizes, rooms: see there.
+        scheduled: whether records follow a schedule.
+        field: names of the `FIELDS`.
+        bits: where each lane's simulation (`index`, −1 for none), its records (`counts`), the
+            rows that it has read (`rows`) and its marks (`done`, `live`, `fresh`, `wants`) are.
+    """
+
+    def __init__(self, text: FunctionBuilder, width: int, sizes: Sizes, *, scheduled: bool) -> None:
+        self.text, self.width, self.sizes, self.scheduled = text, width, sizes, scheduled
+        self.field: dict[str, str] = {}
+        for place, name in enumerate(FIELDS):
+            at = text.assign(f"getelementptr i64, ptr %fields, i64 {place}")
+            kind = "i64" if name in _NUMBERS else "ptr"
+            self.field[name] = text.assign(f"load {kind}, ptr {at}, align 8")
+        many = [max(size, 1) * width for size in sizes]
+        self.rooms = Rooms(*[text.room(Kind.F64, size) for size in (*many, width)])
+        self.bits = {name: text.room(Kind.I64, width) for name in ("index", "counts", "rows")}
+        self.bits |= {name: text.room(Kind.BOOL, width) for name in _MARKS}
+        for lane in range(width):
+            text.line(f"store i64 -1, ptr {text.address(self.bits['index'], Kind.I64, lane)}")
+            for name, bit in _MARKS.items():
+                text.line(f"store i8 {bit}, ptr {text.address(self.bits[name], Kind.BOOL, lane)}")
+
+    def exchange(self, lane: str) -> None:
+        """A lane gives its outputs and takes the next simulation, or rests where there is none."""
+        t = self.text
+        index_at = t.address(self.bits["index"], Kind.I64, lane)
+        count_at = t.address(self.bits["counts"], Kind.I64, lane)
+        index = t.assign(f"load i64, ptr {index_at}")
+        give, take, fill, rest, after = (t.fresh(s) for s in ("give", "take", "fill", "rest", "x"))
+        has = t.assign(f"icmp sge i64 {index}, 0")
+        t.line(f"br i1 {has}, label %{give}, label %{take}")
+        t.begin(give)
+        self._copy(
+            self.sizes.outputs, self.rooms.given, lane, self.field["outputs"], index, out=True
+        )
+        if self.sizes.recorded:
+            count = t.assign(f"load i64, ptr {count_at}")
+            t.line(
+                f"store i64 {count}, ptr {t.address(self.field['record_counts'], Kind.I64, index)}"
+            )
+        t.line(f"br label %{take}")
+        t.begin(take)
+        queue = self.field["queue"]
+        following = t.assign(f"atomicrmw add ptr {queue}, i64 1 monotonic")
+        more = t.assign(f"icmp slt i64 {following}, {self.field['count']}")
+        live_at = t.address(self.bits["live"], Kind.BOOL, lane)
+        fresh_at = t.address(self.bits["fresh"], Kind.BOOL, lane)
+        t.line(f"br i1 {more}, label %{fill}, label %{rest}")
+        t.begin(fill)
+        t.line(f"store i64 {following}, ptr {index_at}")
+        t.line(f"store i8 1, ptr {fresh_at}")
+        t.line(f"store i64 0, ptr {count_at}")
+        if self.sizes.row:
+            t.line(f"store i64 0, ptr {t.address(self.bits['rows'], Kind.I64, lane)}")
+        if self.scheduled:
+            self._schedule(lane, "0")
+        self._copy(
+            self.sizes.inputs, self.rooms.taken, lane, self.field["inputs"], following, out=False
+        )
+        t.line(f"br label %{after}")
+        t.begin(rest)
+        t.line(f"store i64 -1, ptr {index_at}")
+        t.line(f"store i8 0, ptr {live_at}")
+        t.line(f"store i8 0, ptr {fresh_at}")
+        t.line(f"br label %{after}")
+        t.begin(after)
+
+    def read(self, lane: str) -> None:
+        """A lane reads the next row of its tape, behind the last one that one again."""
+        t = self.text
+        at = t.address(self.bits["rows"], Kind.I64, lane)
+        place = t.assign(f"load i64, ptr {at}")
+        index = t.assign(f"load i64, ptr {t.address(self.bits['index'], Kind.I64, lane)}")
+        first = t.assign(f"load i64, ptr {t.address(self.field['tapes'], Kind.I64, index)}")
+        first = t.assign(f"inttoptr i64 {first} to ptr")
+        row = t.assign(f"mul i64 {place}, {self.field['tape_stride']}")
+        for k in range(self.sizes.row):
+            there = t.address(first, Kind.F64, t.assign(f"add i64 {row}, {k}"))
+            number = t.assign(f"load double, ptr {there}")
+            here = t.assign(f"add i64 {lane}, {k * self.width}")
+            t.line(f"store double {number}, ptr {t.address(self.rooms.row, Kind.F64, here)}")
+        following = t.assign(f"add i64 {place}, 1")
+        length = t.assign(f"load i64, ptr {t.address(self.field['tape_lengths'], Kind.I64, index)}")
+        more = t.assign(f"icmp slt i64 {following}, {length}")
+        t.line(f"store i64 {t.assign(f'select i1 {more}, i64 {following}, i64 {place}')}, ptr {at}")
+
+    def _copy(self, many: int, own: str, lane: str, array: str, index: str, *, out: bool) -> None:
+        """Copies one lane's numbers to or from its column of an array (numbers, simulations)."""
+        if not many:
+            return
+        t = self.text
+        start, again, after = t.label, t.fresh("copy"), t.fresh("copied")
+        t.line(f"br label %{again}")
+        t.begin(again)
+        k, following = "%" + t.fresh("k"), "%" + t.fresh("k")
+        t.line(f"{k} = phi i64 [ 0, %{start} ], [ {following}, %{again} ]")
+        own_row = t.assign(f"mul i64 {k}, {self.width}")
+        here = t.assign(f"add i64 {own_row}, {lane}")
+        row = t.assign(f"mul i64 {k}, {self.field['count']}")
+        there = t.assign(f"add i64 {row}, {index}")
+        source, target = t.address(own, Kind.F64, here), t.address(array, Kind.F64, there)
+        if not out:
+            source, target = target, source
+        number = t.assign(f"load double, ptr {source}")
+        t.line(f"store double {number}, ptr {target}")
+        t.line(f"{following} = add i64 {k}, 1")
+        more = t.assign(f"icmp slt i64 {following}, {many}")
+        t.line(f"br i1 {more}, label %{again}, label %{after}")
+        t.begin(after)
+
+    def _schedule(self, lane: str, place: str) -> None:
+        """Looks up a lane's next time, infinity behind the last one."""
+        t = self.text
+        at = t.address(self.rooms.next_time, Kind.F64, lane)
+        look, none, after = (t.fresh(s) for s in ("look", "none", "seen"))
+        more = t.assign(f"icmp slt i64 {place}, {self.field['schedule_length']}")
+        t.line(f"br i1 {more}, label %{look}, label %{none}")
+        t.begin(look)
+        time = t.assign(f"load double, ptr {t.address(self.field['schedule'], Kind.F64, place)}")
+        t.line(f"store double {time}, ptr {at}")
+        t.line(f"br label %{after}")
+        t.begin(none)
+        t.line(f"store double 0x7FF0000000000000, ptr {at}")
+        t.line(f"br label %{after}")
+        t.begin(after)
+
+    def visit_where(self, stem: str, where: str, visit: Callable[[str], None]) -> None:
+        """Visits the lanes in which a mask in memory holds."""
+        t = self.text
+        start, again, here = t.label, t.fresh(stem), t.fresh(stem)
+        skip, after = t.fresh("skip"), t.fresh("after")
+        t.line(f"br label %{again}")
+        t.begin(again)
+        lane, following = "%" + t.fresh("lane"), "%" + t.fresh("lane")
+        t.line(f"{lane} = phi i64 [ 0, %{start} ], [ {following}, %{skip} ]")
+        bit = t.assign(f"load i8, ptr {t.address(self.bits[where], Kind.BOOL, lane)}")
+        holds = t.assign(f"trunc i8 {bit} to i1")
+        t.line(f"br i1 {holds}, label %{here}, label %{skip}")
+        t.begin(here)
+        visit(lane)
+        t.line(f"br label %{skip}")
+        t.begin(skip)
+        t.line(f"{following} = add i64 {lane}, 1")
+        more = t.assign(f"icmp slt i64 {following}, {self.width}")
+        t.line(f"br i1 {more}, label %{again}, label %{after}")
+        t.begin(after)
+
+    def note(self, lane: str) -> None:
+        """Appends a lane's record to its simulation's, where there is room."""
+        t = self.text
+        count_at = t.address(self.bits["counts"], Kind.I64, lane)
+        count = t.assign(f"load i64, ptr {count_at}")
+        write, after = t.fresh("write"), t.fresh("written")
+        fits = t.assign(f"icmp slt i64 {count}, {self.field['record_room']}")
+        t.line(f"br i1 {fits}, label %{write}, label %{after}")
+        t.begin(write)
+        index = t.assign(f"load i64, ptr {t.address(self.bits['index'], Kind.I64, lane)}")
+        row = t.assign(f"mul i64 {index}, {self.field['record_room']}")
+        row = t.assign(f"add i64 {row}, {count}")
+        row = t.assign(f"mul i64 {row}, {self.sizes.recorded}")
+        for place in range(self.sizes.recorded):
+            here = t.assign(f"add i64 {lane}, {place * self.width}")
+            value = t.assign(f"load double, ptr {t.address(self.rooms.noted, Kind.F64, here)}")
+            there = t.assign(f"add i64 {row}, {place}")
+            t.line(f"store double {value}, ptr {t.address(self.field['records'], Kind.F64, there)}")
+        t.line(f"br label %{after}")
+        t.begin(after)
+        more = t.assign(f"add i64 {count}, 1")
+        t.line(f"store i64 {more}, ptr {count_at}")
+        if self.scheduled:
+            self._schedule(lane, more)

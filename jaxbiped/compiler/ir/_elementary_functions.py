@@ -1,0 +1,249 @@
+"""Elementary functions from plain arithmetic, as parts of a graph.
+
+Every function holds over all 64-bit numbers, infinities and NaN included; tests/lanes measures
+the errors in units in the last place.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+from jaxbiped.compiler.ir._graph import Block, Kind, Value
+
+
+class Arithmetic:
+    """64-bit arithmetic in a block. Plain numbers stand for constants."""
+
+    def __init__(self, block: Block) -> None:
+        self.block = block
+
+    def real(self, x: Value | float) -> Value:
+        return x if isinstance(x, Value) else self.block.const(x, Kind.F64)
+
+    def whole(self, x: Value | int) -> Value:
+        return x if isinstance(x, Value) else self.block.const(x, Kind.I64)
+
+    def add(self, a: Value | float, b: Value | float) -> Value:
+        return self.block.add("fadd", self.real(a), self.real(b))
+
+    def sub(self, a: Value | float, b: Value | float) -> Value:
+        return self.block.add("fsub", self.real(a), self.real(b))
+
+    def mul(self, a: Value | float, b: Value | float) -> Value:
+        return self.block.add("fmul", self.real(a), self.real(b))
+
+    def div(self, a: Value | float, b: Value | float) -> Value:
+        return self.block.add("fdiv", self.real(a), self.real(b))
+
+    def fma(self, a: Value | float, b: Value | float, c: Value | float) -> Value:
+        """a b + c, rounded once."""
+        return self.block.add("fma", self.real(a), self.real(b), self.real(c))
+
+    def neg(self, a: Value) -> Value:
+        return self.block.add("fneg", a)
+
+    def abs(self, a: Value) -> Value:
+        return self.block.add("fabs", a)
+
+    def rint(self, a: Value) -> Value:
+        return self.block.add("rint", a)
+
+    def compare(self, how: str, a: Value, b: Value | float) -> Value:
+        return self.block.add(f"fcmp {how}", a, self.real(b), kind=Kind.BOOL)
+
+    def choose(self, condition: Value, a: Value | float, b: Value | float) -> Value:
+        return self.block.add("select", condition, self.real(a), self.real(b), kind=Kind.F64)
+
+    def either(self, a: Value, b: Value) -> Value:
+        return self.block.add("or", a, b)
+
+    def both(self, a: Value, b: Value) -> Value:
+        return self.block.add("and", a, b)
+
+    def integer(self, op: str, a: Value, b: Value | int) -> Value:
+        return self.block.add(op, a, self.whole(b))
+
+    def bits(self, a: Value) -> Value:
+        return self.block.add("bitcast", a, kind=Kind.I64)
+
+    def from_bits(self, a: Value) -> Value:
+        return self.block.add("bitcast", a, kind=Kind.F64)
+
+    def truncated(self, a: Value) -> Value:
+        """A whole number below 2⁶³; anything for any other."""
+        return self.block.add("to_int", a, kind=Kind.I64)
+
+    def floated(self, a: Value) -> Value:
+        return self.block.add("to_float", a, kind=Kind.F64)
+
+    def series(self, x: Value, coefficients: Sequence[float]) -> Value:
+        """A polynomial, highest power first, by halves (Estrin): its parts need not wait."""
+        terms: list[Value | float] = list(reversed(coefficients))
+        while len(terms) > 1:
+            pairs = [
+                self.fma(terms[i + 1], x, terms[i]) if i + 1 < len(terms) else terms[i]
+                for i in range(0, len(terms), 2)
+            ]
+            terms, x = [*pairs], self.mul(x, x)
+        return self.real(terms[0])
+
+    def scaled(self, x: Value, exponent: Value) -> Value:
+        """x 2ⁿ for a whole number n, rounded once."""
+        return self.block.add("ldexp", x, exponent)
+
+    def where_rare(
+        self, rare: Value, value: Value, other: "Callable[[Arithmetic], Value]"
+    ) -> Value:
+        """`value`, but in the lanes that are `rare` another, computed only where there are any."""
+        inside = Block(self.block)
+        found = other(Arithmetic(inside))
+        results = self.block.region("if", (rare, inside, (found,), (value,)), [found.kind])
+        return results[0]
+
+    def per_lane(self, name: str, *args: Value) -> Value:
+        """The C library's function of all but the last; lane by lane, where the last holds."""
+        return self.block.add(f"libm {name}", *args, kind=Kind.F64)
+
+
+LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
+"""Two parts of ln 2: the first has 33 bits, so that its product with an exponent is exact."""
+_EXP_SERIES = (
+    2.510038319586702e-08,
+    2.7620085455018414e-07,
+    2.7557268464831627e-06,
+    2.4801521302241082e-05,
+    0.00019841269863050506,
+    0.001388888891720967,
+    0.008333333333330063,
+    0.041666666666624136,
+    0.16666666666666669,
+    0.5000000000000001,
+)
+"""(exp r − 1 − r)/r² through its values at Chebyshev's points of |r| ≤ 0.3466; off by 1.7e-17."""
+_LOG_SERIES = (
+    1.479819860511658591e-01,
+    1.531383769920937332e-01,
+    1.818357216161805012e-01,
+    2.222219843214978396e-01,
+    2.857142874366239149e-01,
+    3.999999999940941908e-01,
+    6.666666666666735130e-01,
+)
+"""Minimax coefficients of log((1 + s)/(1 − s)) (FreeBSD's msun, e_log.c), highest power first."""
+_SQRT_HALF_BITS = 0x3FE6A09E667F3BCD
+_ONE_BITS = 0x3FF0000000000000
+TINIEST_NORMAL = 2.2250738585072014e-308
+
+
+def exponential(m: Arithmetic, x: Value, low: Value | float = 0.0) -> Value:
+    """exp(x + low), `low` a small correction."""
+    clamped = m.choose(m.compare("ogt", x, 800.0), 800.0, x)
+    clamped = m.choose(m.compare("olt", clamped, -800.0), -800.0, clamped)
+    n = m.rint(m.mul(clamped, 1.0 / math.log(2.0)))
+    minus = m.neg(n)
+    r = m.fma(minus, LN2_LOW, m.fma(minus, LN2_HIGH, clamped))
+    r = m.add(r, low)
+    value = m.add(m.fma(m.mul(r, r), m.series(r, _EXP_SERIES), r), 1.0)
+    return m.scaled(value, n)
+
+
+def split_exponent(m: Arithmetic, x: Value) -> tuple[Value, Value]:
+    """k and f with x = 2^k (1 + f), 1 + f in [√½, √2); for x above zero, normal and finite."""
+    moved = m.integer("add", m.bits(x), _ONE_BITS - _SQRT_HALF_BITS)
+    exponent = m.integer("sub", m.integer("lshr", moved, 52), 1023)
+    fraction = m.integer("add", m.integer("and", moved, (1 << 52) - 1), _SQRT_HALF_BITS)
+    return m.floated(exponent), m.sub(m.from_bits(fraction), 1.0)
+
+
+def logarithm(m: Arithmetic, x: Value) -> Value:
+    """The natural logarithm (FreeBSD's msun, e_log.c)."""
+    k, f = split_exponent(m, x)
+    s = m.div(f, m.add(f, 2.0))
+    z = m.mul(s, s)
+    series = m.mul(z, m.series(z, _LOG_SERIES))
+    half = m.mul(m.mul(f, f), 0.5)
+    inner = m.fma(s, m.add(half, series), m.mul(k, LN2_LOW))
+    value = m.sub(m.mul(k, LN2_HIGH), m.sub(m.sub(half, inner), f))
+    normal = m.both(m.compare("oge", x, TINIEST_NORMAL), m.compare("olt", x, math.inf))
+    rare = m.block.add("not", normal)
+    return m.where_rare(rare, value, lambda inside: inside.per_lane("log", x, rare))
+
+
+_HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
+"""π/2 in three parts."""
+_LARGE_ANGLE = 2.0**20
+_SINE = (
+    1.58969099521155010221e-10,
+    -2.50507602534068634195e-08,
+    2.75573137070700676789e-06,
+    -1.98412698298579493134e-04,
+    8.33333333332248946124e-03,
+    -1.66666666666666324348e-01,
+)
+_COSINE = (
+    -1.13596475577881948265e-11,
+    2.08757232129817482790e-09,
+    -2.75573143513906633035e-07,
+    2.48015872894767294178e-05,
+    -1.38888888888741095749e-03,
+    4.16666666666666019037e-02,
+)
+"""Minimax coefficients on [−π/4, π/4] (FreeBSD's msun, k_sin.c and k_cos.c)."""
+
+
+def _quarter_turns(m: Arithmetic, x: Value) -> tuple[Value, Value, Value]:
+    """Quadrant, sine and cosine of the angle that is left."""
+    q = m.rint(m.mul(x, 2.0 / math.pi))
+    minus = m.neg(q)
+    first = m.fma(minus, _HALF_PI[0], x)
+    rest = m.fma(minus, _HALF_PI[1], first)
+    low = m.fma(minus, _HALF_PI[2], m.fma(minus, _HALF_PI[1], m.sub(first, rest)))
+    z = m.mul(rest, rest)
+    cubed = m.mul(m.mul(rest, z), m.series(z, _SINE))
+    half = m.mul(z, 0.5)
+    near = m.sub(1.0, half)
+    lost = m.sub(m.sub(1.0, near), half)
+    bend = m.fma(m.mul(z, z), m.series(z, _COSINE), lost)
+    cosine = m.add(near, m.fma(m.neg(rest), low, bend))
+    sine = m.add(rest, m.fma(low, near, cubed))
+    return m.truncated(q), sine, cosine
+
+
+def _circular(name: str, quarter: int) -> Callable[[Arithmetic, Value], Value]:
+    def function(m: Arithmetic, x: Value) -> Value:
+        number, sine, cosine = _quarter_turns(m, x)
+        number = m.integer("add", number, quarter)
+        odd = m.block.add("icmp ne", m.integer("and", number, 1), m.whole(0), kind=Kind.BOOL)
+        back = m.block.add("icmp ne", m.integer("and", number, 2), m.whole(0), kind=Kind.BOOL)
+        value = m.choose(odd, cosine, sine)
+        value = m.choose(back, m.neg(value), value)
+        if quarter == 0:
+            value = _near_zero(m, x, value)
+        large = m.block.add("not", m.compare("olt", m.abs(x), _LARGE_ANGLE))
+        return m.where_rare(large, value, lambda inside: inside.per_lane(name, x, large))
+
+    return function
+
+
+sine = _circular("sin", 0)
+cosine = _circular("cos", 1)
+
+_TANH_ABOVE = (-9.64399179425052238628e-1, -9.92877231001918586564e1, -1.61468768441708447952e3)
+_TANH_BELOW = (1.0, 1.12811678491632931402e2, 2.23548839060100448583e3, 4.84406305325125486048e3)
+"""Rational approximation of (tanh x / x − 1)/x² below 0.625 (Cephes, tanh.c)."""
+
+
+def hyperbolic_tangent(m: Arithmetic, x: Value) -> Value:
+    """tanh x."""
+    z = m.mul(x, x)
+    ratio = m.div(m.series(z, _TANH_ABOVE), m.series(z, _TANH_BELOW))
+    small = m.fma(m.mul(x, z), ratio, x)
+    size = m.abs(x)
+    power = exponential(m, m.add(size, size))
+    large = m.sub(1.0, m.div(2.0, m.add(power, 1.0)))
+    large = m.choose(m.compare("olt", x, 0.0), m.neg(large), large)
+    return _near_zero(m, x, m.choose(m.compare("ogt", size, 0.625), large, small))
+
+
+def _near_zero(m: Arithmetic, x: Value, value: Value) -> Value:
+    """`value`, but where it is x itself to the last place x: the sign of zero stays."""
+    return m.choose(m.compare("olt", m.abs(x), 2.0**-27), x, value)

@@ -1,0 +1,268 @@
+"""Elementwise primitives of JAX, as operations of a graph."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from jaxbiped.compiler.ir import _elementary_functions as elementary
+from jaxbiped.compiler.ir import _powers as powers
+from jaxbiped.compiler.ir._graph import Block, Kind, Value
+
+Array: TypeAlias = np.ndarray
+"""An array of values, dtype object."""
+Rule: TypeAlias = Callable[..., Any]
+
+KINDS = {
+    np.dtype("float64"): Kind.F64,
+    np.dtype("float32"): Kind.F32,
+    np.dtype("int64"): Kind.I64,
+    np.dtype("int32"): Kind.I32,
+    np.dtype("bool"): Kind.BOOL,
+}
+
+
+def array_of(values: Sequence[Value], shape: tuple[int, ...]) -> Array:
+    """Values in row-major order as an array."""
+    array = np.empty(len(values), dtype=object)
+    array[:] = list(values)
+    return array.reshape(shape)
+
+
+def elementwise(function: Callable[..., Value], *arrays: Array) -> Array:
+    """Applies a function of values to arrays."""
+    result = np.frompyfunc(function, len(arrays), 1)(*arrays)
+    return result if isinstance(result, np.ndarray) else array_of([result], ())
+
+
+# Elementwise rules: (block, *values, **parameters of the primitive) -> value.
+
+
+def _arithmetic(float_op: str, int_op: str) -> Rule:
+    return lambda block, a, b, **_: block.add(float_op if a.kind.is_float else int_op, a, b)
+
+
+def _comparison(float_name: str, int_name: str) -> Rule:
+    def rule(block: Block, a: Value, b: Value, **_: Any) -> Value:
+        if a.kind is Kind.BOOL:
+            different = block.add("xor", a, b)
+            return different if int_name == "ne" else block.add("not", different)
+        op = f"fcmp {float_name}" if a.kind.is_float else f"icmp {int_name}"
+        return block.add(op, a, b, kind=Kind.BOOL)
+
+    return rule
+
+
+def _extreme(float_how: str, int_how: str) -> Rule:
+    """Of two; NaN where either is."""
+
+    def rule(block: Block, a: Value, b: Value, **_: Any) -> Value:
+        if a.kind is Kind.BOOL:
+            return block.add("or" if int_how == "sgt" else "and", a, b)
+        if not a.kind.is_float:
+            better = block.add(f"icmp {int_how}", a, b, kind=Kind.BOOL)
+            return block.add("select", better, a, b, kind=a.kind)
+        # Unordered: a NaN in `a` wins; one in `b` needs a look of its own.
+        better = block.add(f"fcmp {float_how}", a, b, kind=Kind.BOOL)
+        chosen = block.add("select", better, a, b, kind=a.kind)
+        if b.constant is not None:
+            return chosen
+        missing = block.add("fcmp uno", b, b, kind=Kind.BOOL)
+        return block.add("select", missing, b, chosen, kind=a.kind)
+
+    return rule
+
+
+def _logical(op: str) -> Rule:
+    return lambda block, a, b, **_: block.add(op, a, b)
+
+
+def _negative(block: Block, a: Value, **_: Any) -> Value:
+    if a.kind.is_float:
+        return block.add("fneg", a)
+    return block.add("sub", block.const(0, a.kind), a)
+
+
+def _size(block: Block, a: Value, **_: Any) -> Value:
+    if a.kind.is_float:
+        return block.add("fabs", a)
+    below = block.add("icmp slt", a, block.const(0, a.kind), kind=Kind.BOOL)
+    return block.add("select", below, _negative(block, a), a, kind=a.kind)
+
+
+def _sign(block: Block, a: Value, **_: Any) -> Value:
+    if not a.kind.is_float:
+        raise NotImplementedError
+    zero = block.const(0.0, a.kind)
+    up = block.add("fcmp ogt", a, zero, kind=Kind.BOOL)
+    down = block.add("fcmp olt", a, zero, kind=Kind.BOOL)
+    negative = block.add("select", down, block.const(-1.0, a.kind), a, kind=a.kind)
+    return block.add("select", up, block.const(1.0, a.kind), negative, kind=a.kind)
+
+
+def _round(block: Block, a: Value, *, rounding_method: Any, **_: Any) -> Value:
+    if int(rounding_method) != 1:  # to the nearest, ties to even
+        raise NotImplementedError
+    return block.add("rint", a)
+
+
+def _direct(op: str) -> Rule:
+    return lambda block, a, **_: block.add(op, a)
+
+
+def _invert(block: Block, a: Value, **_: Any) -> Value:
+    if a.kind is Kind.BOOL:
+        return block.add("not", a)
+    return block.add("xor", a, block.const(-1, a.kind))
+
+
+def _is_finite(block: Block, a: Value, **_: Any) -> Value:
+    size = block.add("fabs", a)
+    return block.add("fcmp olt", size, block.const(math.inf, a.kind), kind=Kind.BOOL)
+
+
+def _whole_power(block: Block, a: Value, *, y: int, **_: Any) -> Value:
+    multiply = "fmul" if a.kind.is_float else "mul"
+    result, base, left = None, a, abs(y)
+    while left:
+        if left & 1:
+            result = base if result is None else block.add(multiply, result, base)
+        left >>= 1
+        if left:
+            base = block.add(multiply, base, base)
+    one = block.const(1, a.kind)
+    result = one if result is None else result
+    return result if y >= 0 else block.add("fdiv", one, result)
+
+
+def _square(block: Block, a: Value, **_: Any) -> Value:
+    return block.add("fmul" if a.kind.is_float else "mul", a, a)
+
+
+def convert(block: Block, a: Value, kind: Kind) -> Value:
+    """A value as another kind of number."""
+    if a.kind is kind:
+        return a
+    if a.constant is not None:
+        return block.const(a.constant, kind)
+    if kind is Kind.BOOL:
+        op = "fcmp une" if a.kind.is_float else "icmp ne"
+        return block.add(op, a, block.const(0, a.kind), kind=kind)
+    if a.kind is Kind.BOOL:
+        return block.add("select", a, block.const(1, kind), block.const(0, kind), kind=kind)
+    if a.kind.is_float and kind.is_float:
+        return block.add("resize_float", a, kind=kind)
+    if a.kind.is_float:
+        return block.add("to_int", a, kind=kind)
+    return block.add("to_float" if kind.is_float else "resize_int", a, kind=kind)
+
+
+def _divide(block: Block, a: Value, b: Value, **_: Any) -> Value:
+    """By the reciprocal, which other divisions by the same number share."""
+    if not a.kind.is_float:
+        raise NotImplementedError
+    if b.constant is not None or a.constant is not None:
+        return block.add("fdiv", a, b)
+    return block.add("fmul", a, block.add("fdiv", block.const(1.0, a.kind), b))
+
+
+def _convert(block: Block, a: Value, *, new_dtype: Any, **_: Any) -> Value:
+    return convert(block, a, KINDS[np.dtype(new_dtype)])
+
+
+def _select(block: Block, which: Value, *cases: Value, **_: Any) -> Value:
+    if len(cases) != 2:
+        raise NotImplementedError
+    return block.add(
+        "select", convert(block, which, Kind.BOOL), cases[1], cases[0], kind=cases[0].kind
+    )
+
+
+def _clamp(block: Block, low: Value, a: Value, high: Value, **_: Any) -> Value:
+    above = ELEMENTWISE["max"](block, a, low)
+    return ELEMENTWISE["min"](block, above, high)
+
+
+def _elementary(function: Callable[..., Value]) -> Rule:
+    def rule(block: Block, *args: Value, **_: Any) -> Value:
+        kind = args[0].kind
+        wide = [convert(block, a, Kind.F64) for a in args]
+
+        def make(home: Block) -> Value:
+            return function(elementary.Arithmetic(home), *wide)
+
+        return convert(
+            block, block.shared(function.__qualname__ + str(id(function)), wide, make), kind
+        )
+
+    return rule
+
+
+def _logarithm(block: Block, a: Value, **_: Any) -> Value:
+    found: Value = _elementary(elementary.logarithm)(block, a)
+    if a.kind is Kind.F64 and found.constant is None:
+        found.logarithm_of = a
+    return found
+
+
+def _exponential(block: Block, a: Value, **_: Any) -> Value:
+    """Of y log x it is a power, and of that three halves are the usual ones: Hertz's."""
+    if a.op == "fmul":
+        for y, logarithm in (a.args, a.args[::-1]):
+            if logarithm.logarithm_of is not None:
+                return _elementary(powers.power_of_root)(block, logarithm.logarithm_of, y)
+    return _elementary(elementary.exponential)(block, a)
+
+
+def _same(block: Block, a: Value, **_: Any) -> Value:
+    return a
+
+
+ELEMENTWISE: dict[str, Rule] = {
+    "add": _arithmetic("fadd", "add"),
+    "add_any": _arithmetic("fadd", "add"),
+    "sub": _arithmetic("fsub", "sub"),
+    "mul": _arithmetic("fmul", "mul"),
+    "div": _divide,
+    "neg": _negative,
+    "abs": _size,
+    "sign": _sign,
+    "max": _extreme("ugt", "sgt"),
+    "min": _extreme("ult", "slt"),
+    "sqrt": _direct("sqrt"),
+    "round": _round,
+    "floor": _direct("floor"),
+    "ceil": _direct("ceil"),
+    "exp": _exponential,
+    "log": _logarithm,
+    "sin": _elementary(elementary.sine),
+    "cos": _elementary(elementary.cosine),
+    "tanh": _elementary(elementary.hyperbolic_tangent),
+    "pow": _elementary(powers.power),
+    "integer_pow": _whole_power,
+    "square": _square,
+    "eq": _comparison("oeq", "eq"),
+    "ne": _comparison("une", "ne"),
+    "lt": _comparison("olt", "slt"),
+    "le": _comparison("ole", "sle"),
+    "gt": _comparison("ogt", "sgt"),
+    "ge": _comparison("oge", "sge"),
+    "and": _logical("and"),
+    "or": _logical("or"),
+    "xor": _logical("xor"),
+    "not": _invert,
+    "is_finite": _is_finite,
+    "select_n": _select,
+    "clamp": _clamp,
+    "convert_element_type": _convert,
+    "stop_gradient": _same,
+    "copy": _same,
+    "copy_p": _same,
+    "optimization_barrier": _same,
+    "reduce_precision": _same,
+    "unvmap_any": _same,
+    "unvmap_all": _same,
+    "unvmap_max": _same,
+}
+"""A condition over all lanes of a batch is here one over this lane."""

@@ -1,0 +1,259 @@
+"""Lowering of a jaxpr of small static shapes to a graph of scalar operations."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jax.extend.core import Literal
+
+from jaxbiped.compiler.ir._array_primitives import MOVES, REDUCTIONS, product, reduce
+from jaxbiped.compiler.ir._elementwise_primitives import (
+    ELEMENTWISE,
+    KINDS,
+    Array,
+    array_of,
+    convert,
+    elementwise,
+)
+from jaxbiped.compiler.ir._graph import Block, Kind, Value
+
+_INLINED = {
+    "jit": "jaxpr",
+    "pjit": "jaxpr",
+    "closed_call": "call_jaxpr",
+    "core_call": "call_jaxpr",
+    "remat2": "jaxpr",
+    "checkpoint": "jaxpr",
+    "custom_jvp_call": "call_jaxpr",
+    "custom_vjp_call": "call_jaxpr",
+    "custom_vjp_call_jaxpr": "fun_jaxpr",
+}
+_LONGEST_UNROLLED, _LARGEST_UNROLLED = 4, 2000
+"""Loops over arrays of up to this length are written out, and up to so many equations in all."""
+
+
+class UnknownPrimitiveError(NotImplementedError):
+    """A JAX operation that the lane engine cannot express."""
+
+
+def lower_jaxpr(
+    block: Block, jaxpr: Any, consts: Sequence[Any], args: Sequence[Array]
+) -> list[Array]:
+    """Adds a jaxpr's operations to a block; the arrays of its results.
+
+    Raises:
+        UnknownPrimitiveError: it holds an operation that lanes do not have.
+    """
+    known: dict[Any, Array] = {}
+    for variable, const in zip(jaxpr.constvars, consts, strict=True):
+        known[variable] = const if _is_array(const) else _constant(block, const)
+    known.update(zip(jaxpr.invars, args, strict=True))
+
+    def read(atom: Any) -> Array:
+        if isinstance(atom, Literal):
+            return _constant(block, np.asarray(atom.val, dtype=_dtype(atom)))
+        return known[atom]
+
+    for equation in jaxpr.eqns:
+        inputs = [read(atom) for atom in equation.invars]
+        try:
+            results = _apply(block, equation, inputs)
+        except (NotImplementedError, KeyError) as error:
+            if isinstance(error, UnknownPrimitiveError):
+                raise
+            raise UnknownPrimitiveError(
+                f"the JAX primitive {equation.primitive.name!r} on "
+                f"{[str(v.aval) for v in equation.invars]} has no form in the lane engine; "
+                'use engine="xla".'
+            ) from None
+        known.update(zip(equation.outvars, results, strict=True))
+    return [read(atom) for atom in jaxpr.outvars]
+
+
+def _dtype(atom: Any) -> Any:
+    return atom.aval.dtype
+
+
+def _shape(atom: Any) -> tuple[int, ...]:
+    return tuple(atom.aval.shape)
+
+
+def _is_array(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype == object
+
+
+def _constant(block: Block, value: Any) -> Array:
+    numbers = np.asarray(value)
+    kind = KINDS[numbers.dtype]
+    return array_of([block.const(x, kind) for x in numbers.ravel()], numbers.shape)
+
+
+def inner_jaxpr(equation: Any) -> tuple[Any, Sequence[Any]] | None:
+    """The jaxpr and the constants of what an equation only calls; None for any other."""
+    name = _INLINED.get(equation.primitive.name)
+    if name is None:
+        return None
+    inner = equation.params[name]
+    return (inner.jaxpr, inner.consts) if hasattr(inner, "jaxpr") else (inner, [])
+
+
+def _apply(block: Block, equation: Any, inputs: list[Array]) -> list[Array]:
+    name, params = equation.primitive.name, equation.params
+    inner = inner_jaxpr(equation)
+    if inner is not None:
+        return lower_jaxpr(block, *inner, inputs)
+    if name in ELEMENTWISE:
+        rule = ELEMENTWISE[name]
+        if name == "select_n" and inputs[0].ndim == 0 and inputs[1].ndim > 0:
+            inputs = [np.broadcast_to(inputs[0], inputs[1].shape), *inputs[1:]]
+        return [elementwise(lambda *values: rule(block, *values, **params), *inputs)]
+    if name in MOVES:
+        return [MOVES[name](*inputs, **params)]
+    if name in REDUCTIONS:
+        return [reduce(block, name, inputs[0], params["axes"])]
+    if name == "dot_general":
+        return [product(block, *inputs, **params)]
+    if name == "iota":
+        numbers = np.arange(params["shape"][params["dimension"]], dtype=params["dtype"])
+        places = [1] * len(params["shape"])
+        places[params["dimension"]] = -1
+        return [_constant(block, np.broadcast_to(numbers.reshape(places), params["shape"]))]
+    if name == "split":
+        cuts = np.cumsum(params["sizes"])[:-1]
+        return list(np.split(inputs[0], cuts, axis=params["axis"]))
+    if name == "unstack":
+        return [
+            np.asarray(part, dtype=object) for part in np.moveaxis(inputs[0], params["axis"], 0)
+        ]
+    if name == "cond":
+        return _branches(block, params["branches"], inputs)
+    if name == "scan":
+        return _scan(block, params, inputs)
+    raise NotImplementedError
+
+
+def _branches(block: Block, branches: Any, inputs: list[Array]) -> list[Array]:
+    """A conditional: each branch runs where any lane takes it."""
+    which, operands = inputs[0].item(), inputs[1:]
+    if which.constant is not None:
+        chosen = branches[min(max(int(which.constant), 0), len(branches) - 1)]
+        return lower_jaxpr(block, chosen.jaxpr, chosen.consts, operands)
+    results: list[Array] | None = None
+    for number, branch in enumerate(branches):
+        if results is None:
+            # The first one needs no condition of its own: the rest replace what it gives.
+            results = lower_jaxpr(block, branch.jaxpr, branch.consts, operands)
+            continue
+        here = _is(block, which, number, len(branches))
+        results = _conditional(block, here, branch, operands, results)
+    assert results is not None
+    return results
+
+
+def _is(block: Block, which: Value, number: int, count: int) -> Value:
+    """Whether a branch's number is this one; numbers out of range are clamped."""
+    if which.kind is Kind.BOOL:
+        return which
+    if which.op == "select" and count == 2 and which.args[1].constant == 1:
+        return which.args[0]
+    how = "icmp sge" if number == count - 1 else "icmp eq"
+    return block.add(how, which, block.const(number, which.kind), kind=Kind.BOOL)
+
+
+def _conditional(
+    block: Block, here: Value, branch: Any, operands: list[Array], otherwise: list[Array]
+) -> list[Array]:
+    inside = Block(block)
+    found = lower_jaxpr(inside, branch.jaxpr, branch.consts, operands)
+    values = [v for array in found for v in array.ravel()]
+    defaults = [v for array in otherwise for v in array.ravel()]
+    kinds = [v.kind for v in values]
+    results = block.region("if", (here, inside, tuple(values), tuple(defaults)), kinds)
+    return _reshape(results, found)
+
+
+def _reshape(values: Sequence[Value], like: list[Array]) -> list[Array]:
+    arrays, place = [], 0
+    for array in like:
+        arrays.append(array_of(values[place : place + array.size], array.shape))
+        place += array.size
+    return arrays
+
+
+def _scan(block: Block, params: Any, inputs: list[Array]) -> list[Array]:
+    jaxpr, length = params["jaxpr"], params["length"]
+    constants, carried = params["num_consts"], params["num_carry"]
+    fixed, carry = inputs[:constants], inputs[constants : constants + carried]
+    items = inputs[constants + carried :]
+    body = jaxpr.jaxpr
+    outputs = len(body.outvars) - carried
+    long = length > _LONGEST_UNROLLED or length * _size(body) > _LARGEST_UNROLLED
+    if not carried and long:
+        return _map(block, jaxpr, fixed, items, length)
+    if not items and not outputs and long:
+        return _repeat(block, jaxpr, fixed, carry, length)
+    collected: list[list[Array]] = [[] for _ in range(outputs)]
+    for step in range(length):
+        place = length - 1 - step if params["reverse"] else step
+        chosen = [np.asarray(item[place], dtype=object) for item in items]
+        results = lower_jaxpr(block, body, jaxpr.consts, [*fixed, *carry, *chosen])
+        carry = results[:carried]
+        for column, value in zip(collected, results[carried:], strict=True):
+            column.append(value)
+    if params["reverse"]:
+        collected = [column[::-1] for column in collected]
+    if not length:
+        shapes = [_shape(variable) for variable in body.outvars[carried:]]
+        return [*carry, *(np.empty((0, *shape), dtype=object) for shape in shapes)]
+    return [*carry, *(np.stack(column) for column in collected)]
+
+
+def _size(jaxpr: Any) -> int:
+    """How many equations a jaxpr has, with those inside of calls."""
+    inner = [inner_jaxpr(equation) for equation in jaxpr.eqns]
+    return sum(1 if each is None else _size(each[0]) for each in inner)
+
+
+def _repeat(
+    block: Block, jaxpr: Any, fixed: list[Array], carry: list[Array], length: int
+) -> list[Array]:
+    inside = Block(block, loop=True)
+    starts = [v for array in carry for v in array.ravel()]
+    held = inside.region("held", (), [v.kind for v in starts])
+    found = lower_jaxpr(inside, jaxpr.jaxpr, jaxpr.consts, [*fixed, *_reshape(held, carry)])
+    ends = [
+        convert(inside, v, start.kind)
+        for v, start in zip([v for a in found for v in a.ravel()], starts, strict=True)
+    ]
+    args = (length, inside, tuple(starts), tuple(held), tuple(ends))
+    return _reshape(block.region("repeat", args, [v.kind for v in starts]), carry)
+
+
+def _map(
+    block: Block, jaxpr: Any, fixed: list[Array], items: list[Array], length: int
+) -> list[Array]:
+    """One run of the body for each entry along the leading axes, kept apart in memory."""
+    inside = Block(block, loop=True)
+    rows = [np.moveaxis(item, 0, -1).reshape(-1, length) for item in items]
+    every = [tuple(row) for array in rows for row in array]
+    # What is the same in every entry is known before the loop.
+    same = [all(value is row[0] for value in row) for row in every]
+    flat = [row for row, alike in zip(every, same, strict=True) if not alike]
+    taken = inside.region("taken", (tuple(flat),), [row[0].kind for row in flat])
+    left = iter(taken)
+    given = [row[0] if alike else next(left) for row, alike in zip(every, same, strict=True)]
+    shapes = [np.empty(item.shape[1:], dtype=object) for item in items]
+    found = lower_jaxpr(inside, jaxpr.jaxpr, jaxpr.consts, [*fixed, *_reshape(given, shapes)])
+    values = tuple(v for array in found for v in array.ravel())
+    args = (length, inside, tuple(taken), values)
+    kinds = [v.kind for v in values for _ in range(length)]
+    results = array_of(block.region("map", args, kinds), (len(values), length))
+    for row, value in zip(results, values, strict=True):
+        if value.block is not inside:
+            row[:] = value
+    arrays, place = [], 0
+    for array in found:
+        part = results[place : place + array.size].reshape(*array.shape, length)
+        arrays.append(np.moveaxis(part, -1, 0))
+        place += array.size
+    return arrays

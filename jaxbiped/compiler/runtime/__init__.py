@@ -1,0 +1,1 @@
+"""Run time: scheduling, buffers, threads and caches."""

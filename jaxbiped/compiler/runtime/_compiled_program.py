@@ -1,0 +1,269 @@
+"""Compiled programs, run over many simulations at once: queues, threads and arrays."""
+
+import contextlib
+import ctypes
+import functools
+import threading
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped.compiler.codegen._lane_kernel import ENTRY, kernel_text
+from jaxbiped.compiler.codegen._lane_scheduler import FIELDS
+from jaxbiped.compiler.runtime._buffer_pool import BufferPool
+from jaxbiped.compiler.runtime._host_cpu import host
+from jaxbiped.compiler.runtime._input_streams import input_streams_of
+from jaxbiped.compiler.runtime._machine_code import MachineCode, assembly, machine_code
+from jaxbiped.compiler.runtime._program import (
+    Graph,
+    Outline,
+    Program,
+    graph_of,
+    leaves_of,
+    outline_of,
+)
+from jaxbiped.compiler.runtime._threads import default_threads, run_in_threads
+
+_MANY = 8
+"""Vectors for each thread from which on two are computed side by side."""
+_TRACING = threading.Lock()
+
+
+class Recorded(NamedTuple):
+    """What was recorded of n simulations.
+
+    Attributes:
+        values: shape (n, room, numbers in a record). Beyond the records there are NaN where a
+            schedule says when they are due, else zeros: memory that nobody ever touched.
+        counts: how many records there were, shape (n,); more than `room` are lost.
+    """
+
+    values: np.ndarray
+    counts: np.ndarray
+
+
+class Ran(NamedTuple):
+    """Outputs of n simulations, leaves (n, …), and what they recorded."""
+
+    outputs: PyTree
+    recorded: Recorded | None
+
+
+class CompiledProgram:
+    """A program compiled for inputs of one structure."""
+
+    def __init__(self, program: Program, inputs: PyTree) -> None:
+        """A program is traced when it is needed; `inputs` are one simulation's, or their shapes."""
+        # The outline and the graph need these: compiled by themselves, they are traced once.
+        self._program = program._replace(
+            start=jax.jit(program.start),
+            finish=jax.jit(program.finish),
+            record=None if program.record is None else jax.jit(program.record),
+        )
+        self._inputs = jtu.tree_map(lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype), inputs)
+        self._graph: Graph | None = None
+        self._code: dict[int, MachineCode] = {}
+        self._begun: set[int] = set()
+        self._lock, self._making = threading.Lock(), threading.Lock()
+
+    @property
+    def backwards(self) -> bool:
+        """Whether it reads tapes from the last row on."""
+        return self._program.backwards
+
+    @functools.cached_property
+    def size(self) -> int:
+        """How many numbers the inputs of one simulation are."""
+        return sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(self._inputs))
+
+    @functools.cached_property
+    def outline(self) -> Outline:
+        """What leaves it."""
+        return outline_of(self._program, self._inputs)
+
+    def check(self) -> None:
+        """Waits until it is traced.
+
+        Raises:
+            UnknownPrimitiveError: it holds an operation that lanes do not have.
+        """
+        _ = self.graph
+
+    @property
+    def graph(self) -> Graph:
+        """Its operations."""
+        # One after the other: what is traced first can be compiled while the next one is traced.
+        if self._graph is None:
+            with _TRACING:
+                if self._graph is None:
+                    self._graph = graph_of(self._program, self._inputs)
+        return self._graph
+
+    @functools.cached_property
+    def maps(self) -> bool:
+        """Whether it loops over entries of arrays."""
+        return any(value.op == "map" for value in self.graph.body.values)
+
+    def text(self, width: int) -> str:
+        """The program as LLVM's text."""
+        return kernel_text(self.graph, width, host())
+
+    def instructions(self) -> int:
+        """How many machine instructions the program has, for vectors of the host's width."""
+        text = self.text(host().width)
+        lines = assembly(text, host(), as_written=self.maps).splitlines()
+        return sum(line.startswith("\t") and not line.startswith("\t.") for line in lines)
+
+    def code(self, width: int) -> MachineCode:
+        """The machine code, for vectors of this width."""
+        with self._making:
+            if width not in self._code:
+                text = self.text(width)
+                self._code[width] = machine_code(text, ENTRY, host(), as_written=self.maps)
+            return self._code[width]
+
+    def width(self, count: int, threads: int) -> int:
+        """Simulations in one vector: a thread that has only one is faster with it alone.
+
+        Where there are many, two of the host's vectors side by side: while one waits, the other one
+        is computed. What a map loops over fills the caches instead.
+        """
+        if count <= threads:
+            return 1
+        if count < _MANY * threads * host().width:
+            return host().width
+        return host().width * (1 if self.maps else 2)
+
+    def make_ready(self, count: int) -> None:
+        """Begins to trace and compile, in the background, what running `count` of them needs."""
+        width = self.width(count, default_threads())
+        with self._lock:
+            begun = width in self._code or width in self._begun
+            self._begun.add(width)
+        if not begun:
+            threading.Thread(target=self._prepare, args=(width,)).start()
+
+    def _prepare(self, width: int) -> None:
+        # Who needs the program is told why there is none.
+        with contextlib.suppress(Exception):
+            self.code(width)
+
+    def run(
+        self,
+        inputs: PyTree,
+        *,
+        schedule: np.ndarray | None = None,
+        tape: Sequence[np.ndarray] | None = None,
+        room: int = 0,
+        threads: int | None = None,
+        width: int | None = None,
+        quick: bool = False,
+    ) -> Ran:
+        """Runs n simulations; leaves of `inputs` have a leading axis of n.
+
+        Args:
+            inputs: of all simulations; 64-bit floating-point numbers, whatever they stand for.
+            schedule: increasing times of the records, shape (m,), where the program has such.
+            tape: rows for each simulation, n arrays (rows, numbers), where the program reads such;
+                from the last one on where it reads `backwards`.
+            room: records that each simulation has room for.
+            threads: how many to use; the environment's or the machine's choice unless given.
+            width: simulations in one vector; the results do not depend on it.
+            quick: whether one thread's work is so short that nobody could interrupt it.
+
+        Raises:
+            KeyboardInterrupt: the user interrupts; the simulations end within a tenth of a second.
+        """
+        leaves = [np.asarray(leaf) for leaf in jtu.tree_leaves(inputs)]
+        count = leaves[0].shape[0]
+        rows = [
+            np.moveaxis(leaf, 0, -1).reshape(int(np.prod(shape.shape)), count)
+            for leaf, shape in zip(leaves, jtu.tree_leaves(self._inputs), strict=True)
+        ]
+        table = np.concatenate(rows).astype(np.float64)
+        found, recorded = self.run_table(
+            table,
+            schedule=schedule,
+            tape=tape,
+            room=room,
+            threads=threads,
+            width=width,
+            quick=quick,
+        )
+        return Ran(self._outputs(found), recorded)
+
+    def run_table(
+        self,
+        table: np.ndarray,
+        *,
+        schedule: np.ndarray | None = None,
+        tape: Sequence[np.ndarray] | None = None,
+        room: int = 0,
+        memory: BufferPool | None = None,
+        threads: int | None = None,
+        width: int | None = None,
+        quick: bool = False,
+    ) -> tuple[np.ndarray, Recorded | None]:
+        """`run` of inputs and outputs as tables (numbers, n), their leaves' entries in order.
+
+        Beyond records in given `memory` there is anything.
+        """
+        table = np.ascontiguousarray(table, dtype=np.float64)
+        count = table.shape[1]
+        outputs = np.full((len(self.graph.outputs), count), np.nan)
+        times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
+        tapes = input_streams_of(tape, count, len(self.graph.row), backwards=self.backwards)
+        shape = (count, room, len(self.graph.recorded))
+        records = np.zeros(shape) if memory is None else memory.array(shape)
+        if schedule is not None:
+            records[:] = np.nan
+        record_counts = np.zeros(count, dtype=np.int64)
+        queue, stop = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+        chosen = self.width(count, threads or default_threads()) if width is None else width
+        arrays = dict(
+            queue=queue,
+            stop=stop,
+            inputs=table,
+            outputs=outputs,
+            records=records,
+            record_counts=record_counts,
+            schedule=times,
+            tapes=tapes.starts,
+            tape_lengths=tapes.lengths,
+        )
+        numbers = dict(
+            count=count, record_room=room, schedule_length=len(times), tape_stride=tapes.stride
+        )
+        fields = np.array(
+            [arrays[n].ctypes.data if n in arrays else numbers[n] for n in FIELDS], dtype=np.int64
+        )
+        if count:
+            entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(self.code(chosen).address)
+            workers = min(threads or default_threads(), -(-count // chosen))
+            run_in_threads(lambda: entry(fields.ctypes.data), workers, stop, quick=quick)
+        recorded = Recorded(records, record_counts) if self.graph.recording is not None else None
+        return self._whole(outputs), recorded
+
+    def _whole(self, varying: np.ndarray) -> np.ndarray:
+        """The outputs with those among them that are always the same."""
+        constants = self.graph.constants
+        if not constants:
+            return varying
+        whole = np.empty((len(varying) + len(constants), varying.shape[1]))
+        whole[list(constants)] = np.array(list(constants.values()))[:, None]
+        whole[[i for i in range(len(whole)) if i not in constants]] = varying
+        return whole
+
+    def _outputs(self, table: np.ndarray) -> PyTree:
+        shapes, structure = jtu.tree_flatten(self.outline.outputs)
+        parts = leaves_of(self.outline.outputs, table)
+        with np.errstate(invalid="ignore"):
+            leaves = [
+                np.moveaxis(part, -1, 0).astype(shape.dtype)
+                for part, shape in zip(parts, shapes, strict=True)
+            ]
+        return jtu.tree_unflatten(structure, leaves)

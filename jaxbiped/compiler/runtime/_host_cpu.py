@@ -1,0 +1,39 @@
+"""Host CPU: the features that code is generated for."""
+
+import functools
+from typing import NamedTuple
+
+import llvmlite.binding as llvm
+
+
+class Host(NamedTuple):
+    """The CPU that code is made for.
+
+    Attributes:
+        triple: architecture and system, in LLVM's words.
+        cpu: its model; `features` its instruction sets.
+        width: 64-bit numbers in one vector register.
+        scales: whether it multiplies by powers of two in one instruction.
+    """
+
+    triple: str
+    cpu: str
+    features: str
+    width: int
+    scales: bool
+
+
+@functools.cache
+def host() -> Host:
+    """This machine."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    features = llvm.get_host_cpu_features()
+    width = 8 if features.get("avx512f") and features.get("avx512dq") else 4
+    if not features.get("avx2") and width == 4:
+        width = 2
+    text = features.flatten()
+    if width == 8:
+        # LLVM else keeps to half registers on some CPUs.
+        text += ",-prefer-256-bit"
+    return Host(llvm.get_default_triple(), llvm.get_host_cpu_name(), text, width, width == 8)

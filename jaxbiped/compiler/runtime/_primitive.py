@@ -1,0 +1,296 @@
+"""Compiled programs as a primitive of JAX: they run under `jit` and `vmap`."""
+
+import contextlib
+import contextvars
+import enum
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jax.extend.core import Primitive
+from jax.interpreters import ad, batching, mlir
+from jaxtyping import Array, PyTree
+
+from jaxbiped.compiler.runtime._compiled_program import CompiledProgram, Recorded
+from jaxbiped.compiler.runtime._program import leaves_of
+from jaxbiped.compiler.runtime._record_cache import BLOCK
+from jaxbiped.compiler.runtime._recorder import Recorder
+from jaxbiped.compiler.runtime._threads import default_threads
+
+_UNTRACED: contextvars.ContextVar[list[CompiledProgram] | None] = contextvars.ContextVar(
+    "programs that may not be expressible", default=None
+)
+
+
+class _Part(enum.Enum):
+    """Which part of what simulations give is wanted."""
+
+    ALL = "outputs and records"
+    OUTPUTS = "outputs, while records are held back"
+    COLUMNS = "records that were held back"
+
+
+@contextlib.contextmanager
+def deferred_checks() -> Iterator[list[CompiledProgram]]:
+    """Within, nothing that is lowered waits until its programs are traced.
+
+    They are listed: whoever goes on to run them first has to `check` each.
+    """
+    programs: list[CompiledProgram] = []
+    token = _UNTRACED.set(programs)
+    try:
+        yield programs
+    finally:
+        _UNTRACED.reset(token)
+
+
+class Schedule:
+    """Times of records, the same for every simulation. Compared by identity."""
+
+    def __init__(self, times: np.ndarray) -> None:
+        self.times = np.ascontiguousarray(times, dtype=np.float64)
+
+
+class Recording(eqx.Module):
+    """The records of one simulation, told by its inputs: arrays of them travel nowhere.
+
+    Attributes:
+        numbers: the inputs' leaves one behind the other, and then those of what was read, (k,).
+        recorder: how it was run.
+    """
+
+    numbers: Any
+    recorder: Recorder = eqx.field(static=True)
+
+    def columns(self, first: Any) -> list[Any]:
+        """For each of the first k numbers `first`'s and then those recorded, NaN beyond the last.
+
+        `first` has shape (k,), the arrays (1 + room,).
+        """
+        params = _params(self.recorder.compiled, recorder=self.recorder, wants=_Part.COLUMNS)
+        return _bind([self.numbers, first], params)
+
+
+def call(
+    compiled: CompiledProgram,
+    inputs: PyTree,
+    schedule: Schedule | None = None,
+    *,
+    tape: Any = None,
+    room: int = 0,
+    quick: bool = False,
+) -> tuple[PyTree, Recorded | None]:
+    """Runs one simulation, or under `vmap` many at once, each in a lane.
+
+    There is room for `room` records, or for one at each time of a schedule. A `tape`, shape
+    (rows, numbers) or the `Recording` of another simulation, is for programs that read one.
+
+    It has no derivative of its own. Outside of `jit` it runs at once and an
+    interrupt ends it; inside, it is called back from the compiled program, and an interrupt waits.
+    A single simulation that is `quick` is over before a user could interrupt, and needs no thread.
+    """
+    recorder, rows = None, [] if tape is None else [tape]
+    if isinstance(tape, Recording):
+        recorder, rows = tape.recorder, [tape.numbers]
+    params = _params(compiled, schedule=schedule, room=room, quick=quick, recorder=recorder)
+    table, *rest = _bind([_numbers(inputs), *rows], params)
+    return _outputs(compiled, table), Recorded(*rest) if rest else None
+
+
+def call_recording(
+    compiled: CompiledProgram,
+    inputs: PyTree,
+    *,
+    room: int,
+    quick: bool,
+    tape: Recording | None = None,
+    once: bool = False,
+) -> tuple[PyTree, Recording]:
+    """`call`, but the records stay on the host; not for longer where they are read but `once`."""
+    reads = None if tape is None else tape.recorder
+    recorder = Recorder(compiled, room, quick, once, reads)
+    numbers = _numbers(inputs if tape is None else (inputs, tape.numbers))
+    (table,) = _bind([numbers], _params(compiled, recorder=recorder, wants=_Part.OUTPUTS))
+    return _outputs(compiled, table), Recording(numbers, recorder)
+
+
+def _params(
+    compiled: CompiledProgram,
+    *,
+    room: int = 0,
+    quick: bool = False,
+    schedule: Schedule | None = None,
+    wants: _Part = _Part.ALL,
+    recorder: Recorder | None = None,
+) -> dict[str, Any]:
+    """Of the operation: what is run and how, and which part of what that gives is wanted."""
+    return dict(
+        compiled=compiled,
+        schedule=schedule,
+        room=room,
+        quick=quick,
+        wants=wants,
+        recorder=recorder,
+    )
+
+
+def _numbers(inputs: PyTree) -> Any:
+    """The leaves one behind the other: every array that crosses costs time."""
+    leaves = jtu.tree_leaves(inputs)
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+        return jnp.concatenate([jnp.ravel(jnp.asarray(x, dtype=jnp.float64)) for x in leaves])
+    return np.concatenate([np.ravel(np.asarray(leaf, dtype=np.float64)) for leaf in leaves])
+
+
+def _bind(given: list[Any], params: dict[str, Any]) -> list[Any]:
+    """The operation's results for one simulation."""
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in given):
+        return [leaf[0] for leaf in _RUN.bind(*[x[None] for x in given], **params)]
+    found = _run(*[np.asarray(x)[None] for x in given], **params)
+    return [jnp.asarray(leaf[0]) for leaf in found]
+
+
+def _outputs(compiled: CompiledProgram, table: Any) -> PyTree:
+    shapes, structure = jtu.tree_flatten(compiled.outline.outputs)
+    parts = leaves_of(compiled.outline.outputs, table)
+    leaves = [jnp.asarray(part.astype(s.dtype)) for part, s in zip(parts, shapes, strict=True)]
+    return jtu.tree_unflatten(structure, leaves)
+
+
+def _run(
+    numbers: Any,
+    tape: Any = None,
+    *,
+    compiled: CompiledProgram,
+    schedule: Schedule | None,
+    room: int,
+    quick: bool,
+    wants: _Part,
+    recorder: Recorder | None,
+) -> list[np.ndarray]:
+    """Of inputs (n, k) and their tapes: outputs (n, o), and what was recorded."""
+    given = np.asarray(numbers)
+    if recorder is not None and wants is _Part.OUTPUTS:
+        return [recorder.outputs(given).T]
+    if recorder is not None and wants is _Part.COLUMNS:
+        return recorder.columns(given, np.asarray(tape))
+    times = None if schedule is None else schedule.times
+    alone = quick and len(given) == 1
+    width = compiled.width(len(given), default_threads())
+
+    def run(part: slice, rows: Sequence[np.ndarray] | None) -> list[np.ndarray]:
+        outputs, recorded = compiled.run_table(
+            given[part].T,
+            schedule=times,
+            tape=rows,
+            room=room if times is None else len(times),
+            quick=alone,
+            width=width,
+        )
+        return [outputs.T, *(recorded or ())]
+
+    if recorder is None:
+        return run(slice(None), None if tape is None else list(np.asarray(tape)))
+    parts = [slice(k, k + BLOCK) for k in range(0, max(1, len(given)), BLOCK)]
+    found = [run(part, recorder.rows(np.asarray(tape)[part])) for part in parts]
+    return [np.concatenate(each) for each in zip(*found, strict=True)]
+
+
+def _shapes(
+    leaves: tuple[Any, ...],
+    *,
+    compiled: CompiledProgram,
+    schedule: Schedule | None,
+    room: int,
+    wants: _Part,
+    recorder: Recorder | None,
+    **_: Any,
+) -> list[Any]:
+    count = leaves[0].shape[0]
+    if wants is _Part.COLUMNS:
+        assert recorder is not None
+        column = jax.ShapeDtypeStruct((count, 1 + recorder.room), jnp.float64)
+        return [column] * leaves[1].shape[1]
+    numbers = compiled.outline.recorded
+    outputs = jtu.tree_leaves(compiled.outline.outputs)
+    size = sum(int(np.prod(leaf.shape)) for leaf in outputs)
+    found = [jax.ShapeDtypeStruct((count, size), jnp.float64)]
+    if numbers is not None and wants is _Part.ALL:
+        room = room if schedule is None else len(schedule.times)
+        found.append(jax.ShapeDtypeStruct((count, room, numbers), jnp.float64))
+        found.append(jax.ShapeDtypeStruct((count,), jnp.int64))
+    return found
+
+
+def _implementation(*leaves: Any, **params: Any) -> list[Array]:
+    return [jnp.asarray(leaf) for leaf in _run(*leaves, **params)]
+
+
+def _abstract_evaluation(*leaves: Any, **params: Any) -> list[Any]:
+    shapes = _shapes(leaves, **params)
+    return [jax.core.ShapedArray(shape.shape, shape.dtype) for shape in shapes]
+
+
+def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
+    """A call back from the compiled program, with arrays of NumPy.
+
+    `jax.pure_callback` would make arrays of JAX of them, which copies, and where they are large
+    waits for a thread of the same pool that this call holds: for ever, on few cores.
+    """
+
+    def run(*given: np.ndarray) -> tuple[np.ndarray, ...]:
+        return tuple(_run(*given, **params))
+
+    if params["wants"] is not _Part.COLUMNS:
+        # While XLA compiles the rest, this compiles as well.
+        compiled, waiting = params["compiled"], _UNTRACED.get()
+        compiled.make_ready(context.avals_in[0].shape[0])
+        if waiting is None:
+            compiled.check()
+        else:
+            waiting.append(compiled)
+    results, _, _ = mlir.emit_python_callback(
+        context,
+        run,
+        None,
+        list(operands),
+        context.avals_in,
+        context.avals_out,
+        has_side_effect=False,
+        returns_token=False,
+    )
+    return results
+
+
+def _refuse_derivative(primals: Any, tangents: Any, **params: Any) -> Any:
+    raise TypeError(
+        'JAX cannot differentiate what the lane engine computes here: use engine="xla", or a '
+        "function that brings its own derivatives, such as gait_measures."
+    )
+
+
+def _batching(leaves: Any, axes: Any, **params: Any) -> tuple[list[Array], list[int]]:
+    size = next(
+        leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None
+    )
+    aligned = [
+        jnp.broadcast_to(leaf, (size, *leaf.shape)) if axis is None else jnp.moveaxis(leaf, axis, 0)
+        for leaf, axis in zip(leaves, axes, strict=True)
+    ]
+    count = aligned[0].shape[1]
+    merged = [leaf.reshape(size * count, *leaf.shape[2:]) for leaf in aligned]
+    found = _RUN.bind(*merged, **params)
+    return [leaf.reshape(size, count, *leaf.shape[1:]) for leaf in found], [0] * len(found)
+
+
+_RUN = Primitive("lanes")
+_RUN.multiple_results = True
+_RUN.def_impl(_implementation)
+_RUN.def_abstract_eval(_abstract_evaluation)
+ad.primitive_jvps[_RUN] = _refuse_derivative
+batching.primitive_batchers[_RUN] = _batching
+mlir.register_lowering(_RUN, _lowering)

@@ -1,0 +1,196 @@
+"""Program of a simulation: four functions of JAX, and their graph."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.compiler.ir._elementwise_primitives import KINDS, Array, array_of, convert
+from jaxbiped.compiler.ir._graph import Block, Kind, Value
+from jaxbiped.compiler.ir._lower_jaxpr import lower_jaxpr
+from jaxbiped.compiler.passes._code_sinking import sink_code
+
+
+class Program(NamedTuple):
+    """What every lane does, from taking a simulation to giving it back.
+
+    Leaves of inputs, of what is carried and of outputs are numbers or arrays of static shape.
+
+    Attributes:
+        start: what is carried at first, `start(inputs)`.
+        attempt: one attempted step, `attempt(inputs, carried)`, gives what is then carried and
+            whether the simulation is over (boolean).
+        tape: numbers in each row of a tape, of which every attempt reads the next row as a third
+            argument, shape (tape,); behind the last row that one again. 0: there is none.
+        backwards: whether a tape is read from its last row on.
+        finish: outputs, `finish(inputs, carried)`.
+        record: `record(inputs, carried, next_time)` gives whether there is something to record
+            (boolean) and what, a list of numbers. It is asked until it has nothing more where
+            `scheduled`, else once after each attempt. None: nothing is recorded.
+        scheduled: whether records are made at times of a schedule, the next of which it is given.
+    """
+
+    start: Callable[[PyTree], PyTree]
+    attempt: Callable[..., tuple[PyTree, Scalar]]
+    finish: Callable[[PyTree, PyTree], PyTree]
+    record: Callable[[PyTree, PyTree, Scalar], tuple[Scalar, Sequence[Scalar]]] | None = None
+    scheduled: bool = False
+    tape: int = 0
+    backwards: bool = False
+
+
+class Outline(NamedTuple):
+    """What leaves a program, known before its operations are.
+
+    Attributes:
+        outputs: pytree of outputs, with shapes and dtypes.
+        recorded: how many numbers are in a record; None where nothing is recorded.
+    """
+
+    outputs: PyTree
+    recorded: int | None
+
+
+class Graph(NamedTuple):
+    """A program's operations.
+
+    Attributes:
+        prepare: what depends on a simulation's inputs alone.
+        begin, body, end, notes: blocks of `start`, `attempt`, `finish` and `record`.
+        inputs: what is read, `carried` what is carried, one array for each leaf.
+        first: what is carried at first; `following` after an attempt.
+        row: of the tape.
+        done: whether the simulation is over.
+        outputs: 64-bit floating-point numbers, all; `constants` those that are always the same, by
+            their places, which `outputs` leaves out.
+        next_time: of the schedule. `recording`, `recorded`: see `Program.record`.
+    """
+
+    prepare: Block
+    begin: Block
+    body: Block
+    end: Block
+    notes: Block
+    inputs: list[Value]
+    carried: list[Array]
+    first: list[Array]
+    following: list[Array]
+    row: list[Value]
+    done: Value
+    outputs: list[Value]
+    constants: dict[int, float]
+    next_time: Value
+    recording: Value | None
+    recorded: list[Value]
+    scheduled: bool
+
+    def results(self) -> list[Value]:
+        """All that its operations are for."""
+        carried = [v for group in (self.first, self.following) for a in group for v in a.ravel()]
+        notes = [] if self.recording is None else [self.recording, *self.recorded]
+        return [*carried, self.done, *self.outputs, *notes]
+
+
+def outline_of(program: Program, inputs: PyTree) -> Outline:
+    """Of a program for inputs of these shapes and dtypes."""
+    carried = jax.eval_shape(program.start, inputs)
+    outputs = jax.eval_shape(program.finish, inputs, carried)
+    if program.record is None:
+        return Outline(outputs, None)
+    time = jax.ShapeDtypeStruct((), jnp.float64)
+    _, values = jax.eval_shape(program.record, inputs, carried, time)
+    return Outline(outputs, sum(int(np.prod(value.shape)) for value in values))
+
+
+def graph_of(program: Program, inputs: PyTree) -> Graph:
+    """Traces a program for inputs of these shapes and dtypes."""
+    prepare = Block(invariant=True)
+    begin, body, end = Block(prepare), Block(prepare), Block(prepare)
+    notes = Block(prepare)
+    given = [inputs_of(prepare, leaf) for leaf in jtu.tree_leaves(inputs)]
+    carried_shape = jax.eval_shape(program.start, inputs)
+    carried = [inputs_of(body, leaf) for leaf in jtu.tree_leaves(carried_shape)]
+    first = lower_function(begin, program.start, (inputs,), given)
+    shapes: tuple[Any, ...] = (inputs, carried_shape)
+    arguments = [*given, *carried]
+    row: list[Value] = []
+    if program.tape:
+        shape = jax.ShapeDtypeStruct((program.tape,), jnp.float64)
+        shapes, arguments = (*shapes, shape), [*arguments, inputs_of(body, shape)]
+        row = list(arguments[-1])
+    following = lower_function(body, program.attempt, shapes, arguments)
+    finals = lower_function(end, program.finish, (inputs, carried_shape), [*given, *carried])
+    next_time = Value("input", (), Kind.F64, notes)
+    recording, recorded = None, []
+    if program.record is not None:
+        time = jax.ShapeDtypeStruct((), jnp.float64)
+        arguments = [*given, *carried, array_of([next_time], ())]
+        mask, *values = lower_function(
+            notes, program.record, (inputs, carried_shape, time), arguments
+        )
+        recording = mask.item()
+        recorded = [convert(notes, v, Kind.F64) for a in values for v in a.ravel()]
+    *following, done = following
+    outputs = [convert(end, v, Kind.F64) for array in finals for v in array.ravel()]
+    graph = Graph(
+        prepare=prepare,
+        begin=begin,
+        body=body,
+        end=end,
+        notes=notes,
+        inputs=[v for array in given for v in array.ravel()],
+        carried=carried,
+        first=_match_kinds(begin, first, carried),
+        following=_match_kinds(body, following, carried),
+        row=row,
+        done=done.item(),
+        outputs=[v for v in outputs if v.constant is None],
+        constants={i: v.constant for i, v in enumerate(outputs) if v.constant is not None},
+        next_time=next_time,
+        recording=recording,
+        recorded=recorded,
+        scheduled=program.scheduled,
+    )
+    sink_code(graph.results())
+    return graph
+
+
+def leaves_of(structure: PyTree, table: Any) -> list[Any]:
+    """A table of outputs (numbers, …) cut into arrays of the leaves' shapes, (*shape, …)."""
+    leaves, place = [], 0
+    for leaf in jax.tree.leaves(structure):
+        size = int(np.prod(leaf.shape))
+        leaves.append(table[place : place + size].reshape((*leaf.shape, *table.shape[1:])))
+        place += size
+    return leaves
+
+
+def inputs_of(block: Block, leaf: Any) -> Array:
+    """What is read of one leaf, as values of a block."""
+    kind = KINDS[np.dtype(leaf.dtype)]
+    shape = np.shape(leaf)
+    return array_of([Value("input", (), kind, block) for _ in range(int(np.prod(shape)))], shape)
+
+
+def lower_function(
+    block: Block, function: Callable[..., Any], shapes: tuple[Any, ...], arrays: list[Array]
+) -> list[Array]:
+    """A function's operations added to a block: its results."""
+    closed = jax.make_jaxpr(function)(*shapes)
+    return lower_jaxpr(block, closed.jaxpr, closed.consts, arrays)
+
+
+def _match_kinds(block: Block, arrays: list[Array], like: list[Array]) -> list[Array]:
+    """The same values, each as the kind that is carried."""
+    return [
+        array_of(
+            [convert(block, v, w.kind) for v, w in zip(a.ravel(), b.ravel(), strict=True)],
+            b.shape,
+        )
+        for a, b in zip(arrays, like, strict=True)
+    ]

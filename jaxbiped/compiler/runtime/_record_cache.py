@@ -1,0 +1,113 @@
+"""Record cache: what simulations recorded waits on the host until somebody asks for it."""
+
+import collections
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+Tables = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Of n simulations: outputs (numbers, n), records (n, room, numbers), and how many these are."""
+
+BLOCK = 512
+"""Simulations that record, or read records, at once: all together would take much memory."""
+
+
+class RecordCache:
+    """What simulations recorded, by program and inputs, as long as there is room for it.
+
+    A search runs many simulations and needs the records of two of them, known only at its end:
+    they need not travel through it. Nothing depends on what is held: what is missing is run again.
+    """
+
+    def __init__(self, most: int) -> None:
+        """Holds `most` bytes; beyond them what came first goes first."""
+        self._most, self._size = most, 0
+        self._records: collections.OrderedDict[Any, np.ndarray] = collections.OrderedDict()
+        self._lock = threading.Lock()
+
+    def ran(
+        self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
+    ) -> np.ndarray:
+        """Outputs of what `run` finds for inputs (numbers, n); its records are then known."""
+        return self._ran(program, inputs, run)[0]
+
+    def rows(
+        self,
+        program: Any,
+        inputs: np.ndarray,
+        run: Callable[[np.ndarray], Tables],
+        *,
+        once: bool = False,
+    ) -> list[np.ndarray]:
+        """Records of each simulation (records, numbers), or zeros where it made none.
+
+        Those asked for but `once` are then held no longer.
+        """
+        known = self._known(program, inputs, run)
+        if once:
+            with self._lock:
+                for column in inputs.T:
+                    self._drop((program, column.tobytes()))
+        return [each if len(each) else np.zeros((1, each.shape[1])) for each in known]
+
+    def columns(
+        self,
+        program: Any,
+        inputs: np.ndarray,
+        first: np.ndarray,
+        room: int,
+        run: Callable[[np.ndarray], Tables],
+    ) -> list[np.ndarray]:
+        """The first k numbers in a record, each as an array (n, 1 + room), NaN beyond the last.
+
+        Before those recorded comes that of `first`, shape (n, k).
+        """
+        known = self._known(program, inputs, run)
+        found = [np.empty((len(known), 1 + room)) for _ in first.T]
+        for i, records in enumerate(known):
+            for column, start, values in zip(found, first[i], records.T, strict=False):
+                column[i, 0], column[i, 1 : 1 + len(values)] = start, values
+                column[i, 1 + len(values) :] = np.nan
+        return found
+
+    def _known(
+        self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
+    ) -> list[np.ndarray]:
+        """Records of each simulation; what is not known `run` finds."""
+        keys = [(program, column.tobytes()) for column in inputs.T]
+        with self._lock:
+            known = {key: self._records[key] for key in keys if key in self._records}
+        missing = [i for i, key in enumerate(keys) if key not in known]
+        if missing:
+            _, found = self._ran(program, inputs[:, missing], run)
+            known |= {keys[i]: each for i, each in zip(missing, found, strict=True)}
+        return [known[key] for key in keys]
+
+    def _ran(
+        self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Outputs and records of each simulation, which are held from now on."""
+        every, found = [], []
+        for first in range(0, inputs.shape[1], BLOCK):
+            outputs, records, counts = run(inputs[:, first : first + BLOCK])
+            every.append(outputs)
+            # Where they fill most of their room, that stays; else it would be held for little.
+            filled = 2 * np.sum(counts) >= records.shape[0] * records.shape[1]
+            own = [each[:n] for each, n in zip(records, counts, strict=True)]
+            found += own if filled else [each.copy() for each in own]
+        outputs = np.concatenate(every, axis=1)
+        with self._lock:
+            for column, each in zip(inputs.T, found, strict=True):
+                key = program, column.tobytes()
+                self._drop(key)
+                self._records[key] = each
+                self._size += each.nbytes
+            while self._size > self._most:
+                self._drop(next(iter(self._records)))
+        return outputs, found
+
+    def _drop(self, key: Any) -> None:
+        records = self._records.pop(key, None)
+        self._size -= 0 if records is None else records.nbytes

@@ -1,0 +1,46 @@
+"""Threads: how many run a program, and how a user's interrupt ends them."""
+
+import os
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+THREADS_VARIABLE = "JAXBIPED_THREADS"
+"""Environment variable: threads to use, else as many as the process has cores."""
+_POLL = 0.1
+"""How long to wait before looking whether the user interrupts [s]."""
+
+
+def default_threads() -> int:
+    """Threads to use where nobody says."""
+    chosen = os.environ.get(THREADS_VARIABLE, "")
+    if chosen.isdigit() and int(chosen) > 0:
+        return int(chosen)
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def run_in_threads(work: Callable[[], Any], workers: int, stop: np.ndarray, *, quick: bool) -> None:
+    """Runs the same work in several threads, which share its queue; `stop` ends it early.
+
+    What is `quick` needs no thread: it is over before a user could interrupt.
+    """
+    if workers == 1 and quick:
+        work()
+        return
+    others = [threading.Thread(target=work, daemon=True) for _ in range(workers)]
+    for thread in others:
+        thread.start()
+    try:
+        for thread in others:
+            while thread.is_alive():
+                # Waiting without end would keep the interrupt waiting, too.
+                thread.join(_POLL)
+    except BaseException:
+        stop[0] = 1
+        for thread in others:
+            thread.join()
+        raise

@@ -1,0 +1,124 @@
+"""Constraint methods: the interface of what holds constraints in redundant coordinates."""
+
+import abc
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+import equinox as eqx
+
+from jaxbiped._types import Scalar
+from jaxbiped.linalg._symmetric import factorise, solve
+
+if TYPE_CHECKING:
+    from typing import ClassVar as AbstractClassVar
+else:
+    from equinox import AbstractClassVar
+
+Row: TypeAlias = dict[int, Scalar]
+"""A row of a Jacobian: its entries by coordinate, those left out that are always zero."""
+
+
+class Constrained(NamedTuple):
+    """A constrained system at one state: n coordinates q, k constraints Φ(q) = 0.
+
+    Attributes:
+        masses: diagonal of M [kg, kg·m²], n entries.
+        applied: applied forces Q [N, N·m], n entries.
+        rows: of J = ∂Φ/∂q, k of them.
+        violation: Φ, k entries.
+        rate: Φ̇ = J q̇, k entries.
+        bias: γ = −J̇ q̇, k entries.
+    """
+
+    masses: list[Scalar]
+    applied: list[Scalar]
+    rows: list[Row]
+    violation: list[Scalar]
+    rate: list[Scalar]
+    bias: list[Scalar]
+
+
+class AbstractConstraintMethod(eqx.Module):
+    """Finds the multipliers λ of M q̈ = Q − Jᵀ λ. A pytree of its constants.
+
+    Attributes:
+        needs_independent: whether constraints that say the same twice make it singular.
+    """
+
+    needs_independent: AbstractClassVar[bool]
+
+    @abc.abstractmethod
+    def multipliers(self, system: Constrained) -> list[Scalar]:
+        """λ of each constraint [N]; −Jᵀ λ are the constraints' forces on the coordinates."""
+
+
+class AbstractProjectingMethod(AbstractConstraintMethod):
+    """Also takes positions and velocities back to the constraints after every step.
+
+    Attributes:
+        iterations: corrections of the positions after each step.
+    """
+
+    iterations: eqx.AbstractVar[int]
+
+    @abc.abstractmethod
+    def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
+        """The correction −W Jᵀ(J W Jᵀ)⁻¹ r of each coordinate that takes a residual r off.
+
+        The same for positions, where r is Φ, and for velocities, where it is Φ̇. W is the
+        metric's inverse.
+        """
+
+
+def gram(rows: list[Row], weights: list[Scalar], shift: Scalar | None = None) -> list[list[Scalar]]:
+    """J W Jᵀ + s I for a diagonal W, its lower half; s = 0 unless given."""
+    matrix = []
+    for i, row in enumerate(rows):
+        entries = []
+        for other in rows[: i + 1]:
+            shared = [row[c] * other[c] * weights[c] for c in row if c in other]
+            entries.append(sum(shared[1:], shared[0]) if shared else 0.0 * weights[0])
+        if shift is not None:
+            entries[i] = entries[i] + shift
+        matrix.append(entries)
+    return matrix
+
+
+def free_residual(system: Constrained) -> list[Scalar]:
+    """J M⁻¹ Q − γ: by how much the applied forces alone would break the constraints."""
+    free = [force / mass for force, mass in zip(system.applied, system.masses, strict=True)]
+    return [
+        sum((entry * free[c] for c, entry in row.items()), -bias)
+        for row, bias in zip(system.rows, system.bias, strict=True)
+    ]
+
+
+def stabilised(system: Constrained, damping: Scalar, stiffness: Scalar) -> list[Scalar]:
+    """J M⁻¹ Q − γ + damping Φ̇ + stiffness Φ."""
+    parts = zip(free_residual(system), system.rate, system.violation, strict=True)
+    return [free + damping * rate + stiffness * off for free, rate, off in parts]
+
+
+def inverse_masses(masses: list[Scalar]) -> list[Scalar]:
+    """The diagonal of M⁻¹."""
+    return [1.0 / mass for mass in masses]
+
+
+def exact_multipliers(system: Constrained, right: list[Scalar] | None = None) -> list[Scalar]:
+    """λ with (J M⁻¹ Jᵀ) λ = right, the free residual unless given."""
+    right = free_residual(system) if right is None else right
+    return solve(factorise(gram(system.rows, inverse_masses(system.masses))), right)
+
+
+def applied_impulse(rows: list[Row], weights: list[Scalar], multipliers: list[Scalar]) -> Row:
+    """−W Jᵀ μ, for the coordinates that any constraint knows."""
+    moves: Row = {}
+    for row, value in zip(rows, multipliers, strict=True):
+        for c, entry in row.items():
+            move = -weights[c] * entry * value
+            moves[c] = moves[c] + move if c in moves else move
+    return moves
+
+
+def projection(rows: list[Row], weights: list[Scalar], residual: list[Scalar]) -> Row:
+    """−W Jᵀ(J W Jᵀ)⁻¹ r for a diagonal W."""
+    return applied_impulse(rows, weights, solve(factorise(gram(rows, weights)), residual))

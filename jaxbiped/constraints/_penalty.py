@@ -1,0 +1,43 @@
+"""The penalty method: the paper's "penalty"."""
+
+from typing import ClassVar
+
+import equinox as eqx
+
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
+from jaxbiped.constraints._penalised import check_penalty, penalty_system
+from jaxbiped.linalg._symmetric import solve
+
+
+class Penalty(AbstractConstraintMethod):
+    """(M + A JᵀJ) q̈ = Q − A Jᵀ(J̇ q̇ + 2 ζ ω Φ̇ + ω² Φ): stiff springs in place of constraints.
+
+    What holds the joint is λ = A (Φ̈ + 2 ζ ω Φ̇ + ω² Φ), so a loaded joint is open by about
+    λ/(A ω²), and accelerations and forces are off by a share of 1/(A s), s ≈ 1/m an eigenvalue of
+    J M⁻¹ Jᵀ: 2e-11 at the walker's hip. The A of 1e7 kg that is usual elsewhere belongs to solving
+    with M + A JᵀJ, which a larger one makes ill-conditioned. Here 1/A is added to J M⁻¹ Jᵀ, which
+    it cannot harm; the larger A is, the nearer is `Baumgarte` with a = ζ ω and b = ω. Constraints
+    that say the same twice share the load, to A s roundings.
+
+    Source: the seed paper, section 4, "penalty"; Bayo, García de Jalón and Serna (1988).
+
+    Attributes:
+        A: penalty [kg].
+        omega: ω, the frequency at which a violation decays [1/s].
+        zeta: ζ, its damping [–].
+
+    Raises:
+        ArgumentError: A not above 0, or ω or ζ below 0.
+    """
+
+    A: Parameter = eqx.field(converter=as_float, default=1e10)
+    omega: Parameter = eqx.field(converter=as_float, default=10.0)
+    zeta: Parameter = eqx.field(converter=as_float, default=1.0)
+    needs_independent: ClassVar[bool] = False
+
+    def __check_init__(self) -> None:
+        check_penalty(self.A, self.omega, self.zeta)
+
+    def multipliers(self, system: Constrained) -> list[Scalar]:
+        return solve(*penalty_system(system, self.A, self.omega, self.zeta))

@@ -1,0 +1,76 @@
+"""Projection of coordinates and rates onto the constraints."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+
+from jaxbiped._types import Scalar
+from jaxbiped.constraints._constraint_method import (
+    AbstractProjectingMethod,
+    Row,
+    applied_impulse,
+    gram,
+    inverse_masses,
+)
+from jaxbiped.constraints._linkage import Linkage
+from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of, row_times
+from jaxbiped.linalg._symmetric import factorise, solve
+
+_ITERATIONS = 12
+"""Of the search for the nearest consistent state: a tenth of a metre is taken off to rounding."""
+
+
+def correct_step(
+    linkage: Linkage,
+    method: AbstractProjectingMethod,
+    q: Sequence[Scalar],
+    v: Sequence[Scalar],
+) -> tuple[list[Scalar], list[Scalar]]:
+    """Coordinates and rates corrected as a method does after each step.
+
+    Plain arithmetic, a fixed number of times: derivatives pass through as exactly as values.
+    """
+    masses, q, v = masses_of(linkage), list(q), list(v)
+    for _ in range(method.iterations):
+        at = constraints_of(linkage, q, v)
+        q = _add(q, method.step_back(masses, at.rows, at.violation))
+    at = constraints_of(linkage, q, v)
+    return q, _add(v, method.step_back(masses, at.rows, at.rate))
+
+
+@eqx.filter_jit
+def nearest_consistent(
+    linkage: Linkage, q: Sequence[Scalar], v: Sequence[Scalar]
+) -> tuple[list[Scalar], list[Scalar]]:
+    """The consistent coordinates and rates nearest in the mass metric.
+
+    min Δqᵀ M Δq with Φ(q + Δq) = 0: each iteration solves it with the constraints linearised where
+    the last one ended, so that what it converges to is nearest to the start and not only near.
+    """
+    weights, origin = inverse_masses(masses_of(linkage)), list(q)
+
+    def least(rows: list[Row], residual: list[Scalar]) -> Row:
+        # Shifted by nearly nothing, so that constraints that say the same twice share.
+        matrix = gram(rows, weights)
+        shift = 1e-14 * sum((matrix[i][i] for i in range(1, len(matrix))), matrix[0][0])
+        return applied_impulse(
+            rows, weights, solve(factorise(gram(rows, weights, shift)), residual)
+        )
+
+    def nearer(_: Any, q: list[Scalar]) -> list[Scalar]:
+        at = constraints_of(linkage, q, v)
+        gone = [a - b for a, b in zip(q, origin, strict=True)]
+        left = [off - row_times(row, gone) for off, row in zip(at.violation, at.rows, strict=True)]
+        return _add(origin, least(at.rows, left))
+
+    if not linkage.joints:
+        return origin, list(v)
+    found = jax.lax.fori_loop(0, _ITERATIONS, nearer, origin)
+    at = constraints_of(linkage, found, v)
+    return found, _add(v, least(at.rows, at.rate))
+
+
+def _add(values: Sequence[Scalar], moves: Row) -> list[Scalar]:
+    return [value + moves[i] if i in moves else value for i, value in enumerate(values)]

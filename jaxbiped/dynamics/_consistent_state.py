@@ -1,0 +1,120 @@
+"""Consistent redundant states: on their constraints after each step, and at the start."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from jaxbiped._checks import ArgumentError, holds_somewhere
+from jaxbiped._types import Scalar
+from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
+from jaxbiped.constraints._linkage_constraints import masses_of
+from jaxbiped.constraints._projection import correct_step, nearest_consistent
+from jaxbiped.dynamics._bristle_state import state_for
+from jaxbiped.dynamics._redundant_motion import (
+    Violation,
+    coordinates_of,
+    violation,
+    with_coordinates,
+)
+from jaxbiped.dynamics._redundant_state import (
+    EulerState,
+    RedundantState,
+    is_redundant,
+    redundant_state,
+)
+from jaxbiped.dynamics._state import check_leaves
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
+
+FURTHEST = Violation(position=0.01, rate=0.1, normalisation=0.01)
+"""A start that is further off its constraints is refused [m, m/s, –]."""
+
+
+class Consistent(NamedTuple):
+    """A start on its constraints, and by how much it was not.
+
+    Attributes:
+        state: the consistent state nearest in the mass metric.
+        violation: of the start that was given.
+        position: how far it was moved, √(Δqᵀ M Δq / total mass) [m].
+        velocity: the same of its velocities [m/s].
+    """
+
+    state: Any
+    violation: Violation
+    position: Scalar
+    velocity: Scalar
+
+
+def project(scene: RedundantScene, state: Any) -> Any:
+    """The state as the scene's method corrects it after each step; differentiable.
+
+    Raises:
+        ArgumentError: a method that does not project.
+    """
+    method = scene.method
+    if not isinstance(method, AbstractProjectingMethod):
+        raise ArgumentError(
+            f"method = {type(method).__name__} is not allowed here: it does not project."
+        )
+    q, v = coordinates_of(scene, state)
+    return with_coordinates(state, *correct_step(scene.linkage, method, q, v))
+
+
+def consistent_state(
+    scene: RedundantScene, state: Any, *, furthest: Violation = FURTHEST
+) -> Consistent:
+    """The consistent state nearest to a start, least in the mass metric.
+
+    Args:
+        scene: whose legs are joined.
+        state: start; a `State` is made a redundant one, and needs no correction.
+        furthest: a start that violates its constraints by more is refused.
+
+    Returns:
+        The state, and how much was corrected; leaves shaped as the state's.
+
+    Raises:
+        ArgumentError: not a state of the scene's kind, an entry that is not finite, leaves of
+            different shapes, or a start too far off. What is being traced is not refused.
+    """
+    state = _check_state_of_scene(scene, state)
+    off = violation(scene, state)
+    units = {"position": "m", "rate": "m/s", "normalisation": "(no unit)"}
+    for name, unit in units.items():
+        value, bound = getattr(off, name), getattr(furthest, name)
+        if holds_somewhere(value > bound):
+            raise ArgumentError(
+                f"state violates its constraints by {float(jnp.max(value)):.3g} {unit} "
+                f"({name}), which is too far to correct: at most {float(bound):g} is allowed."
+            )
+    q, v = coordinates_of(scene, state)
+    masses = masses_of(scene.linkage)
+    new_q, new_v = nearest_consistent(scene.linkage, q, v)
+
+    def size(new: list[Scalar], old: list[Scalar]) -> Scalar:
+        moved = [m * (a - b) ** 2 for m, a, b in zip(masses, new, old, strict=True)]
+        return jnp.sqrt(sum(moved[1:], moved[0]) / scene.walker.total_mass)
+
+    return Consistent(with_coordinates(state, new_q, new_v), off, size(new_q, q), size(new_v, v))
+
+
+def _check_state_of_scene(scene: RedundantScene, state: Any) -> Any:
+    if not is_redundant(state):
+        return redundant_state(scene, state_for(scene.scene, state))
+    kind = EulerState if scene.orientation == "euler" else RedundantState
+    if not isinstance(state, kind):
+        raise ArgumentError(
+            f"state is a {type(state).__name__}, but orientation = {scene.orientation!r} needs a "
+            f"{kind.__name__}."
+        )
+    remembers = isinstance(scene.friction, AbstractBristleLaw)
+    if remembers and state.bristle_1 is None:
+        straight = jnp.zeros_like(state.x_1)
+        state = state._replace(bristle_1=straight, bristle_2=straight)
+    if not remembers and state.bristle_1 is not None:
+        raise ArgumentError(
+            f"state has bristles, but friction = {type(scene.friction).__name__} has none: leave "
+            "them None."
+        )
+    return check_leaves(state, "state")

@@ -1,0 +1,53 @@
+"""Default initial guess of a search."""
+
+import functools
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._bristle_state import BristleState, state_type
+from jaxbiped.dynamics._feet import standing_height
+from jaxbiped.dynamics._rigid_state import rigid_state
+from jaxbiped.dynamics._state import State, seed_state
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene._walker import Walker
+
+
+def default_guess(scene: Any) -> Any:
+    """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight."""
+    seed, own = _seed()
+    if isinstance(scene, RigidScene):
+        pace = jnp.sqrt(scene.ground.g / scene.walker.l * own.walker.l / own.ground.g)
+        rates = dict(omega_1=seed.omega_1 * pace, omega_2=seed.omega_2 * pace)
+        return jax.tree.map(as_float, rigid_state(seed)._replace(**rates))
+    size = scene.walker.l / own.walker.l
+    pace = jnp.sqrt(scene.ground.g / own.ground.g / size)
+    depth = (standing_height(own, seed.theta_2) - seed.hip_z) * size
+
+    def reach(walker: Walker) -> tuple[Scalar, Scalar]:
+        return walker.hip_to_foot * jnp.cos(seed.theta_2) + walker.r, walker.hip_to_foot
+
+    (forward, up), (own_forward, own_up) = reach(scene.walker), reach(own.walker)
+    fitted = seed._replace(
+        hip_z=standing_height(scene, seed.theta_2, depth),
+        hip_vx=seed.hip_vx * forward / own_forward * pace,
+        hip_vz=seed.hip_vz * up / own_up * pace,
+        omega_1=seed.omega_1 * pace,
+        omega_2=seed.omega_2 * pace,
+    )
+    start: State = jax.tree.map(as_float, fitted)
+    if state_type(scene) is BristleState:
+        straight = jnp.zeros_like(start.hip_x)
+        return BristleState(**start._asdict(), bristle_1=straight, bristle_2=straight)
+    return start
+
+
+@functools.cache
+def _seed() -> tuple[State, Scene]:
+    """The seed's start and its scene, of plain numbers, which take no time to make."""
+    with jax.ensure_compile_time_eval():
+        return jax.tree.map(float, (seed_state(), seed_scene()))

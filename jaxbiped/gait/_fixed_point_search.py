@@ -1,0 +1,174 @@
+"""Fixed points of the return map: the search for a periodic orbit."""
+
+import enum
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.gait._newton import (
+    Method,
+    Progress,
+    Stage,
+    initial_progress,
+    newton_iteration,
+    select,
+)
+from jaxbiped.gait._poincare_map import (
+    LinearisedReturn,
+    linearised_return,
+    recurring_components,
+    seed_directions,
+    state_with,
+)
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._soundness import is_sound
+from jaxbiped.variational._solve_to_section import Precision
+
+LOOSER = 10.0
+"""How much looser the search is solved before its end, and the witness of its error."""
+ROUGH = Precision(3e-6, 3e-4)
+"""How exactly the search is solved until it is near."""
+
+
+class Search(enum.IntEnum):
+    """How a search ended. `str(search)` is its name in words.
+
+    - found: the orbit returns to within the residual asked for.
+    - no return: the first return already ended in a misfortune (its `Ending` tells which).
+    - not converged: no step reduced the residual any more, or the evaluations allowed were used up.
+    - no walk: an orbit returns, but with a foot deep underground or a step uphill, and no other
+      was found. A search from a guess does not tell.
+    """
+
+    FOUND = 0
+    NO_RETURN = 1
+    NOT_CONVERGED = 2
+    NO_WALK = 3
+
+    def __str__(self) -> str:
+        return self.name.lower().replace("_", " ")
+
+
+class Found(NamedTuple):
+    """A fixed point, or the best that was found instead.
+
+    Attributes:
+        ending: code of a `Search`.
+        code: that of the `Ending` of the last return that did not return, 0 for none.
+        recurring: the m recurring components.
+        residual: largest of their changes over a cycle; infinite where nothing returned.
+        both: the return from there, and a looser one near there that is the witness of its error,
+            one behind the other.
+        evaluations: how often the return map was evaluated.
+        history: residual of each evaluation, shape (max_evaluations,), NaN beyond the last.
+        sound: whether the orbit is a walk (see `is_sound`).
+    """
+
+    ending: Scalar
+    code: Scalar
+    recurring: Scalar
+    residual: Scalar
+    both: LinearisedReturn
+    evaluations: Scalar
+    history: Scalar
+    sound: Scalar
+
+    @property
+    def last(self) -> LinearisedReturn:
+        """The return from the fixed point."""
+        return jax.tree.map(lambda leaf: leaf[0], self.both)
+
+    @property
+    def coarse(self) -> LinearisedReturn:
+        """The looser one."""
+        return jax.tree.map(lambda leaf: leaf[1], self.both)
+
+
+Run = Callable[[Scalar, Scalar, Scalar], LinearisedReturn]
+"""The return from recurring components, as exactly as a stage wants, or none where idle."""
+
+
+def search(
+    spec: ReturnMapSpec,
+    args: PyTree,
+    active: tuple[int, ...],
+    guess: PyTree,
+    precision: Precision,
+    method: Method,
+    wanted: Any = True,
+) -> Found:
+    """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely.
+
+    Not at all where not `wanted`.
+    """
+    first = recurring_components(spec.system, guess)
+    off = jnp.abs(spec.section.value(args, guess))
+    run = _runner(spec, args, active, guess, precision)
+    shape: LinearisedReturn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
+    nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
+    begin = initial_progress(first, off, method, nothing)
+    stage = jnp.where(wanted, begin.stage, int(Stage.STUCK))
+    end = _iterate(run, begin._replace(stage=stage), method)
+    ending = jnp.where(
+        end.stage == Stage.FOUND,
+        int(Search.FOUND),
+        jnp.where(end.stage == Stage.NO_RETURN, int(Search.NO_RETURN), int(Search.NOT_CONVERGED)),
+    )
+    return Found(
+        ending=ending,
+        code=end.code,
+        recurring=end.base,
+        residual=end.base_residual,
+        both=jax.tree.map(lambda *pair: jnp.stack(pair), end.base_return, end.coarse),
+        evaluations=end.evaluations,
+        history=end.history,
+        sound=_with_soundness(spec, args, guess, end),
+    )
+
+
+def _with_soundness(spec: ReturnMapSpec, args: PyTree, guess: PyTree, end: Progress) -> Scalar:
+    state, last = state_with(spec.system, guess, end.base), end.base_return
+    # Not every system has a component that drifts.
+    return is_sound(args, state, jnp.sum(last.advance), last.period)
+
+
+def _runner(
+    spec: ReturnMapSpec,
+    args: PyTree,
+    active: tuple[int, ...],
+    guess: PyTree,
+    precision: Precision,
+) -> Run:
+    """Turns with derivatives by the state, and once it is near by the `active` parameters."""
+    seeds, _ = seed_directions(args, active, len(recurring_components(spec.system, guess)))
+    coarse = Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
+
+    def run(trial: Scalar, stage: Scalar, idle: Scalar) -> LinearisedReturn:
+        wanted = Precision(
+            *(
+                jnp.where(stage == Stage.FINE, a, jnp.where(stage == Stage.COARSE, b, c))
+                for a, b, c in zip(precision, coarse, ROUGH, strict=True)
+            )
+        )
+        start = state_with(spec.system, guess, trial)
+        return linearised_return(spec, seeds, start, wanted, idle, steered=stage >= Stage.COARSE)
+
+    return run
+
+
+def _iterate(run: Run, begin: Progress, method: Method) -> Progress:
+    """Searches on until it has ended or the evaluations are used up."""
+
+    def goes_on(now: Progress) -> Scalar:
+        return (now.stage < Stage.FOUND) & (now.evaluations < method.evaluations_allowed)
+
+    def advance(now: Progress) -> Progress:
+        on = goes_on(now)
+        latest = run(now.trial, now.stage, ~on)
+        return select(on, newton_iteration(now, latest, method), now)
+
+    return jax.lax.while_loop(goes_on, advance, begin)

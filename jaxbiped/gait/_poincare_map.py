@@ -1,0 +1,250 @@
+"""Poincaré map: one return to the section, with its Jacobian."""
+
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.solve._units import recurring_inverse_units
+from jaxbiped.variational._hybrid_system import AbstractSystem
+from jaxbiped.variational._section_by_lanes import solve_to_section_by_lanes
+from jaxbiped.variational._solve_to_section import (
+    Nodes,
+    Precision,
+    SectionArrival,
+    solve_to_section,
+)
+from jaxbiped.variational._switch_locator import Watch
+from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
+
+STATE_FLOOR = 0.1
+"""Size below which errors of derivatives by the state are absolute, in the scene's units."""
+PARAMETER_FLOOR = 1e-4
+"""The same by the logarithm of a parameter: small sensitivities are wanted to digits as well."""
+
+
+class LinearisedReturn(NamedTuple):
+    """One return. With m recurring components, p parameters and n = m + p directions:
+
+    Attributes:
+        recurring: the m components that must return.
+        jacobian: their derivatives on the section, shape (m, n).
+        monodromy: their derivatives at a fixed time, shape (m, n).
+        velocity: their rates where the cycle ends, shape (m,).
+        period: duration [s]; `period_row` its derivatives, shape (n,).
+        advance: what the cyclic coordinates gained, shape (d,); `advance_rows` (d, n).
+        peak: largest load; `peak_row` (n,). Zeros where the system has none.
+        code: 0 or that of an `Ending`.
+        attempted: solver steps attempted.
+        jumps: crossings where the vector field itself jumped; `missed` of them had no correction.
+        nodes: the ends of the steps of each passage, leaves (steps, …), where saved.
+    """
+
+    recurring: Scalar
+    jacobian: Scalar
+    monodromy: Scalar
+    velocity: Scalar
+    period: Scalar
+    period_row: Scalar
+    advance: Scalar
+    advance_rows: Scalar
+    peak: Scalar
+    peak_row: Scalar
+    code: Scalar
+    attempted: Scalar
+    jumps: Scalar
+    missed: Scalar
+    nodes: Nodes | None
+
+
+def recurring_indices(system: AbstractSystem, y: PyTree) -> list[int]:
+    """Positions of the leaves that must return."""
+    return [i for i in range(len(jtu.tree_leaves(y))) if i not in system.cyclic_coordinates]
+
+
+def recurring_components(system: AbstractSystem, y: PyTree) -> Scalar:
+    """The components that must return, shape (m,)."""
+    leaves = jtu.tree_leaves(y)
+    return jnp.stack([leaves[i] for i in recurring_indices(system, y)])
+
+
+def state_with(system: AbstractSystem, like: PyTree, recurring: Scalar) -> PyTree:
+    """A state with these recurring components, and zero for the drifting ones."""
+    leaves, structure = jtu.tree_flatten(like)
+    places = recurring_indices(system, like)
+    zero = jnp.zeros_like(recurring[0])
+    filled = [recurring[places.index(i)] if i in places else zero for i in range(len(leaves))]
+    return jtu.tree_unflatten(structure, filled)
+
+
+def seed_directions(args: PyTree, active: tuple[int, ...], m: int) -> tuple[Seeded, Scalar]:
+    """Seeds for m directions of state and then one for each active parameter.
+
+    A parameter moves by its size (its logarithm by one), by one where that is 0. Also sizes, (p,).
+    """
+    leaves = jtu.tree_leaves(args)
+    values = [jax.lax.stop_gradient(leaves[i]) for i in active]
+    sizes = jnp.stack([jnp.where(v == 0.0, 1.0, v) for v in values]) if values else jnp.zeros(0)
+    seeds = jnp.concatenate([jnp.zeros((len(active), m)), jnp.diag(sizes)], axis=1)
+    by_state = STATE_FLOOR * recurring_inverse_units(args, m)
+    floors = jnp.concatenate([by_state, jnp.full(len(active), PARAMETER_FLOOR)])
+    return Seeded(args, seeds, floors, active), sizes
+
+
+@eqx.filter_jit  # for its trace cache
+def linearised_return(
+    spec: ReturnMapSpec,
+    args: Seeded,
+    y: PyTree,
+    precision: Precision,
+    idle: Any,
+    *,
+    steered: Any = True,
+) -> LinearisedReturn:
+    """Follows the orbit from `y` for one cycle, with derivatives; nothing where `idle`.
+
+    Where not `steered`, derivatives by parameters choose no steps, and lanes do without them.
+    """
+    places = recurring_indices(spec.system, y)
+    count, n = len(jtu.tree_leaves(y)), args.seeds.shape[1]
+    start = jnp.zeros((count, n)).at[jnp.asarray(places), jnp.arange(len(places))].set(1.0)
+    watch = _watch_for(spec, args.args, y)
+    limit = jnp.where(idle, 0.0, spec.time_limit)
+
+    def one(
+        before: tuple[Tangents, Scalar], _: None
+    ) -> tuple[tuple[Tangents, Scalar], tuple[SectionArrival, Scalar, Scalar]]:
+        y0, failed = before
+        y0 = _entry_coordinates(spec, y0, args)
+        within = jnp.where(failed != 0, 0.0, limit)
+        found = _next_passage(spec, watch, y0, args, precision, within, steered)
+        found = _exit_coordinates(spec, found, args)
+        state, moved = along_columns(lambda s, a: spec.system.reset_map(a, s), found.y, args)
+        on_section = as_columns(moved)
+        # At a fixed time the renewal comes earlier or later, and the motion after it with it.
+        rates = spec.system.vector_field(jnp.zeros(()), state, args.args)
+        velocity = jnp.stack(jtu.tree_leaves(rates))
+        columns = on_section - velocity[:, None] * found.time_columns
+        code = jnp.where(failed != 0, failed, found.code)
+        return (Tangents(state, columns), code), (found, on_section, velocity)
+
+    begin = (Tangents(y, start), jnp.asarray(0))
+    if spec.steps == 1:
+        (end, code), last = one(begin, None)
+        every = jax.tree.map(lambda leaf: leaf[None], last)
+    else:
+        (end, code), every = jax.lax.scan(one, begin, length=spec.steps)
+    passages, on_section, velocity = every
+    return _chain_passages(spec, y, end, code, passages, on_section[-1], velocity[-1])
+
+
+def _watch_for(spec: ReturnMapSpec, args: PyTree, y: PyTree) -> Watch:
+    """What the passages of a cycle land on."""
+    if spec.within is None:
+        return spec.watch(args, y)
+    inside = eqx.filter_eval_shape(redundant_state, args, y)
+    return spec.watch(args, inside, of=spec.within)
+
+
+def _entry_coordinates(spec: ReturnMapSpec, y: Tangents, args: Seeded) -> Tangents:
+    """The start of a passage in the coordinates that it is solved in."""
+    if spec.within is None:
+        return y
+    state, columns = along_columns(lambda s, a: redundant_state(a, s), y, args)
+    return Tangents(state, as_columns(columns))
+
+
+def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) -> SectionArrival:
+    """A passage told in its own coordinates."""
+    if spec.within is None:
+        return found
+    state, columns = along_columns(lambda s, a: minimal_state(a, s), found.y, args)
+    nodes = found.nodes
+    if nodes is not None:
+        structure = jtu.tree_structure(found.y.state)
+
+        def left(rows: Scalar) -> Scalar:
+            inside = jtu.tree_unflatten(structure, list(jnp.moveaxis(rows[..., 1:], -1, 0)))
+            outside = jtu.tree_leaves(minimal_state(args.args, inside))
+            return jnp.stack([rows[..., 0], *outside], axis=-1)
+
+        nodes = Nodes(left(nodes.start), left(nodes.ends), left(nodes.arrival), nodes.steps)
+    return found._replace(y=Tangents(state, as_columns(columns)), nodes=nodes)
+
+
+def _next_passage(
+    spec: ReturnMapSpec,
+    watch: Watch,
+    y0: Tangents,
+    args: Seeded,
+    precision: Precision,
+    limit: Scalar,
+    steered: Any,
+) -> SectionArrival:
+    """The next passage, by the engine that is asked for."""
+    most = spec.max_solver_steps
+    m = args.seeds.shape[1] - len(args.active)
+    if spec.engine == "xla":
+        deaf = (jnp.arange(len(args.floors)) >= m) & ~jnp.asarray(steered)
+        floors = jnp.where(deaf, jnp.inf, args.floors)
+        args = Seeded(args.args, args.seeds, floors, args.active)
+        return solve_to_section(
+            watch,
+            spec.solver,
+            y0,
+            args,
+            precision=precision,
+            time_limit=limit,
+            max_solver_steps=most,
+            save_nodes=True,
+        )
+    sizes = jnp.diagonal(args.seeds[:, m:])
+    return solve_to_section_by_lanes(
+        watch,
+        spec.solver,
+        y0,
+        args,
+        sizes,
+        precision=precision,
+        time_limit=limit,
+        max_solver_steps=most,
+        steered=steered,
+    )
+
+
+def _chain_passages(
+    spec: ReturnMapSpec,
+    y: PyTree,
+    end: Tangents,
+    code: Scalar,
+    passages: SectionArrival,
+    on_section: Scalar,
+    velocity: Scalar,
+) -> LinearisedReturn:
+    places = jnp.asarray(recurring_indices(spec.system, y))
+    cyclic_coordinates = jnp.asarray(spec.system.cyclic_coordinates, dtype=int)
+    before, after = jnp.stack(jtu.tree_leaves(y)), jnp.stack(jtu.tree_leaves(end.state))
+    highest = jnp.argmax(passages.peak)
+    return LinearisedReturn(
+        recurring=after[places],
+        jacobian=on_section[places],
+        monodromy=end.columns[places],
+        velocity=velocity[places],
+        period=jnp.sum(passages.time),
+        period_row=passages.time_columns[-1],
+        advance=(after - before)[cyclic_coordinates],
+        advance_rows=on_section[cyclic_coordinates],
+        peak=passages.peak[highest],
+        peak_row=passages.peak_columns[highest],
+        code=code,
+        attempted=jnp.sum(passages.attempted),
+        jumps=jnp.sum(passages.jumps),
+        missed=jnp.sum(passages.missed),
+        nodes=passages.nodes,
+    )

@@ -1,0 +1,1 @@
+"""Small linear algebra, unrolled: faster on tiny matrices than calls of LAPACK."""

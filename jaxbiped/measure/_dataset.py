@@ -1,0 +1,92 @@
+"""Dataset of a trajectory: labelled, for files and for other programs."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jaxbiped.dynamics._energy import energies
+from jaxbiped.dynamics._feet import feet, touches
+from jaxbiped.dynamics._forces import foot_forces
+from jaxbiped.dynamics._redundant_motion import violation
+from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import xarray
+
+_STATE_UNITS = {
+    "hip_x": "m",
+    "hip_z": "m",
+    "theta_1": "rad",
+    "theta_2": "rad",
+    "hip_vx": "m/s",
+    "hip_vz": "m/s",
+    "omega_1": "rad/s",
+    "omega_2": "rad/s",
+    "bristle_1": "1",
+    "bristle_2": "1",
+}
+
+
+def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset":
+    """States, foot forces, penetrations and energies along a trajectory, labelled, in SI units.
+
+    Variables have the dimension `time` [s]; forces and penetrations also `leg` (1, 2). Attributes
+    hold how the motion ended and every parameter of the scene. Write it with `to_netcdf` (or
+    `to_zarr`, with zarr installed).
+
+    Raises:
+        ValueError: a batch of trajectories.
+    """
+    import xarray
+
+    if np.ndim(trajectory.t) != 1:
+        raise ValueError("This is a batch of trajectories: take one of them at a time.")
+    state = trajectory.state
+    both, forces, held = feet(scene, state), foot_forces(scene, state), energies(scene, state)
+    variables = {
+        name: ("time", np.asarray(value), {"units": _STATE_UNITS[name]})
+        for name, value in minimal_state(scene, state)._asdict().items()
+    }
+    if isinstance(scene, RedundantScene):
+        off = np.asarray(violation(scene, state).position)
+        variables["violation"] = ("time", off, {"units": "m"})
+    for name, value in held._asdict().items():
+        variables[f"{name}_energy"] = ("time", np.asarray(value), {"units": "J"})
+
+    def legs(values: list) -> np.ndarray:
+        return np.stack([np.asarray(value) for value in values])
+
+    per_leg = {
+        "normal_force": (legs([force.normal for force in forces]), "N"),
+        "penetration": (legs([foot.penetration for foot in both]), "m"),
+        "slip_speed": (legs([foot.slip_speed for foot in both]), "m/s"),
+        "touches": (legs([touches(foot) for foot in both]), "1"),
+    }
+    if forces.foot_1.tangential is not None:
+        per_leg["tangential_force"] = (legs([force.tangential for force in forces]), "N")
+    dataset = xarray.Dataset(
+        variables
+        | {
+            name: (("leg", "time"), data, {"units": unit}) for name, (data, unit) in per_leg.items()
+        },
+        coords={"time": ("time", np.asarray(trajectory.t), {"units": "s"}), "leg": [1, 2]},
+    )
+    return dataset.assign_attrs(ending=str(trajectory.outcome), **_parameters(scene))
+
+
+def _parameters(scene: Any) -> dict[str, float | str]:
+    """Every parameter of a scene, and the names of its laws, by dotted path."""
+    found: dict[str, float | str] = {}
+    parts = vars(scene)
+    if isinstance(scene, RedundantScene):
+        parts = vars(scene.scene) | {"method": scene.method}
+        found["orientation"] = scene.orientation
+    for part_name, part in parts.items():
+        found[part_name] = type(part).__name__
+        for name, value in vars(part).items():
+            if value is not None:  # a parameter that the law does without
+                found[f"{part_name}.{name}"] = float(value)
+    return found

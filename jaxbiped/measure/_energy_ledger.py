@@ -1,0 +1,61 @@
+"""The energy ledger: where gravity's work went."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxbiped.dynamics._energy import energies, powers
+from jaxbiped.measure._samples import evaluate_at, sample
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._trajectory import Trajectory
+
+
+class EnergyLedger(NamedTuple):
+    """Gravity's work and where it went, between consecutive times [J]; leaves of shape (n,).
+
+    gravity_work = damper_loss + friction_loss + stored_change + residual. The residual is no
+    physics: it measures the error of the solve.
+
+    Attributes:
+        gravity_work: work of gravity on the walker.
+        damper_loss: lost in the contact's normal direction, including the elastic energy that a
+            foot leaves in the ground when it lets go.
+        friction_loss: lost to friction.
+        stored_change: change of kinetic and elastic energy.
+        residual: what the other four leave open.
+    """
+
+    gravity_work: np.ndarray
+    damper_loss: np.ndarray
+    friction_loss: np.ndarray
+    stored_change: np.ndarray
+    residual: np.ndarray
+
+
+def energy_ledger(
+    scene: Scene, trajectory: Trajectory, times: np.ndarray | None = None
+) -> EnergyLedger:
+    """Ledger between consecutive `times` [s], or (shape (1,)) over the whole trajectory.
+
+    Energies are functions of the state; the works of the contact are integrals of its powers
+    over the continuous solution.
+
+    Raises:
+        ValueError: a trajectory without its continuous solution, or a batch of them.
+    """
+    trajectory.require_dense()
+    ends = np.asarray(trajectory.t)[[0, -1]] if times is None else np.asarray(times)
+    held = evaluate_at(scene, trajectory, energies, ends)
+    flows = sample(scene, trajectory, powers, ends)
+    interval = np.searchsorted(ends, 0.5 * (flows.edges[1:] + flows.edges[:-1])) - 1
+    inside = (interval >= 0) & (interval < len(ends) - 1)
+
+    def between(power: np.ndarray) -> np.ndarray:
+        work = flows.integral(power)
+        return np.bincount(interval[inside], work[inside], minlength=len(ends) - 1)
+
+    gravity = -np.diff(held.gravitational)
+    damper = between(flows.values.indentation) - np.diff(held.elastic)
+    friction = between(flows.values.friction)
+    stored = np.diff(held.kinetic) + np.diff(held.elastic)
+    return EnergyLedger(gravity, damper, friction, stored, gravity - damper - friction - stored)

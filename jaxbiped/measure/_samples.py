@@ -1,0 +1,115 @@
+"""Samples of a trajectory between its steps: values, integrals and moments of change."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._types import as_float
+from jaxbiped.dynamics._state import State
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._dense_output import AT_ONCE, join_parts, split_evenly
+from jaxbiped.solve._trajectory import Trajectory
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+_RESOLUTION = 2.0**48
+"""By how much an interval is narrowed down that holds a change."""
+
+
+class Samples(NamedTuple):
+    """A function of the state sampled on every interval of a trajectory, for integrals over it.
+
+    Attributes:
+        edges: ends of the intervals [s], shape (n + 1,).
+        values: the function at the Gauss points, leaves of shape (n, 5).
+    """
+
+    edges: np.ndarray
+    values: PyTree
+
+    def integral(self, leaf: np.ndarray) -> np.ndarray:
+        """Integral of a leaf of `values` over each interval, shape (n,)."""
+        return np.asarray(np.diff(self.edges) * (leaf @ (0.5 * _WEIGHTS)))
+
+
+def sample(
+    scene: Scene,
+    trajectory: Trajectory,
+    function: Callable[[Scene, State], PyTree],
+    extra: np.ndarray,
+) -> Samples:
+    """Samples `function(scene, state)` between the solver's steps and the `extra` times [s]."""
+    edges = np.unique(np.concatenate([np.asarray(trajectory.t), extra]))
+    middles, halves = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+    times = middles[:, None] + halves[:, None] * _NODES
+    return Samples(edges, evaluate_at(scene, trajectory, function, times))
+
+
+def evaluate_at(
+    scene: Scene,
+    trajectory: Trajectory,
+    function: Callable[[Scene, State], PyTree],
+    times: np.ndarray,
+) -> PyTree:
+    """`function(scene, state)` at times of any shape, as NumPy arrays of that shape."""
+    values = evaluate_along(scene, trajectory.at(np.ravel(times)), function)
+    return jtu.tree_map(lambda leaf: leaf.reshape(times.shape), values)
+
+
+def at_steps(
+    scene: Scene, trajectory: Trajectory, function: Callable[[Scene, State], PyTree]
+) -> PyTree:
+    """`function(scene, state)` at the ends of the solver's steps, as NumPy arrays."""
+    return evaluate_along(scene, trajectory.state, function)
+
+
+def evaluate_along(
+    scene: Scene, state: State, function: Callable[[Scene, State], PyTree]
+) -> PyTree:
+    """`function(scene, state)` at states with leaves of shape (n,), as NumPy arrays."""
+    # With every leaf an array: a plain number would be compiled in.
+    arrays = jtu.tree_map(as_float, scene)
+    leaves, structure = jtu.tree_flatten(state)
+    states = zip(*[split_evenly(np.asarray(leaf)) for leaf in leaves], strict=True)
+    found = [_apply(function, arrays, jtu.tree_unflatten(structure, part)) for part in states]
+    return join_parts(found, len(leaves[0]))
+
+
+def moments_of_change(
+    scene: Scene,
+    trajectory: Trajectory,
+    function: Callable[[Scene, State], PyTree],
+    condition: Callable[[PyTree], np.ndarray],
+    before: np.ndarray,
+    after: np.ndarray,
+) -> np.ndarray:
+    """The times in (before, after) at which a condition changes [s], shape (n,).
+
+    `condition` makes booleans (n, m) of the function's values at m times in each of the n
+    intervals, leaves (n, m); they differ between the two ends.
+    """
+    if before.size == 0:
+        return before
+    among = max(3, AT_ONCE // len(before))
+    shares = np.linspace(0.0, 1.0, among)
+    left, right, rows = before, after, np.arange(len(before))
+    for _ in range(int(np.ceil(np.log(_RESOLUTION) / np.log(among - 1)))):
+        times = left[:, None] + (right - left)[:, None] * shares
+        times[:, -1] = right
+        holds = condition(evaluate_at(scene, trajectory, function, times))
+        changed = holds != holds[:, :1]
+        changed[:, -1] = True
+        first = np.argmax(changed, axis=1)
+        left, right = times[rows, first - 1], times[rows, first]
+    return right
+
+
+@eqx.filter_jit
+def _apply(function: Any, scene: Scene, states: State) -> PyTree:
+    values = function(scene, states)
+    shape = jnp.shape(jtu.tree_leaves(states)[0])
+    return jtu.tree_map(lambda leaf: jnp.broadcast_to(leaf, shape), values)

@@ -1,0 +1,95 @@
+"""Interfaces of the laws of contact: normal force and friction."""
+
+import abc
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._types import Scalar
+
+
+class AbstractNormalLaw(eqx.Module):
+    """Normal force of the ground on a foot as a function of penetration and its rate.
+
+    Attributes:
+        jumps_at_touchdown: whether the force itself, not its derivatives alone, jumps where a
+            foot that comes down begins to touch. A property of the class.
+    """
+
+    jumps_at_touchdown: ClassVar[bool] = False
+
+    @abc.abstractmethod
+    def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
+        """Normal force [N], never negative, zero where `penetration` [m] is not above zero.
+
+        `rate` [m/s] is the rate of penetration, positive while the foot goes in.
+        """
+
+    @abc.abstractmethod
+    def elastic_force(self, penetration: Scalar) -> Scalar:
+        """The part of the force that stores energy [N], as if the foot were held at rest."""
+
+    @abc.abstractmethod
+    def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
+        """Functions whose zeros are where the force's first derivatives jump inside contact.
+
+        None for a law that is smooth for every `penetration` above zero. Touchdown itself is
+        known to everyone and not among them.
+        """
+
+    @abc.abstractmethod
+    def elastic_energy(self, penetration: Scalar) -> Scalar:
+        """Energy stored in the contact [J]: the integral of `elastic_force`."""
+
+
+class AbstractFrictionLaw(eqx.Module):
+    """Tangential force of the ground on a foot as a function of normal force and slip speed.
+
+    Attributes:
+        builds_up_over: name of the parameter that is the slip speed [m/s] over which the force
+            builds up from rest, which steps must resolve; None for a law without one. A property
+            of the class.
+    """
+
+    builds_up_over: ClassVar[str | None] = None
+
+    @abc.abstractmethod
+    def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
+        """Tangential force [N] along the slope, opposing `slip_speed` [m/s]."""
+
+    @abc.abstractmethod
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        """Functions whose zeros are where a first or second derivative by the slip speed jumps."""
+
+
+def power(base: Scalar, exponent: Scalar | float) -> Scalar:
+    """`base ** exponent` for a positive base, with one exponential shared by all derivatives."""
+    return jnp.exp(exponent * jnp.log(base))
+
+
+def depth_in_contact(penetration: Scalar) -> Scalar:
+    """The penetration where above zero, else 1 m: powers of it have finite derivatives."""
+    return jnp.where(penetration > 0.0, penetration, 1.0)
+
+
+def pushing(penetration: Scalar, force: Scalar) -> Scalar:
+    """`force` [N] in contact and where above zero, else zero: no foot is pulled."""
+    return jnp.where((penetration > 0.0) & (force > 0.0), force, 0.0)
+
+
+def hertz_force(stiffness: Scalar, exponent: Scalar | float, penetration: Scalar) -> Scalar:
+    """K δⁿ where δ > 0, else zero [N]; every derivative is finite at δ = 0."""
+    depth = depth_in_contact(penetration)
+    return jnp.where(penetration > 0.0, stiffness * power(depth, exponent), 0.0)
+
+
+def hertz_energy(stiffness: Scalar, exponent: Scalar | float, penetration: Scalar) -> Scalar:
+    """The integral of `hertz_force` over penetration [J]."""
+    return hertz_force(stiffness, exponent, penetration) * penetration / (exponent + 1.0)
+
+
+def smooth_ramp(x: Scalar, width: Scalar) -> Scalar:
+    """Zero up to 0, `x` from `width` on, twice continuously differentiable in between."""
+    t = jnp.clip(x / width, 0.0, 1.0)
+    return x * (t * t * t * (10.0 + t * (6.0 * t - 15.0)))

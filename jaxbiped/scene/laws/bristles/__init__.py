@@ -1,0 +1,1 @@
+"""Bristle friction laws."""

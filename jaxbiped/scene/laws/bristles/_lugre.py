@@ -1,0 +1,70 @@
+"""The LuGre law of friction."""
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._checks import check_not_negative, check_positive
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
+
+
+class LuGre(AbstractBristleLaw):
+    """Bristles with damping and a Stribeck peak, every part in proportion to the load.
+
+    With the deflection z = b/σ0, g(V) = mu_kinetic + (mu_static − mu_kinetic) exp(−(V/v_s)²):
+
+    - ż = V_T − σ0 |V_T| z / g(V_T)
+    - F = F_N (σ0 z + σ1 ż + σ2 V_T)
+
+    Source: Canudas de Wit, Olsson, Åström, Lischinsky, IEEE Trans. Automatic Control 40 (1995);
+    in proportion to the load after Canudas de Wit and Tsiotras (1999). The original has forces in
+    place of coefficients, whose bristles would be infinitely stiff where the load vanishes.
+
+    Attributes (leaves of any batch shape):
+        mu_static: coefficient of slow steady slip [–].
+        mu_kinetic: coefficient of fast slip [–].
+        v_s: Stribeck speed [m/s].
+        sigma_0: stiffness of the bristles for each newton of load [1/m].
+        sigma_1: their damping [s/m].
+        sigma_2: viscous friction [s/m].
+        engaging_load: normal force at which bristles are half in contact [N].
+        relaxation: rate at which they straighten out of contact [1/s].
+
+    Raises:
+        ArgumentError: a coefficient, v_s, sigma_0 or engaging_load not above 0; sigma_1, sigma_2
+            or relaxation below 0.
+    """
+
+    mu_static: Parameter = eqx.field(converter=as_float)
+    mu_kinetic: Parameter = eqx.field(converter=as_float)
+    v_s: Parameter = eqx.field(converter=as_float)
+    sigma_0: Parameter = eqx.field(converter=as_float)
+    sigma_1: Parameter = eqx.field(converter=as_float)
+    sigma_2: Parameter = eqx.field(converter=as_float, default=0.0)
+    engaging_load: Parameter = eqx.field(converter=as_float, default=1.0)
+    relaxation: Parameter = eqx.field(converter=as_float, default=50.0)
+
+    def __check_init__(self) -> None:
+        check_positive("mu_static", self.mu_static)
+        check_positive("mu_kinetic", self.mu_kinetic)
+        check_positive("v_s", self.v_s, "m/s")
+        check_positive("sigma_0", self.sigma_0, "1/m")
+        check_not_negative("sigma_1", self.sigma_1, "s/m")
+        check_not_negative("sigma_2", self.sigma_2, "s/m")
+        check_positive("engaging_load", self.engaging_load, "N")
+        check_not_negative("relaxation", self.relaxation, "1/s")
+
+    def engagement(self) -> tuple[Scalar, Scalar]:
+        return self.engaging_load, self.relaxation
+
+    def rate(self, slip_speed: Scalar, bristle: Scalar) -> Scalar:
+        return self.sigma_0 * self._deflection_rate(slip_speed, bristle)
+
+    def coefficient(self, slip_speed: Scalar, bristle: Scalar) -> Scalar:
+        damping = self.sigma_1 * self._deflection_rate(slip_speed, bristle)
+        return bristle + damping + self.sigma_2 * slip_speed
+
+    def _deflection_rate(self, slip_speed: Scalar, bristle: Scalar) -> Scalar:
+        u = slip_speed / self.v_s
+        steady = self.mu_kinetic + (self.mu_static - self.mu_kinetic) * jnp.exp(-u * u)
+        return slip_speed - jnp.abs(slip_speed) * bristle / steady

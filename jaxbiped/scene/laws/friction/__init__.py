@@ -1,0 +1,1 @@
+"""Friction laws without a state."""

@@ -1,0 +1,52 @@
+"""Ambrósio's friction law."""
+
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._checks import check_not_negative, check_positive
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
+
+
+class Ambrosio(AbstractFrictionLaw):
+    """Dry friction that sets in at v0, rises in proportion and is held from v1 on.
+
+    With F_C = mu F_N and s = |V_T|:
+
+    - s ≤ v0: F = 0
+    - v0 < s < v1: F = F_C (s − v0)/(v1 − v0)
+    - s ≥ v1: F = F_C
+
+    A foot that slips more slowly than v0 slips freely.
+
+    Source: Ambrósio, in Virtual Nonlinear Multibody Systems, NATO Science Series (2003) 57.
+
+    Attributes (leaves of any batch shape):
+        mu: coefficient of friction [–].
+        v0: slip speed up to which there is no friction [m/s].
+        v1: slip speed from which there is all of it [m/s].
+
+    Raises:
+        ArgumentError: mu below 0, v0 not above 0 or v1 not above v0.
+    """
+
+    builds_up_over: ClassVar[str | None] = "v1"
+    mu: Parameter = eqx.field(converter=as_float)
+    v0: Parameter = eqx.field(converter=as_float)
+    v1: Parameter = eqx.field(converter=as_float)
+
+    def __check_init__(self) -> None:
+        check_not_negative("mu", self.mu)
+        check_positive("v0", self.v0, "m/s")
+        check_positive("v1", self.v1, "m/s")
+        check_positive("v1 − v0", self.v1 - self.v0, "m/s")
+
+    def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
+        part = jnp.clip((jnp.abs(slip_speed) - self.v0) / (self.v1 - self.v0), 0.0, 1.0)
+        return -self.mu * normal_force * jnp.sign(slip_speed) * part
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        bounds = (self.v0, self.v1)
+        return (*(slip_speed - v for v in bounds), *(slip_speed + v for v in bounds))

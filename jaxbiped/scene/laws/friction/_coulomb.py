@@ -1,0 +1,36 @@
+"""Coulomb friction, regularised at rest."""
+
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._checks import check_not_negative, check_positive
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
+
+
+class RegularisedCoulomb(AbstractFrictionLaw):
+    """F = mu F_N tanh(V_T / v_d), opposing V_T. Smooth everywhere, no Stribeck peak.
+
+    Attributes (leaves of any batch shape):
+        mu: coefficient of friction [–].
+        v_d: slip speed over which the force builds up [m/s].
+
+    Raises:
+        ArgumentError: mu below 0 or v_d not above 0.
+    """
+
+    builds_up_over: ClassVar[str | None] = "v_d"
+    mu: Parameter = eqx.field(converter=as_float)
+    v_d: Parameter = eqx.field(converter=as_float)
+
+    def __check_init__(self) -> None:
+        check_not_negative("mu", self.mu)
+        check_positive("v_d", self.v_d, "m/s")
+
+    def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
+        return -self.mu * normal_force * jnp.tanh(slip_speed / self.v_d)
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        return ()

@@ -1,0 +1,55 @@
+"""The seed's friction law with its corner at v0 and its kink at rest rounded."""
+
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._checks import check_not_negative, check_positive
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, smooth_ramp
+
+
+class SmoothBengisuAkay(AbstractFrictionLaw):
+    """`BengisuAkay` made twice continuously differentiable, with the same four parameters.
+
+    With u = V_T/v0, F_S = mu_static F_N and F_C = mu_kinetic F_N:
+
+    - |u| < 1: F = F_S (15 u − 10 u³ + 3 u⁵)/8, odd, with slope 15/8 at rest (the original's: 2)
+    - |u| ≥ 1: F = F_C + (F_S − F_C) exp(−xi R(s − v0)), R a C² ramp from zero that equals its
+      argument from v0 on.
+
+    From 2 v0 on it is the original. README, "Smooth laws", tells how much it changes the gait.
+
+    Attributes (leaves of any batch shape):
+        mu_static: static coefficient, reached at v0 [–].
+        mu_kinetic: kinetic coefficient, reached far above v0 [–].
+        v0: slip speed of the peak [m/s].
+        xi: Stribeck rate, the decay above v0 [s/m].
+
+    Raises:
+        ArgumentError: a coefficient or xi below 0, or v0 not above 0.
+    """
+
+    builds_up_over: ClassVar[str | None] = "v0"
+    mu_static: Parameter = eqx.field(converter=as_float)
+    mu_kinetic: Parameter = eqx.field(converter=as_float)
+    v0: Parameter = eqx.field(converter=as_float)
+    xi: Parameter = eqx.field(converter=as_float)
+
+    def __check_init__(self) -> None:
+        check_not_negative("mu_static", self.mu_static)
+        check_not_negative("mu_kinetic", self.mu_kinetic)
+        check_positive("v0", self.v0, "m/s")
+        check_not_negative("xi", self.xi, "s/m")
+
+    def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
+        u = jnp.clip(slip_speed / self.v0, -1.0, 1.0)
+        rise = u * (1.875 + u * u * (0.375 * u * u - 1.25))
+        beyond = smooth_ramp(jnp.abs(slip_speed) - self.v0, self.v0)
+        decay = jnp.exp(-self.xi * beyond)
+        level = self.mu_kinetic + (self.mu_static - self.mu_kinetic) * decay
+        return -normal_force * rise * level
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        return ()

@@ -1,0 +1,65 @@
+"""Friction with an exponential Stribeck curve and a viscous part."""
+
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._checks import check_not_negative, check_positive
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
+from jaxbiped.scene.laws.friction._stribeck_curve import stribeck_coefficient, stribeck_switches
+
+
+class Stribeck(AbstractFrictionLaw):
+    """Friction that falls from static to kinetic and rises again with the speed of slip.
+
+    F = F_N (μ tanh(V_T/v_d) + k_v V_T), opposing V_T, with
+    μ = mu_kinetic + (mu_static − mu_kinetic) exp(−(|V_T|/v_s)^p).
+
+    The tanh regularises rest. Where v_d is well below v_s (p = 2) the peak lies at a few v_d and
+    reaches all but mu_static. The viscous part is proportional to the load, so that it fades with
+    contact. For p = 1 the second derivative jumps at rest and for p < 1 it is without bound there;
+    above, the law has no switch.
+
+    Source: Bo and Pavelescu, Wear 82 (1982) 277; Armstrong-Hélouvry, Dupont and Canudas de Wit,
+    Automatica 30 (1994) 1083.
+
+    Attributes (leaves of any batch shape):
+        mu_static: static coefficient, which the curve starts from [–].
+        mu_kinetic: kinetic coefficient, which the curve falls to [–].
+        v_s: Stribeck speed, over which it falls [m/s].
+        p: exponent of the fall, usually from 0.5 to 2 [–].
+        k_v: viscous friction per load and slip speed [s/m].
+        v_d: slip speed over which friction builds up from rest [m/s].
+
+    Raises:
+        ArgumentError: a coefficient or k_v below 0, or v_s, p or v_d not above 0.
+    """
+
+    builds_up_over: ClassVar[str | None] = "v_d"
+    mu_static: Parameter = eqx.field(converter=as_float)
+    mu_kinetic: Parameter = eqx.field(converter=as_float)
+    v_s: Parameter = eqx.field(converter=as_float)
+    p: Parameter = eqx.field(converter=as_float)
+    k_v: Parameter = eqx.field(converter=as_float)
+    v_d: Parameter = eqx.field(converter=as_float)
+
+    def __check_init__(self) -> None:
+        check_not_negative("mu_static", self.mu_static)
+        check_not_negative("mu_kinetic", self.mu_kinetic)
+        check_positive("v_s", self.v_s, "m/s")
+        check_positive("p", self.p)
+        check_not_negative("k_v", self.k_v, "s/m")
+        check_positive("v_d", self.v_d, "m/s")
+
+    def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
+        coefficient = stribeck_coefficient(
+            self.mu_static, self.mu_kinetic, self.v_s, self.p, slip_speed
+        )
+        dry = coefficient * jnp.tanh(slip_speed / self.v_d)
+        return -normal_force * (dry + self.k_v * slip_speed)
+
+    def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
+        """Rest, where p ≤ 1."""
+        return stribeck_switches(self.p, slip_speed)

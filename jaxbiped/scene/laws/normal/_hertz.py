@@ -1,0 +1,97 @@
+"""Hertz's law of elastic contact."""
+
+from typing import Self
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._checks import check_at_least, check_positive, check_within
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, hertz_energy, hertz_force
+from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
+
+
+class Hertz(AbstractNormalLaw):
+    """F_N = K δⁿ while δ > 0: elastic, without damping.
+
+    Attributes (leaves of any batch shape):
+        K: contact stiffness [N/mⁿ]; `hertz_stiffness` gives it from materials.
+        n: exponent [–].
+
+    Raises:
+        ArgumentError: K not above 0 or n below 1.
+    """
+
+    K: Parameter = eqx.field(converter=as_float)
+    n: Parameter = eqx.field(converter=as_float, default=1.5)
+
+    def __check_init__(self) -> None:
+        check_positive("K", self.K, "N/m^n")
+        check_at_least("n", self.n, "1", 1.0)
+
+    @classmethod
+    def from_weight(
+        cls, *, mass: Parameter, penetration: Parameter, g: Parameter = 9.8, n: Parameter = 1.5
+    ) -> Self:
+        """The law that carries the weight of `mass` [kg] at `penetration` [m].
+
+        Args:
+            mass: what stands on the law [kg].
+            penetration: how deep it stands [m].
+            g: gravitational acceleration [m/s²].
+            n: exponent [–].
+
+        Raises:
+            ArgumentError: mass, penetration or g not above 0, or n below 1.
+        """
+        K, _ = matched_to_weight(mass=mass, penetration=penetration, g=g, n=n)
+        return cls(K=K, n=n)
+
+    def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
+        return self.elastic_force(penetration)
+
+    def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
+        return ()
+
+    def elastic_force(self, penetration: Scalar) -> Scalar:
+        return hertz_force(self.K, self.n, penetration)
+
+    def elastic_energy(self, penetration: Scalar) -> Scalar:
+        return hertz_energy(self.K, self.n, penetration)
+
+
+def hertz_stiffness(
+    *,
+    radius: Parameter,
+    modulus: Parameter,
+    poisson: Parameter,
+    ground_modulus: Parameter,
+    ground_poisson: Parameter,
+) -> Scalar:
+    """Stiffness K of the contact of a sphere with a plane, for the exponent 3/2 [N/m^1.5].
+
+    K = 4/3 E* √R with 1/E* = (1 − ν₁²)/E₁ + (1 − ν₂²)/E₂.
+
+    Source: Hertz 1882; Johnson, Contact Mechanics (1985), chapter 4.
+
+    Args:
+        radius: of the sphere, R [m].
+        modulus: Young's modulus of the sphere, E₁ [Pa].
+        poisson: Poisson's ratio of the sphere, ν₁ [–].
+        ground_modulus: Young's modulus of the plane, E₂ [Pa].
+        ground_poisson: Poisson's ratio of the plane, ν₂ [–].
+
+    Raises:
+        ArgumentError: a radius or modulus not above 0, or a Poisson's ratio that no isotropic
+            material has: not above −1, or above 1/2.
+    """
+    radius, modulus, poisson, ground_modulus, ground_poisson = (
+        as_float(value) for value in (radius, modulus, poisson, ground_modulus, ground_poisson)
+    )
+    check_positive("radius", radius, "m")
+    check_positive("modulus", modulus, "Pa")
+    check_within("poisson", poisson, -1.0, 0.5, open_below=True)
+    check_positive("ground_modulus", ground_modulus, "Pa")
+    check_within("ground_poisson", ground_poisson, -1.0, 0.5, open_below=True)
+    compliance = (1.0 - poisson**2) / modulus + (1.0 - ground_poisson**2) / ground_modulus
+    return 4.0 / 3.0 * jnp.sqrt(radius) / compliance

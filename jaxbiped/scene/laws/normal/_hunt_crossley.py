@@ -1,0 +1,119 @@
+"""Hunt and Crossley's law and those of its family, which differ in one factor."""
+
+from typing import Self
+
+import equinox as eqx
+
+from jaxbiped._checks import check_at_least, check_choice, check_not_negative, check_positive
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.scene.laws._abstract_laws import (
+    AbstractNormalLaw,
+    depth_in_contact,
+    hertz_energy,
+    hertz_force,
+    power,
+    pushing,
+)
+from jaxbiped.scene.laws.normal._restitution import RESTITUTION_FORMULAS
+from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
+
+
+class HuntCrossley(AbstractNormalLaw):
+    """F_N = K δⁿ (1 + hysteresis δ̇) while δ > 0, never below zero (no adhesion).
+
+    The literature writes χ/v⁻ for the hysteresis, with a factor χ that depends on the restitution
+    and the approach speed v⁻. In a walker v⁻ is a state of the contact and no constant, so here
+    the quotient is the parameter; `from_restitution` gives it from both. The reaction reaches
+    zero at δ̇ = −1/hysteresis; a foot that nothing pulls out never gets so fast.
+
+    Source: Hunt and Crossley, Journal of Applied Mechanics 42 (1975) 440.
+
+    Attributes (leaves of any batch shape):
+        K: contact stiffness [N/mⁿ].
+        hysteresis: damping over stiffness, χ/v⁻ [s/m].
+        n: exponent [–].
+
+    Raises:
+        ArgumentError: K not above 0, hysteresis below 0 or n below 1.
+    """
+
+    K: Parameter = eqx.field(converter=as_float)
+    hysteresis: Parameter = eqx.field(converter=as_float)
+    n: Parameter = eqx.field(converter=as_float, default=1.5)
+
+    def __check_init__(self) -> None:
+        check_positive("K", self.K, "N/m^n")
+        check_not_negative("hysteresis", self.hysteresis, "s/m")
+        check_at_least("n", self.n, "1", 1.0)
+
+    @classmethod
+    def from_restitution(
+        cls,
+        *,
+        K: Parameter,
+        e: Parameter,
+        approach_speed: Parameter,
+        formula: str = "flores",
+        n: Parameter = 1.5,
+    ) -> Self:
+        """The law meant to give the restitution `e` to an impact at `approach_speed`.
+
+        How near the restitution of such an impact comes to e depends on the formula: for
+        e = 0.5 from 0.47 (Flores) to 0.80 (Lee and Wang).
+
+        Args:
+            K: contact stiffness [N/mⁿ].
+            e: coefficient of restitution [–], up to 1; above 0 for a formula that divides by it.
+            approach_speed: rate of penetration at touchdown, v⁻ [m/s].
+            formula: one of `RESTITUTION_FORMULAS`.
+            n: exponent [–].
+
+        Raises:
+            ArgumentError: an unknown formula, an e that it does not allow, K or approach_speed
+                not above 0, or n below 1.
+        """
+        check_choice("formula", formula, RESTITUTION_FORMULAS)
+        speed = as_float(approach_speed)
+        check_positive("approach_speed", speed, "m/s")
+        return cls(K=K, hysteresis=RESTITUTION_FORMULAS[formula](e) / speed, n=n)
+
+    @classmethod
+    def from_weight(
+        cls,
+        *,
+        mass: Parameter,
+        penetration: Parameter,
+        damping_ratio: Parameter,
+        g: Parameter = 9.8,
+        n: Parameter = 1.5,
+    ) -> Self:
+        """The law on which a mass stands and oscillates as told.
+
+        Args:
+            mass: what stands on the law [kg].
+            penetration: how deep it stands [m].
+            damping_ratio: of small oscillations about that [–].
+            g: gravitational acceleration [m/s²].
+            n: exponent [–].
+
+        Raises:
+            ArgumentError: mass, penetration or g not above 0, damping_ratio below 0, n below 1.
+        """
+        K, damper = matched_to_weight(
+            mass=mass, penetration=penetration, damping_ratio=damping_ratio, g=g, n=n
+        )
+        return cls(K=K, hysteresis=damper / (as_float(mass) * as_float(g)), n=n)
+
+    def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
+        depth = depth_in_contact(penetration)
+        return pushing(penetration, self.K * power(depth, self.n) * (1.0 + self.hysteresis * rate))
+
+    def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
+        """The reaction over K δⁿ."""
+        return (1.0 + self.hysteresis * rate,)
+
+    def elastic_force(self, penetration: Scalar) -> Scalar:
+        return hertz_force(self.K, self.n, penetration)
+
+    def elastic_energy(self, penetration: Scalar) -> Scalar:
+        return hertz_energy(self.K, self.n, penetration)

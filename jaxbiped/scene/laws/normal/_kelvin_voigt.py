@@ -1,0 +1,75 @@
+"""Kelvin and Voigt's law: a linear spring beside a linear damper."""
+
+from typing import ClassVar, Self
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._checks import check_not_negative, check_positive
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, pushing
+from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
+
+
+class KelvinVoigt(AbstractNormalLaw):
+    """F_N = K δ + D δ̇ while δ > 0, never below zero (no adhesion).
+
+    The damper acts at once, so the force jumps by D δ̇ at touchdown: `jumps_at_touchdown`. It
+    comes back to zero at δ̇ = −(K/D) δ, while the foot is still indented.
+
+    Source: Goldsmith, Impact (1960).
+
+    Attributes (leaves of any batch shape):
+        K: contact stiffness [N/m].
+        D: contact damping [N·s/m].
+
+    Raises:
+        ArgumentError: K not above 0 or D below 0.
+    """
+
+    K: Parameter = eqx.field(converter=as_float)
+    D: Parameter = eqx.field(converter=as_float)
+
+    jumps_at_touchdown: ClassVar[bool] = True
+
+    def __check_init__(self) -> None:
+        check_positive("K", self.K, "N/m")
+        check_not_negative("D", self.D, "N s/m")
+
+    @classmethod
+    def from_weight(
+        cls,
+        *,
+        mass: Parameter,
+        penetration: Parameter,
+        damping_ratio: Parameter,
+        g: Parameter = 9.8,
+    ) -> Self:
+        """The law on which a mass stands and oscillates as told.
+
+        Args:
+            mass: what stands on the law [kg].
+            penetration: how deep it stands [m].
+            damping_ratio: of small oscillations about that [–].
+            g: gravitational acceleration [m/s²].
+
+        Raises:
+            ArgumentError: mass, penetration or g not above 0, or damping_ratio below 0.
+        """
+        K, damper = matched_to_weight(
+            mass=mass, penetration=penetration, damping_ratio=damping_ratio, g=g, n=1.0
+        )
+        return cls(K=K, D=damper)
+
+    def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
+        return pushing(penetration, self.K * penetration + self.D * rate)
+
+    def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
+        """The reaction before the clamp; out of contact, its limit at touchdown."""
+        return (self.elastic_force(penetration) + self.D * rate,)
+
+    def elastic_force(self, penetration: Scalar) -> Scalar:
+        return jnp.where(penetration > 0.0, self.K * penetration, 0.0)
+
+    def elastic_energy(self, penetration: Scalar) -> Scalar:
+        return 0.5 * self.elastic_force(penetration) * penetration

@@ -1,0 +1,71 @@
+"""The seed's normal law with its two corners rounded."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped._checks import check_at_least, check_not_negative, check_positive
+from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.scene.laws._abstract_laws import (
+    AbstractNormalLaw,
+    hertz_energy,
+    hertz_force,
+    smooth_ramp,
+)
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_GAUSS = [(0.5 * (1.0 + float(x)), 0.5 * float(w)) for x, w in zip(_NODES, _WEIGHTS, strict=True)]
+
+
+class SmoothRistowSchafer(AbstractNormalLaw):
+    """`RistowSchafer` made twice continuously differentiable, with the same K, c and n.
+
+    Penetration passes through a C² ramp of width `depth_width` and the force through one of
+    width `force_width`; above both widths the law is the original, and it is exactly zero out of
+    contact. README, "Smooth laws", tells how much that changes the gait.
+
+    Attributes (leaves of any batch shape):
+        K: contact stiffness [N/mⁿ].
+        c: contact damping [N·s/m²].
+        n: exponent [–].
+        depth_width: penetration over which touchdown is rounded [m].
+        force_width: force over which the clamp at zero is rounded [N].
+
+    Raises:
+        ArgumentError: K or a width not above 0, c below 0 or n below 1.
+    """
+
+    K: Parameter = eqx.field(converter=as_float)
+    c: Parameter = eqx.field(converter=as_float)
+    n: Parameter = eqx.field(converter=as_float, default=1.5)
+    depth_width: Parameter = eqx.field(converter=as_float, default=1e-5)
+    force_width: Parameter = eqx.field(converter=as_float, default=1.0)
+
+    def __check_init__(self) -> None:
+        check_positive("K", self.K, "N/m^n")
+        check_not_negative("c", self.c, "N s/m^2")
+        check_at_least("n", self.n, "1", 1.0)
+        check_positive("depth_width", self.depth_width, "m")
+        check_positive("force_width", self.force_width, "N")
+
+    def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
+        depth = smooth_ramp(penetration, self.depth_width)
+        force = hertz_force(self.K, self.n, depth) + self.c * depth * rate
+        return smooth_ramp(force, self.force_width)
+
+    def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
+        return ()
+
+    def elastic_force(self, penetration: Scalar) -> Scalar:
+        return hertz_force(self.K, self.n, smooth_ramp(penetration, self.depth_width))
+
+    def elastic_energy(self, penetration: Scalar) -> Scalar:
+        # On the ramp by quadrature (the integrand is smooth there), above it in closed form.
+        width = jnp.asarray(self.depth_width)
+        inside = penetration < width
+        upper = jnp.where(inside, jnp.maximum(penetration / width, 0.0), 1.0)
+        on_ramp = sum(
+            weight * upper * self.elastic_force(node * upper * width) for node, weight in _GAUSS
+        )
+        above = hertz_energy(self.K, self.n, jnp.where(inside, width, penetration))
+        return width * on_ramp + above - hertz_energy(self.K, self.n, width)

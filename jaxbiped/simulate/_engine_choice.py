@@ -1,0 +1,72 @@
+"""Choice of the engine that runs a simulation."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.solve._engine import ENGINES, engine_for
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+
+
+def choose_engine(
+    engine: str,
+    *,
+    solver: Any,
+    save_steps: bool,
+    adjoint: Any,
+    leaves: Any,
+    times: Any,
+    section: AbstractSection | None,
+    extremes: Any,
+    dt: Any = None,
+    redundant: bool = False,
+) -> str:
+    """The engine that "auto" stands for, or the one that is asked for.
+
+    Raises:
+        ArgumentError: an unknown name, or lanes for what they cannot do.
+    """
+    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(leaves))
+    obstacle = _hindrance(solver, save_steps, adjoint, leaves, times, traced=traced)
+    if redundant or dt is not None:
+        what = "redundant coordinates are" if redundant else "steps of one size (dt) are"
+        obstacle = f"{what} diffrax's"
+    by_diffrax = redundant or dt is not None
+    by_lanes_only = _by_lanes_only(section, None if by_diffrax else extremes)
+    if by_lanes_only is None:
+        return engine_for(engine, obstacle=obstacle, prefers_xla=traced)
+    check_choice("engine", engine, ENGINES)
+    if engine == "xla" or obstacle is not None:
+        why = f"here {obstacle}" if obstacle is not None else 'engine = "xla" was chosen'
+        raise ArgumentError(f"{by_lanes_only} is not allowed here: only lanes do that, and {why}.")
+    return "lanes"
+
+
+def _by_lanes_only(section: AbstractSection | None, extremes: Any) -> str | None:
+    """What is asked for that only lanes can do."""
+    if section is not None:
+        return f"save = {type(section).__name__}()"
+    return None if extremes is None else "extremes"
+
+
+def _hindrance(
+    solver: Any, save_steps: bool, adjoint: Any, leaves: Any, times: Any, *, traced: bool
+) -> str | None:
+    """Why lanes cannot do what is asked."""
+    if not isinstance(solver, AbstractRosenbrock):
+        return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
+    if save_steps and traced:
+        return 'under jit, vmap or derivatives it does not save every step (save="steps")'
+    if adjoint is not None:
+        return "an adjoint is diffrax's"
+    if isinstance(times, jax.core.Tracer):
+        return "the times to save at must be known beforehand"
+    if isinstance(times, AbstractSection) and jtu.tree_leaves(times):
+        return f"the section {type(times).__name__} holds numbers of its own"
+    if any(jnp.result_type(leaf) != jnp.float64 for leaf in jtu.tree_leaves(leaves)):
+        return "it computes in 64 bits"
+    return None

@@ -1,0 +1,244 @@
+"""Adaptive solve of a scene as a program for lanes: the same method as through diffrax.
+
+Rounding differs, and it decides on step sizes after a few steps: the steps are not the same.
+"""
+
+import contextlib
+from typing import Any, NamedTuple
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.compiler import Program
+from jaxbiped.dynamics._bristle_state import state_type
+from jaxbiped.dynamics._minimal_motion import vector_field
+from jaxbiped.dynamics._state import State
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve._ending import ending_code, ending_events
+from jaxbiped.solve._final_step import clip_step
+from jaxbiped.solve._fusion_barrier import without_barriers
+from jaxbiped.solve._saved_outputs import LastStep, Saved
+from jaxbiped.solve._units import Units
+from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
+from jaxbiped.solve.controllers._step_control import first_step, step_control
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, step_of
+
+_TERM: Any = diffrax.ODETerm(vector_field)
+
+
+class Solve(NamedTuple):
+    """One simulation's inputs; every leaf a 64-bit floating-point number.
+
+    Attributes:
+        scene, state: what to simulate and from where.
+        duration: simulated time [s]; from `almost` on, a step that would end there ends it.
+        rtol, atol: tolerances, the absolute one in `units`.
+        units: of the state's leaves and of time.
+        footsteps: after which to end, 0 for no limit.
+        patience: time [s] that counts as waiting for footsteps in vain.
+        most_attempts: cap on the solver's steps.
+    """
+
+    scene: Scene
+    state: State
+    duration: Any
+    almost: Any
+    rtol: Any
+    atol: Any
+    units: Units
+    footsteps: Any
+    patience: Any
+    most_attempts: Any
+
+
+class Solved(NamedTuple):
+    """One simulation's outputs: the last state and time, how it ended, and its steps.
+
+    `lowest` and `highest` are the extremes of what was asked for, None where nothing was.
+    """
+
+    t: Any
+    state: State
+    ending: Any
+    accepted: Any
+    rejected: Any
+    lowest: PyTree = None
+    highest: PyTree = None
+
+
+class _Now(NamedTuple):
+    """What is carried from attempt to attempt; as diffrax's loop has it."""
+
+    t: Scalar
+    next_t: Scalar
+    state: State
+    control: Any
+    accepted: Scalar
+    rejected: Scalar
+    events: tuple[Scalar, ...]
+    counted: Scalar
+    last: LastStep | None
+    extremes: tuple[PyTree, PyTree] | None
+
+
+class AdaptiveSolve:
+    """The functions of a `Program` that solves a `Solve`.
+
+    Attributes:
+        solver: its steps.
+        watch: misfortunes that end it.
+        counting: whether footsteps are counted.
+        saved: what is saved.
+        fenced: whether XLA is to compile it, and not lanes (see `fenced`).
+    """
+
+    def __init__(
+        self,
+        solver: AbstractRosenbrock,
+        watch: tuple[str, ...],
+        *,
+        counting: bool,
+        saved: Saved,
+        fenced: bool = False,
+    ) -> None:
+        self.solver, self.counting, self.saved, self.fenced = solver, counting, saved, fenced
+        self.events = ending_events(watch)
+
+    def program(self) -> Program:
+        """The program."""
+        return Program(
+            self.start,
+            self.attempt,
+            self.finish,
+            record=self.record if self.saved.within else None,
+            scheduled=self.saved.times,
+        )
+
+    def start(self, solve: Solve) -> _Now:
+        zero, none = jnp.zeros_like(solve.duration), jnp.asarray(False)
+        next_t, control = self._controller(solve).init(
+            _TERM,
+            zero,
+            solve.duration,
+            solve.state,
+            first_step(solve.duration, solve.units.time),
+            solve.scene,
+            None,
+            self._error_order(),
+        )
+        count = jnp.zeros((), dtype=jnp.int64)
+        last = self.saved.first(solve.state, self.solver) if self.saved.within else None
+        events = tuple([none] * len(self.events))
+        extremes = None
+        if self.saved.extremes is not None:
+            values = _numbers(self.saved.extremes(solve.scene, solve.state))
+            extremes = (values, values)
+        return _Now(zero, next_t, solve.state, control, count, count, events, none, last, extremes)
+
+    def attempt(self, solve: Solve, now: _Now) -> tuple[_Now, Scalar]:
+        with contextlib.nullcontext() if self.fenced else without_barriers():
+            y1, error, dense = step_of(
+                self.solver.tableau, _TERM, now.t, now.next_t, now.state, solve.scene
+            )
+        error = jtu.tree_map(lambda e: jnp.where(jnp.isnan(e), jnp.inf, e), error)
+        keep, t, next_t, _, control, result = self._controller(solve).adapt_step_size(
+            now.t, now.next_t, now.state, y1, solve.scene, error, self._error_order(), now.control
+        )
+        t, next_t = clip_step(keep, t, next_t, solve.duration, solve.almost)
+        state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), y1, now.state)
+        one = jnp.where(keep, 1, 0)
+        events, none = [], jnp.asarray(True)
+        for happens in self.events.values():
+            happened = jnp.asarray(happens(t, state, solve.scene))
+            events.append(happened & none)
+            none = none & ~happened
+        counted = jnp.asarray(result != diffrax.RESULTS.successful)
+        last = now.last
+        if last is not None:
+            last = self.saved.following(
+                solve.scene,
+                last,
+                began=(now.t, now.state),
+                ended=state,
+                keep=keep,
+                moving=now.accepted > 0,
+                dense=dense,
+            )
+        after = _Now(
+            t=t,
+            next_t=next_t,
+            state=state,
+            control=control,
+            accepted=now.accepted + one,
+            rejected=now.rejected + (1 - one),
+            events=tuple(events),
+            counted=counted,
+            last=last,
+            extremes=self._extremes(solve.scene, now, keep, state),
+        )
+        attempts = (after.accepted + after.rejected).astype(solve.most_attempts.dtype)
+        over = (t >= solve.duration) | (attempts >= solve.most_attempts) | ~none | counted
+        return after, over
+
+    def finish(self, solve: Solve, now: _Now) -> Solved:
+        done = (now.t >= solve.duration) | now.counted
+        if self.counting:
+            _, _, count = now.control
+            few = count.astype(solve.footsteps.dtype) < solve.footsteps
+            done = done & ~(few & (solve.duration >= solve.patience))
+        code = ending_code(
+            dict(zip(self.events, now.events, strict=True)),
+            done=done,
+            out_of_steps=jnp.asarray(True),
+        )
+        low, high = (None, None) if now.extremes is None else now.extremes
+        return Solved(now.t, now.state, code, now.accepted, now.rejected, low, high)
+
+    def record(self, solve: Solve, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
+        """See `Saved.record`."""
+        assert now.last is not None
+        return self.saved.record(
+            solve.scene, now.last, now=(now.t, now.state), due=time, solver=self.solver
+        )
+
+    def _extremes(
+        self, scene: Scene, now: _Now, keep: Scalar, state: State
+    ) -> tuple[PyTree, PyTree] | None:
+        if now.extremes is None or self.saved.extremes is None:
+            return None
+        values = _numbers(self.saved.extremes(scene, state))
+
+        def chosen(combine: Any, old: PyTree) -> PyTree:
+            return jtu.tree_map(lambda a, b: jnp.where(keep, combine(a, b), a), old, values)
+
+        low, high = now.extremes
+        return chosen(jnp.minimum, low), chosen(jnp.maximum, high)
+
+    def _controller(self, solve: Solve) -> Any:
+        control: Any = step_control(solve.rtol, solve.atol, rms_norm, solve.units)
+        if not self.counting:
+            return control
+        limit: Any = solve.footsteps
+        return FootstepLimit.around(control, limit)
+
+    def _error_order(self) -> Any:
+        return self.solver.error_order(_TERM)
+
+
+def _numbers(values: PyTree) -> PyTree:
+    return jtu.tree_map(lambda x: jnp.asarray(x, dtype=jnp.float64), values)
+
+
+def shapes_of(scene: Scene) -> Solve:
+    """The shapes of one simulation's inputs, for a scene of these laws."""
+    number: Any = jax.ShapeDtypeStruct((), jnp.float64)
+    scene = jtu.tree_map(lambda _: number, scene)
+    kind = state_type(scene)
+    state = kind(*[number] * len(kind._fields))
+    numbers = dict.fromkeys(Solve._fields[2:], number) | {"units": Units(state, number)}
+    return Solve(scene, state, **numbers)

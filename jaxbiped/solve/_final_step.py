@@ -1,0 +1,33 @@
+"""Final steps of a solve: how they meet its end, as diffrax has it."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped._types import Scalar
+
+_CLIPPED_ULPS = 100
+"""A step that would end this near the end, in units in the last place, ends there."""
+
+
+def just_before_end(duration: Scalar) -> Scalar:
+    """The time from which on a step that would end there ends at `duration`, as diffrax has it.
+
+    Units are counted in the bits of the 64-bit number, which are in the numbers' own order: as
+    many steps to the number before would take XLA seconds to compile.
+    """
+    bits = jax.lax.bitcast_convert_type(duration, jnp.int64)
+    below = jnp.where(duration > 0.0, bits - _CLIPPED_ULPS, bits + _CLIPPED_ULPS)
+    # Numbers below the least normal one count for none.
+    nothing = -np.finfo(np.float64).tiny * (1.0 + (_CLIPPED_ULPS - 1) * np.finfo(np.float64).eps)
+    earlier = jax.lax.bitcast_convert_type(below, jnp.float64)
+    return jnp.where(duration == 0.0, nothing, earlier)
+
+
+def clip_step(
+    keep: Scalar, t: Scalar, next_t: Scalar, end: Scalar, almost_end: Scalar
+) -> tuple[Scalar, Scalar]:
+    """The times at which the next step begins and ends, once it comes near `end`."""
+    t = jnp.minimum(t, end)
+    last = jnp.where(keep, end, t + 0.5 * (end - t))
+    return t, jnp.where(next_t > almost_end, last, next_t)

@@ -1,0 +1,82 @@
+"""Step control: how steps are chosen, the same for every solve of the project."""
+
+from collections.abc import Callable
+from typing import Any
+
+import diffrax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.solve._units import Units
+
+_FIRST_STEP = 1e-5
+"""First step tried, in units of time; a start that is not a number must not choose it."""
+_SMALLEST_STEP = 1e-12
+"""Step size, in units of time, that is taken whatever its error: how a jump of the force is
+crossed."""
+_SAFETY = 0.8
+"""Of the step size that the error estimate allows. At diffrax's 0.9 the contact's switches reject
+so many steps that the same error takes more of them."""
+
+
+def step_control(
+    rtol: Any, atol: Any, norm: Callable[[Any], Any], units: Units | None = None
+) -> Any:
+    """The controller of step sizes for these tolerances, errors measured by `norm`.
+
+    Args:
+        rtol, atol: tolerances; the absolute one in units of each leaf.
+        norm: of the errors in units of the tolerance.
+        units: of the state's leaves and of time; SI unless given.
+    """
+    time = 1.0 if units is None else units.time
+    control = diffrax.PIDController(
+        rtol=rtol,
+        atol=atol,
+        norm=norm,
+        dtmin=_SMALLEST_STEP * time,
+        safety=_SAFETY,
+        force_dtmin=True,  # a state that is no longer a number ends the solve in another way
+    )
+    return control if units is None else InUnits(rtol, atol, norm, control, units.inverse)
+
+
+def first_step(duration: Scalar, time_unit: Any = 1.0) -> Scalar:
+    """The first step to try [s] in a solve of at most `duration` [s]."""
+    return jnp.minimum(jnp.full_like(duration, _FIRST_STEP) * time_unit, duration)
+
+
+class InUnits(diffrax.AbstractAdaptiveStepSizeController):
+    """Wraps a controller; shows it states and errors in units of their own.
+
+    Attributes:
+        rtol, atol, norm: the controller's own, where diffrax looks for them.
+        controller: decides every step's size.
+        inverse: one over the unit of each leaf of the state.
+    """
+
+    rtol: Any
+    atol: Any
+    norm: Callable[[PyTree], Any]
+    controller: Any
+    inverse: PyTree
+
+    def wrap(self, direction: Any) -> "InUnits":
+        """As diffrax asks; direction makes no difference here."""
+        return self
+
+    def init(self, *request: Any) -> Any:
+        """The first step's end and the controller's state, as diffrax asks."""
+        return self.controller.init(*request)
+
+    def adapt_step_size(
+        self, t0: Any, t1: Any, y0: Any, y1_candidate: Any, args: Any, y_error: Any, *rest: Any
+    ) -> Any:
+        """Accepts or rejects a step, as diffrax asks."""
+        before, after, error = (
+            jtu.tree_map(lambda leaf, inverse: leaf * inverse, y, self.inverse)
+            for y in (y0, y1_candidate, y_error)
+        )
+        return self.controller.adapt_step_size(t0, t1, before, after, args, error, *rest)

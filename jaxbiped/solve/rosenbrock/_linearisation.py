@@ -1,0 +1,235 @@
+"""Linearisation of a vector field: value, exact Jacobian, and (I − g J)⁻¹ on vectors."""
+
+import abc
+import math
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import equinox as eqx
+import jax
+import jax.extend
+import jax.flatten_util
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.linalg._elimination import Entry, Matrix, inverse, matmul
+from jaxbiped.solve.rosenbrock._sparsity import Structure, structure_of
+
+Components: TypeAlias = list[Any]
+"""A point of the state space: its scalars one by one, or one vector that holds them all."""
+
+_MOST_SCALARS = 24
+"""Up to this size a Jacobian is eliminated scalar by scalar; beyond, as one dense matrix."""
+
+
+class AbstractLinearisation(eqx.Module):
+    """A vector field that can be linearised about one point, its state split into components."""
+
+    @abc.abstractmethod
+    def evaluate(self, t: Scalar, y: Components) -> Components:
+        """The vector field at any point."""
+
+    @abc.abstractmethod
+    def time_derivative(self) -> Components:
+        """∂f/∂t at the point of linearisation; None for a component that has none."""
+
+    @abc.abstractmethod
+    def jacobian(self) -> Any:
+        """J = ∂f/∂y at the point of linearisation, in a form of its own."""
+
+    @abc.abstractmethod
+    def factorise(self, jacobian: Any, step: Scalar) -> Any:
+        """What `solve_kept` needs of I − step J."""
+
+    @abc.abstractmethod
+    def solve_kept(
+        self,
+        factors: Any,
+        jacobian: Any,
+        step: Scalar,
+        right: Components,
+        direct_right: dict[int, Scalar],
+    ) -> Components:
+        """The kept components of (I − step J)⁻¹ r.
+
+        `right` holds r of the kept components, `direct_right` of the direct ones.
+        """
+
+    @abc.abstractmethod
+    def direct(self) -> dict[int, int]:
+        """Components whose rate *is* another, kept component, each with that one."""
+
+    @abc.abstractmethod
+    def kept(self) -> list[int]:
+        """The other components, which remain when the direct ones are eliminated."""
+
+
+def split(
+    y: PyTree,
+) -> tuple[Components, Callable[[Components], PyTree]]:
+    """The components of `y` and the map back."""
+    leaves, structure = jtu.tree_flatten(y)
+    if sum(jnp.size(leaf) for leaf in leaves) > _MOST_SCALARS:
+        vector, unravel = jax.flatten_util.ravel_pytree(y)
+        return [vector], lambda components: unravel(components[0])
+    shapes = [jnp.shape(leaf) for leaf in leaves]
+    scalars: Components = []
+    for leaf in leaves:
+        scalars.extend([leaf] if jnp.ndim(leaf) == 0 else list(jnp.ravel(leaf)))
+
+    def join(components: Components) -> PyTree:
+        rest = iter(components)
+        joined = []
+        for shape in shapes:
+            if shape == ():
+                joined.append(next(rest))
+            else:
+                parts = [next(rest) for _ in range(math.prod(shape))]
+                joined.append(jnp.stack(parts).reshape(shape))
+        return jtu.tree_unflatten(structure, joined)
+
+    return scalars, join
+
+
+def linearise(
+    field: Callable[[Scalar, Components], Components], t: Scalar, y: Components
+) -> AbstractLinearisation:
+    """Linearises a vector field of components (as `split` makes them) about (t, y)."""
+    if len(y) == 1 and jnp.ndim(y[0]) == 1:
+        return _DenseLinearisation(lambda t, y: field(t, [y])[0], t, y[0])
+    program = jax.make_jaxpr(lambda t, *y: field(t, list(y)))(t, *y)
+    run = jax.extend.core.jaxpr_as_fun(program)
+    return _ScalarLinearisation(run, structure_of(program), t, tuple(y))
+
+
+class _DenseLinearisation(AbstractLinearisation):
+    """One vector, one dense matrix."""
+
+    field: Callable[[Scalar, Any], Any]
+    t: Scalar
+    y: Any
+
+    def evaluate(self, t: Scalar, y: Components) -> Components:
+        return [self.field(t, y[0])]
+
+    def time_derivative(self) -> Components:
+        one = jnp.ones_like(self.t)
+        return [jax.jvp(lambda t: self.field(t, self.y), (self.t,), (one,))[1]]
+
+    def jacobian(self) -> Any:
+        return jax.jacfwd(lambda y: self.field(self.t, y))(self.y)
+
+    def factorise(self, jacobian: Any, step: Scalar) -> Any:
+        identity = jnp.eye(self.y.size, dtype=self.y.dtype)
+        return jax.scipy.linalg.lu_factor(identity - step * jacobian)
+
+    def solve_kept(
+        self,
+        factors: Any,
+        jacobian: Any,
+        step: Scalar,
+        right: Components,
+        direct_right: dict[int, Scalar],
+    ) -> Components:
+        return [jax.scipy.linalg.lu_solve(factors, right[0])]
+
+    def direct(self) -> dict[int, int]:
+        return {}
+
+    def kept(self) -> list[int]:
+        return [0]
+
+
+class _ScalarLinearisation(AbstractLinearisation):
+    """Scalars one by one, with what is zero by structure left out.
+
+    A component whose rate *is* another component, as a position's rate is a velocity, is
+    eliminated by hand: its row of (I − g J) u = r reads u_i = r_i + g u_j. A second-order system
+    of n coordinates so costs an n × n elimination, not 2n × 2n.
+    """
+
+    run: Callable[..., list[Any]]
+    structure: Structure
+    t: Scalar
+    y: tuple[Any, ...]
+
+    def evaluate(self, t: Scalar, y: Components) -> Components:
+        return self.run(t, *y)
+
+    def time_derivative(self) -> Components:
+        return self._column(0)
+
+    def jacobian(self) -> Matrix:
+        columns = [self._column(1 + j) for j in range(len(self.y))]
+        return [list(row) for row in zip(*columns, strict=True)]
+
+    def factorise(self, jacobian: Matrix, step: Scalar) -> list[list[Scalar]]:
+        return inverse(_reduced_matrix(jacobian, self.direct(), self.kept(), step))
+
+    def solve_kept(
+        self,
+        factors: list[list[Scalar]],
+        jacobian: Matrix,
+        step: Scalar,
+        right: Components,
+        direct_right: dict[int, Scalar],
+    ) -> Components:
+        reduced = []
+        for i, own in zip(self.kept(), right, strict=True):
+            entries = [(jacobian[i][p], value) for p, value in direct_right.items()]
+            terms = [entry * value for entry, value in entries if entry is not None]
+            reduced.append(own + step * sum(terms[1:], terms[0]) if terms else own)
+        return matmul(factors, reduced)
+
+    def direct(self) -> dict[int, int]:
+        direct: dict[int, int] = {}
+        for i, copied in enumerate(self.structure.copies):
+            source = None if copied is None else copied - 1
+            if source is None or source < 0 or source == i:
+                continue
+            if source not in direct and i not in direct.values():
+                direct[i] = source
+        return direct
+
+    def kept(self) -> list[int]:
+        direct = self.direct()
+        return [i for i in range(len(self.y)) if i not in direct]
+
+    def _column(self, position: int) -> list[Entry]:
+        """Derivatives of all rates with respect to one input (0: time, 1 on: components)."""
+        inputs = [self.t, *self.y]
+        if not any(position in used for used in self.structure.depends):
+            return [None] * len(self.y)
+
+        def along(value: Scalar) -> list[Any]:
+            return self.run(*inputs[:position], value, *inputs[position + 1 :])
+
+        _, tangents = jax.jvp(along, (inputs[position],), (jnp.ones_like(inputs[position]),))
+        return [
+            tangent if position in used else None
+            for tangent, used in zip(tangents, self.structure.depends, strict=True)
+        ]
+
+
+def _reduced_matrix(
+    jacobian: Matrix, direct: dict[int, int], kept: list[int], step: Scalar
+) -> Matrix:
+    """I − g J with the direct components eliminated."""
+    matrix: Matrix = []
+    for i in kept:
+        row: list[Entry] = []
+        for j in kept:
+            entry = jacobian[i][j]
+            for position, source in direct.items():
+                indirect = jacobian[i][position]
+                if source == j and indirect is not None:
+                    entry = step * indirect if entry is None else entry + step * indirect
+            scaled = None if entry is None else step * entry
+            if i == j:
+                row.append(jnp.ones_like(step) if scaled is None else 1.0 - scaled)
+            else:
+                row.append(None if scaled is None else -scaled)
+        matrix.append(row)
+    return matrix

@@ -1,0 +1,287 @@
+"""Rosenbrock methods as diffrax solvers: implicit steps without iterations."""
+
+import functools
+import operator
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
+
+import diffrax
+import equinox as eqx
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from equinox.internal import ω
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.solve.rosenbrock._linearisation import (
+    AbstractLinearisation,
+    Components,
+    linearise,
+    split,
+)
+
+if TYPE_CHECKING:
+    from typing import ClassVar as AbstractClassVar
+else:
+    from equinox import AbstractClassVar
+
+Row: TypeAlias = tuple[float, ...]
+
+
+class RosenbrockTableau(NamedTuple):
+    """Coefficients of a stiffly accurate Rosenbrock method, in the form without products by J.
+
+    With W = I − h γ J and f_t = ∂f/∂t, the stages are
+    W u_i = γ (h f(t + α_i h, y + Σ_j a_ij u_j) + Σ_j c_ij u_j + γ_i h² f_t).
+    The last stage's argument plus u_s is the new value.
+
+    Source of the form: Hairer and Wanner, Solving Ordinary Differential Equations II, eq. IV.7.25.
+
+    Attributes:
+        gamma: diagonal coefficient γ.
+        a: rows a_ij of the stages from the second on.
+        c: rows c_ij of the stages from the second on.
+        alpha: times α_i of the stages.
+        gammas: coefficients γ_i of the time derivative.
+        dense: rows that make the coefficients of the dense output from the stages.
+        error: weights that make the error estimate from the stages; u_s where left empty.
+    """
+
+    gamma: float
+    a: tuple[Row, ...]
+    c: tuple[Row, ...]
+    alpha: Row
+    gammas: Row
+    dense: tuple[Row, ...]
+    error: Row = ()
+
+
+class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
+    """Dense output of a Rosenbrock step.
+
+    With θ = (t − t0)/(t1 − t0): y = (1 − θ) y0 + θ (y1 + (1 − θ)(k_1 + θ (k_2 + θ k_3 …))).
+    """
+
+    t0: Any  # type: ignore[misc]
+    t1: Any  # type: ignore[misc]
+    y0: PyTree
+    y1: PyTree
+    coefficients: tuple[PyTree, ...]
+
+    def evaluate(self, t0: Any, t1: Any = None, left: bool = True) -> PyTree:
+        del left
+        if t1 is not None:
+            return (self.evaluate(t1) ** ω - self.evaluate(t0) ** ω).ω
+        length = self.t1 - self.t0
+        fraction = (t0 - self.t0) / jnp.where(length == 0.0, 1.0, length)
+
+        def value(y0: Scalar, y1: Scalar, *coefficients: Scalar) -> Scalar:
+            theta = jnp.asarray(fraction, dtype=y0.dtype)
+            inner = coefficients[-1]
+            for coefficient in reversed(coefficients[:-1]):
+                inner = coefficient + theta * inner
+            return (1.0 - theta) * y0 + theta * (y1 + (1.0 - theta) * inner)
+
+        return jtu.tree_map(value, self.y0, self.y1, *self.coefficients)
+
+
+class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):
+    """A Rosenbrock method: every step solves a few linear systems with one exact Jacobian.
+
+    Works on any pytree of real arrays. Where the leaves are scalars, entries of the Jacobian
+    that are zero by structure are left out, and a second-order system is reduced to the size of
+    its velocities. A subclass only declares its tableau and order.
+    """
+
+    tableau: AbstractClassVar[RosenbrockTableau]
+    term_structure: ClassVar = diffrax.AbstractTerm
+    interpolation_cls: ClassVar[Callable[..., RosenbrockInterpolation]] = RosenbrockInterpolation
+
+    def init(self, terms: Any, t0: Any, t1: Any, y0: PyTree, args: PyTree) -> None:
+        """Rosenbrock methods carry nothing from step to step."""
+        return None
+
+    def func(self, terms: Any, t0: Any, y0: PyTree, args: PyTree) -> PyTree:
+        """The vector field at a point."""
+        return terms.vf(t0, y0, args)
+
+    def step(
+        self,
+        terms: Any,
+        t0: Any,
+        t1: Any,
+        y0: PyTree,
+        args: PyTree,
+        solver_state: None,
+        made_jump: Any,
+    ) -> tuple[PyTree, PyTree, dict[str, Any], None, Any]:
+        """One step, as `diffrax.AbstractSolver.step` describes it."""
+        del solver_state, made_jump
+        y1, error, coefficients = _cached_step(self.tableau, terms, t0, t1, y0, args)
+        dense_info = dict(y0=y0, y1=y1, coefficients=coefficients)
+        return y1, error, dense_info, None, diffrax.RESULTS.successful
+
+
+def step_of(
+    tableau: RosenbrockTableau, terms: Any, t0: Any, t1: Any, y0: PyTree, args: PyTree
+) -> tuple[PyTree, PyTree, tuple[PyTree, ...]]:
+    """The new value, its error estimate and the coefficients of the dense output."""
+    start, join = split(y0)
+    dtype = jnp.result_type(*start)
+
+    def field(t: Scalar, y: Components) -> Components:
+        return split(terms.vf(t, join(y), args))[0]
+
+    span = jnp.asarray(t1 - t0, dtype=dtype)
+    control = jnp.asarray(terms.contr(t0, t1), dtype=dtype)
+    stages = stages_of(tableau, field, jnp.asarray(t0), start, span, control)
+    end = _plus(start, stages.weighted(end_weights(tableau)))
+    error = stages.weighted(error_weights(tableau))
+    dense = tuple(join(stages.weighted(row)) for row in tableau.dense)
+    return join(end), join(error), dense
+
+
+_cached_step = eqx.filter_jit(step_of)
+"""Jitted for its cache alone: diffrax traces a step many times over, and this makes every time
+but the first free."""
+
+
+def end_weights(tableau: RosenbrockTableau) -> Row:
+    """Weights of the stages that make the new value from the old."""
+    return (*tableau.a[-1], 1.0)
+
+
+def error_weights(tableau: RosenbrockTableau) -> Row:
+    """Weights of the stages that make the error estimate."""
+    return tableau.error or (*[0.0] * (len(tableau.alpha) - 1), 1.0)
+
+
+class Stages(NamedTuple):
+    """The stages of a step, of which only the kept components are computed one by one.
+
+    A direct component p, whose rate is the kept component s, obeys a linear recurrence: stage by
+    stage (I − γ c) u_p = g (1 s_0 + (a + I) u_s), with g = γ h. So its stages are
+    u_p = g (b s_0 + B u_s), with B and b known from the tableau alone.
+    """
+
+    start: Components
+    step: Scalar
+    lin: AbstractLinearisation
+    jacobian: Any
+    factors: Any
+    direct: dict[int, int]
+    kept: list[int]
+    matrix: np.ndarray
+    vector: np.ndarray
+    increments: list[Components]
+
+    def weighted(self, weights: Sequence[float] | np.ndarray) -> Components:
+        """Σ_j weights_j u_j for every component."""
+        row = np.asarray(weights)
+        count = len(row)
+        totals: Components = [None] * len(self.start)
+        for place, i in enumerate(self.kept):
+            totals[i] = _sum(row, [stage[place] for stage in self.increments])
+        through = row @ self.matrix[:count]
+        at_start = float(row @ self.vector[:count])
+        for p, s in self.direct.items():
+            totals[p] = self.step * self._chain(at_start, through, s)
+        return totals
+
+    def direct_right(self, i: int) -> dict[int, Scalar]:
+        """Right-hand sides of the direct components in stage i."""
+        known, at_start = self.matrix[i, :i], float(self.vector[i])
+        return {p: self.step * self._chain(at_start, known, s) for p, s in self.direct.items()}
+
+    def _chain(self, at_start: float, weights: np.ndarray, s: int) -> Scalar:
+        place = self.kept.index(s)
+        stages = [stage[place] for stage in self.increments[: len(weights)]]
+        terms = [at_start * self.start[s]] if at_start != 0.0 else []
+        return _sum([1.0] * len(terms) + list(weights), terms + stages)
+
+
+def _recurrence(tableau: RosenbrockTableau) -> tuple[np.ndarray, np.ndarray]:
+    """B and b of `Stages`."""
+    size = len(tableau.alpha)
+    a, c = np.zeros((size, size)), np.zeros((size, size))
+    for i in range(1, size):
+        a[i, :i], c[i, :i] = tableau.a[i - 1], tableau.c[i - 1]
+    inverse = np.linalg.inv(np.eye(size) - tableau.gamma * c)
+    return inverse @ (a + np.eye(size)), inverse @ np.ones(size)
+
+
+def stages_of(
+    tableau: RosenbrockTableau,
+    field: Callable[[Scalar, Components], Components],
+    t: Scalar,
+    start: Components,
+    span: Scalar,
+    control: Scalar,
+) -> Stages:
+    """All stages of a step.
+
+    `span` is the step in the time that `field` sees and `control` the same step as the state sees
+    it: opposite in sign where diffrax integrates backwards.
+    """
+    lin = linearise(field, t, start)
+    kept = lin.kept()
+    step = tableau.gamma * control
+    moves = control != 0.0
+
+    def picked(components: Components) -> Components:
+        return [components[i] for i in kept]
+
+    slope, drift, jacobian = fusion_barrier(
+        moves,
+        lambda: (picked(lin.evaluate(t, start)), picked(lin.time_derivative()), lin.jacobian()),
+    )
+    factors = fusion_barrier(moves, lambda: lin.factorise(jacobian, step))
+    recurrence = _recurrence(tableau)
+    stages = Stages(
+        start, step, lin, jacobian, factors, lin.direct(), kept, *recurrence, increments=[]
+    )
+    last_rate = slope
+
+    def stage(i: int) -> tuple[Components, Components | None]:
+        row_a, row_c = (tableau.a[i - 1], tableau.c[i - 1]) if i else ((), ())
+        rate = slope
+        if _repeats(tableau, i):
+            rate = last_rate
+        elif any(row_a):
+            argument = _plus(start, stages.weighted(row_a))
+            time = t + jnp.asarray(tableau.alpha[i] * span, dtype=t.dtype)
+            rate = picked(lin.evaluate(time, argument))
+        right = [step * component for component in rate]
+        if any(row_c):
+            weights = [tableau.gamma * c for c in row_c]
+            extra = [_sum(weights, list(column)) for column in zip(*stages.increments, strict=True)]
+            right = _plus(right, extra)
+        weight = step * (tableau.gammas[i] * span)
+        if tableau.gammas[i]:
+            right = [r if d is None else r + weight * d for r, d in zip(right, drift, strict=True)]
+        kept_rate = rate if _repeats(tableau, i + 1) else None
+        return lin.solve_kept(factors, jacobian, step, right, stages.direct_right(i)), kept_rate
+
+    for i in range(len(tableau.alpha)):
+        increment, last_rate = fusion_barrier(moves, functools.partial(stage, i))
+        stages.increments.append(increment)
+    return stages
+
+
+def _repeats(tableau: RosenbrockTableau, i: int) -> bool:
+    """Whether stage i evaluates the vector field where the stage before it did."""
+    if not 2 <= i < len(tableau.alpha) or tableau.alpha[i] != tableau.alpha[i - 1]:
+        return False
+    return tableau.a[i - 1] == (*tableau.a[i - 2], 0.0)
+
+
+def _sum(weights: Sequence[float] | np.ndarray, values: list[Any]) -> Any:
+    """Σ weights_j values_j, zero weights left out and units not multiplied by."""
+    terms = [v if w == 1.0 else float(w) * v for w, v in zip(weights, values, strict=False) if w]
+    return functools.reduce(operator.add, terms) if terms else jnp.zeros_like(values[0])
+
+
+def _plus(a: Components, b: Components) -> Components:
+    return [x + y for x, y in zip(a, b, strict=True)]

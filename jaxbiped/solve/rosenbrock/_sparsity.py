@@ -1,0 +1,67 @@
+"""Sparsity of a Jacobian, read off a function's own program."""
+
+from typing import Any, NamedTuple
+
+from jax.extend.core import ClosedJaxpr, Jaxpr, Literal
+
+
+class Structure(NamedTuple):
+    """Structure of a function of scalars.
+
+    Attributes:
+        depends: for each output, the positions of the inputs that it can depend on.
+        copies: for each output, the position of the input that it is a plain copy of, or None.
+    """
+
+    depends: tuple[frozenset[int], ...]
+    copies: tuple[int | None, ...]
+
+
+def structure_of(program: ClosedJaxpr) -> Structure:
+    """Structure of a traced program. Conservative: a dependence may be reported in vain."""
+    jaxpr = program.jaxpr
+    inputs: list[frozenset[int]] = [frozenset([i]) for i in range(len(jaxpr.invars))]
+    copies: list[int | None] = list(range(len(jaxpr.invars)))
+    depends, copied = _propagate(jaxpr, inputs, copies)
+    return Structure(tuple(depends), tuple(copied))
+
+
+def _propagate(
+    jaxpr: Jaxpr, inputs: list[frozenset[int]], copies: list[int | None]
+) -> tuple[list[frozenset[int]], list[int | None]]:
+    depends: dict[Any, frozenset[int]] = dict(zip(jaxpr.invars, inputs, strict=True))
+    copied: dict[Any, int | None] = dict(zip(jaxpr.invars, copies, strict=True))
+
+    def read(atom: Any) -> tuple[frozenset[int], int | None]:
+        if isinstance(atom, Literal):
+            return frozenset(), None
+        return depends.get(atom, frozenset()), copied.get(atom)
+
+    for equation in jaxpr.eqns:
+        arguments = [read(atom) for atom in equation.invars]
+        inner = _inner_program(equation)
+        if inner is None:
+            union: frozenset[int] = frozenset().union(*(used for used, _ in arguments))
+            results = [union] * len(equation.outvars)
+            results_copied: list[int | None] = [None] * len(equation.outvars)
+        else:
+            results, results_copied = _propagate(
+                inner, [used for used, _ in arguments], [source for _, source in arguments]
+            )
+        for variable, used, source in zip(equation.outvars, results, results_copied, strict=True):
+            depends[variable], copied[variable] = used, source
+    outputs = [read(atom) for atom in jaxpr.outvars]
+    return [used for used, _ in outputs], [source for _, source in outputs]
+
+
+def _inner_program(equation: Any) -> Jaxpr | None:
+    """The program that a call runs on exactly its own arguments, where it is one."""
+    inner = equation.params.get("jaxpr", equation.params.get("call_jaxpr"))
+    jaxpr = getattr(inner, "jaxpr", inner)
+    plain_call = isinstance(jaxpr, Jaxpr) and equation.primitive.name in _CALLS
+    if plain_call and len(jaxpr.invars) == len(equation.invars):
+        return jaxpr
+    return None
+
+
+_CALLS = {"jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "remat2", "checkpoint"}

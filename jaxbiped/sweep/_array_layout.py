@@ -1,0 +1,132 @@
+"""Array layout of a sweep's results, and how it is cut into chunks."""
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from jaxbiped.basins._label import Label
+from jaxbiped.sweep._labelling import Labelled
+from jaxbiped.sweep.starts._coordinates import UNITS
+from jaxbiped.sweep.starts._starts import AbstractStarts, Batch
+
+if TYPE_CHECKING:
+    import xarray
+
+FIELDS: dict[str, tuple[str, Any, str, str]] = {
+    "label": ("i1", int(Label.PENDING), "", "what became of the start"),
+    "gait": ("i2", -1, "", "position of the gait that it converges to"),
+    "period": ("i2", 0, "footsteps", "cycle of the gait that it converges to"),
+    "footsteps": ("i4", 0, "", "heel strikes until the label was certain"),
+    "time": ("f8", np.nan, "s", "simulated time until the label was certain"),
+    "distance": ("f8", np.nan, "m", "distance walked until the label was certain"),
+    "rate": ("f8", np.nan, "", "share of the distance from the gait left after a footstep"),
+    "closest": ("f8", np.nan, "", "smallest distance from a gait, in its metric"),
+    "attempts": ("i4", 0, "", "attempted steps of the solver"),
+}
+"""Of each field: dtype, value before it is known, unit, and what it is."""
+
+
+class Layout(NamedTuple):
+    """Arrays for starts of some shape, cut into chunks of starts that follow each other.
+
+    Attributes:
+        starts: the starts.
+        axis: along which it is cut: a chunk has one place of the axes before, all of those after.
+        rows: places of that axis in a chunk.
+    """
+
+    starts: AbstractStarts
+    axis: int
+    rows: int
+
+    @staticmethod
+    def of(starts: AbstractStarts, chunk: int) -> "Layout":
+        """With at most `chunk` starts in a chunk."""
+        shape = starts.shape
+        axis, inner = len(shape) - 1, 1
+        while axis > 0 and inner * shape[axis] <= chunk:
+            inner *= shape[axis]
+            axis -= 1
+        return Layout(starts, axis, max(1, min(chunk // inner, shape[axis])))
+
+    @property
+    def chunks(self) -> int:
+        """Number of chunks."""
+        return math.prod(self.starts.shape[: self.axis]) * self._cuts
+
+    @property
+    def chunk_shape(self) -> tuple[int, ...]:
+        """Of all but the last of the axis that is cut."""
+        shape = self.starts.shape
+        return (*[1] * self.axis, self.rows, *shape[self.axis + 1 :])
+
+    def region(self, chunk: int) -> tuple[slice, ...]:
+        """Where a chunk lies in the arrays."""
+        shape = self.starts.shape
+        outer, cut = divmod(chunk, self._cuts)
+        places = np.unravel_index(outer, shape[: self.axis]) if self.axis else ()
+        first = cut * self.rows
+        return (
+            *[slice(int(place), int(place) + 1) for place in places],
+            slice(first, min(first + self.rows, shape[self.axis])),
+            *[slice(0, size) for size in shape[self.axis + 1 :]],
+        )
+
+    def shape_of(self, chunk: int) -> tuple[int, ...]:
+        """Of a chunk."""
+        return tuple(part.stop - part.start for part in self.region(chunk))
+
+    def numbers(self, chunk: int) -> tuple[int, int]:
+        """The first of its starts, and the one after its last."""
+        region, shape = self.region(chunk), self.starts.shape
+        first = 0
+        for part, size in zip(region, shape, strict=True):
+            first = first * size + part.start
+        return first, first + math.prod(self.shape_of(chunk))
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """How many starts each chunk has, shape (chunks,)."""
+        full = math.prod(self.chunk_shape)
+        last = math.prod(self.shape_of(self._cuts - 1))
+        sizes = np.full((self.chunks // self._cuts, self._cuts), full)
+        sizes[:, -1] = last
+        return sizes.ravel()
+
+    @property
+    def _cuts(self) -> int:
+        return -(-self.starts.shape[self.axis] // self.rows)
+
+
+def fields_of(starts: AbstractStarts, found: Labelled, batch: Batch) -> dict[str, np.ndarray]:
+    """What is kept of some starts, flat arrays by name."""
+    fields = {name: getattr(found, name) for name in FIELDS}
+    return fields | {f"start_{name}": batch.columns[name] for name in starts.own_columns}
+
+
+def empty_dataset(layout: Layout) -> "xarray.Dataset":
+    """The results before any is known; the arrays take no memory."""
+    import xarray
+
+    starts = layout.starts
+    dims = tuple(starts.axes)
+    kinds = dict(FIELDS)
+    for name in starts.own_columns:
+        kinds[f"start_{name}"] = ("f8", np.nan, UNITS.get(name, ""), f"the start's {name}")
+    variables = {}
+    for name, (dtype, nothing, unit, what) in kinds.items():
+        attributes: dict[str, Any] = {"long_name": what}
+        if unit:
+            attributes["units"] = unit
+        if name == "label":
+            attributes["flag_values"] = [int(label) for label in Label]
+            attributes["flag_meanings"] = " ".join(str(each).replace(" ", "_") for each in Label)
+        values = np.broadcast_to(np.asarray(nothing, dtype=dtype), starts.shape)
+        variables[name] = (dims, values, attributes)
+    coordinates = {
+        name: (name, values, {"units": UNITS.get(name, "")})
+        for name, values in starts.axes.items()
+        if values is not None
+    }
+    return xarray.Dataset(variables, coordinates)

@@ -1,0 +1,116 @@
+"""Following of starts until each is certain, by either engine."""
+
+import functools
+import threading
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._adaptive_program import Solve
+from jaxbiped.solve._final_step import just_before_end
+from jaxbiped.solve._rigid_steps import RigidWalk
+from jaxbiped.solve._units import units_of
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.sweep._goals import Goals
+from jaxbiped.sweep._labelling_by_lanes import label_by_lanes
+from jaxbiped.sweep._labelling_by_xla import label_by_xla
+from jaxbiped.sweep._labelling_loop import (
+    AbstractLabellingLoop,
+    CompliantLabelling,
+    Outcome,
+    RigidLabelling,
+    Start,
+)
+
+_LONGEST = 1e6
+"""Simulated time [s] that no start takes: its footsteps or its patience end it before."""
+_PATIENCE = 50.0
+"""Longest time between two footsteps, in units of √(l/g)."""
+
+_MAKING = threading.Lock()
+
+
+class Effort(NamedTuple):
+    """How starts are followed. All hashable.
+
+    Attributes:
+        rtol: relative tolerance; the absolute one is a hundredth of it in the scene's units.
+        footsteps: after which a start that is not certain is given up.
+        most_attempts: cap on the solver's attempted steps.
+        gap: see `arrived`.
+        solver: of the compliant walker.
+        engine: "lanes" or "xla".
+    """
+
+    rtol: float
+    footsteps: int
+    most_attempts: int
+    gap: float
+    solver: AbstractRosenbrock
+    engine: str
+
+
+def follow_starts(
+    scene: Scene | RigidScene, states: Any, goals: Goals, periods: tuple[int, ...], effort: Effort
+) -> Outcome:
+    """Follows n starts; leaves of scene, states and goals are NumPy's arrays (n, …)."""
+    count = len(states.hip_x)
+
+    def same(value: Any) -> np.ndarray:
+        return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
+
+    common = dict(
+        scene=scene,
+        state=states,
+        duration=same(_LONGEST),
+        footsteps=same(effort.footsteps),
+        rtol=same(effort.rtol),
+        most_attempts=same(effort.most_attempts),
+    )
+    solve: Any = None
+    if isinstance(scene, RigidScene):
+        solve = RigidWalk(**common)
+    else:
+        last = same(just_before_end(jnp.asarray(_LONGEST)))
+        atol = same(1e-2 * effort.rtol)
+        units = jtu.tree_map(same, units_of(scene, states))
+        solve = Solve(**common, almost=last, atol=atol, units=units, patience=same(np.inf))
+    waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
+    starts = Start(solve, goals, same(effort.gap), waits)
+    with _MAKING:
+        course = _labelling_loop(
+            isinstance(scene, RigidScene), effort.solver, periods, effort.engine
+        )
+    if not count:
+        return _empty_outcome(len(states) - 1)
+    run = label_by_lanes if effort.engine == "lanes" else label_by_xla
+    return run(course, jtu.tree_map(np.asarray, starts))
+
+
+@functools.cache  # the same object each time, so that nothing is compiled again
+def _labelling_loop(
+    rigid: bool, solver: AbstractRosenbrock, periods: tuple[int, ...], engine: str
+) -> AbstractLabellingLoop:
+    if rigid:
+        return RigidLabelling(periods)
+    return CompliantLabelling(solver, periods, fenced=engine == "xla")
+
+
+def _empty_outcome(size: int) -> Outcome:
+    whole, real = np.zeros(0, dtype=np.int64), np.zeros(0)
+    return Outcome(
+        label=whole,
+        goal=whole,
+        period=whole,
+        footsteps=whole,
+        time=real,
+        distance=real,
+        rate=real,
+        closest=real,
+        attempts=whole,
+        final=tuple([real] * size),
+    )

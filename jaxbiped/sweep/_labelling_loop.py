@@ -1,0 +1,294 @@
+"""Labelling loop: a start is followed until its label is certain, by either engine."""
+
+import abc
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import equinox.internal as eqxi
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxbiped._types import Scalar
+from jaxbiped.basins._label import Label
+from jaxbiped.dynamics._section import MidStance
+from jaxbiped.dynamics._state import State, exchange_legs
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
+from jaxbiped.solve._ending import WATCHES
+from jaxbiped.solve._rigid_steps import (
+    RigidProgress,
+    RigidWalk,
+    attempt_step,
+    initial_progress,
+    state_with_hip,
+)
+from jaxbiped.solve._saved_outputs import Saved
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.sweep._convergence_test import UNDECIDED, ArrivalHistory, after_arrival, empty_history
+from jaxbiped.sweep._goals import Goals
+from jaxbiped.sweep._sliding import contact_places, slip_distances
+
+_SECANTS = 8
+"""By which an arrival within a step is located, to rounding."""
+
+
+class Start(NamedTuple):
+    """One start's inputs; every leaf a 64-bit floating-point number, or an array of them.
+
+    Attributes:
+        solve: what to simulate: a `Solve` or a `RigidWalk`.
+        goals: the gaits that it may converge to.
+        gap: see `after_arrival`; 0 where recurrences are not looked for.
+        patience: longest time between two footsteps [s].
+    """
+
+    solve: Any
+    goals: Goals
+    gap: Any
+    patience: Any
+
+
+class Outcome(NamedTuple):
+    """What became of one start; see `Labelled`. `final` is the last state on the section."""
+
+    label: Any
+    goal: Any
+    period: Any
+    footsteps: Any
+    time: Any
+    distance: Any
+    rate: Any
+    closest: Any
+    attempts: Any
+    final: tuple[Any, ...]
+
+
+class Progress(NamedTuple):
+    """What is carried from attempt to attempt.
+
+    Attributes:
+        solve: the solver's own.
+        trace: see there.
+        strike: time of the last footstep [s].
+        landed: where each foot came down; see `slip_distances`. None for a rigid walker.
+    """
+
+    solve: Any
+    trace: ArrivalHistory
+    strike: Scalar
+    landed: tuple[Scalar, Scalar] | None
+
+
+class AbstractLabellingLoop(abc.ABC):
+    """The functions of a labelling loop: `begin`, `attempt` until it is over, `finish`."""
+
+    @abc.abstractmethod
+    def begin(self, start: Start) -> Progress:
+        """Before the first step."""
+
+    @abc.abstractmethod
+    def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
+        """One attempted step further, and whether the label is certain (boolean)."""
+
+    @abc.abstractmethod
+    def finish(self, start: Start, now: Progress) -> Outcome:
+        """The label and what goes with it."""
+
+
+class CompliantLabelling(AbstractLabellingLoop):
+    """Of the compliant walker, which arrives at mid-stance, on whichever leg.
+
+    Attributes:
+        periods: footsteps in a cycle of each known gait.
+        steps: the solver's steps and endings.
+    """
+
+    def __init__(
+        self, solver: AbstractRosenbrock, periods: tuple[int, ...], *, fenced: bool
+    ) -> None:
+        """`fenced`: whether XLA is to compile it."""
+        self.periods = periods
+        saved = Saved(times=True)  # the last step's continuous solution
+        self.steps = AdaptiveSolve(solver, WATCHES, counting=True, saved=saved, fenced=fenced)
+
+    def begin(self, start: Start) -> Progress:
+        solve: Solve = start.solve
+        zero = jnp.zeros_like(solve.duration)
+        trace = empty_history(zero, len(solve.state) - 1, self.periods)
+        landed = contact_places(solve.scene, solve.state)
+        return Progress(self.steps.start(solve), trace, zero, landed)
+
+    def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
+        solve: Solve = start.solve
+        after, over = self.steps.attempt(solve, now.solve)
+        _, _, before_count = now.solve.control
+        _, _, count = after.control
+        strike = jnp.where(count > before_count, after.t, now.strike)
+        trace = self._traced(start, now, after)
+        assert now.landed is not None
+        landed, slid = slip_distances(solve.scene, after.state, now.landed)
+        late = after.t - strike > start.patience
+        verdict = jnp.where(late, int(Label.OUT_OF_STEPS), trace.verdict)
+        verdict = jnp.where(slid > solve.scene.walker.l, int(Label.SLID), verdict)
+        trace = trace._replace(verdict=verdict)
+        return Progress(after, trace, strike, landed), over | (verdict != UNDECIDED)
+
+    def finish(self, start: Start, now: Progress) -> Outcome:
+        solved = self.steps.finish(start.solve, now.solve)
+        _, _, count = now.solve.control
+        return _outcome(
+            now.trace,
+            code=solved.ending,
+            footsteps=count,
+            time=solved.t,
+            distance=solved.state.hip_x - start.solve.state.hip_x,
+            attempts=solved.accepted + solved.rejected,
+        )
+
+    def _traced(self, start: Start, now: Progress, after: Any) -> ArrivalHistory:
+        """After the last step, within which it may have arrived at mid-stance."""
+        scene, last, section = start.solve.scene, after.last, MidStance()
+
+        def rises(change: bool) -> Scalar:
+            old, new = _with_leg_names(change, last.state), _with_leg_names(change, after.state)
+            crosses = (section.value(scene, old) < 0.0) & (section.value(scene, new) >= 0.0)
+            return crosses & section.counts(scene, new)
+
+        first = rises(True)
+        arrives = last.noted & (first | rises(False))
+        dense = self.steps.solver.interpolation_cls(
+            t0=last.t, t1=after.t, y0=last.state, y1=after.state, coefficients=last.coefficients
+        )
+
+        def at(time: Scalar) -> State:
+            state = dense.evaluate(time)
+            pairs = zip(_with_leg_names(True, state), _with_leg_names(False, state), strict=True)
+            return type(state)(*[jnp.where(first, a, b) for a, b in pairs])
+
+        def on_section() -> ArrivalHistory:
+            def value(time: Scalar) -> Scalar:
+                return section.value(scene, at(time))
+
+            time = _root(value, last.t, after.t)
+            return after_arrival(
+                now.trace, _recurring_components(at(time)), start.goals, self.periods, start.gap
+            )
+
+        return _trace_or(arrives, on_section, now.trace)
+
+
+def _root(value: Callable[[Scalar], Scalar], low: Scalar, high: Scalar) -> Scalar:
+    """Where a function rises through zero between two times, by the Illinois method."""
+
+    def secant(_: Any, now: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+        a, b, at_a, at_b, side, _ = now
+        rise = at_b - at_a
+        middle = b - at_b * (b - a) / jnp.where(rise == 0.0, 1.0, rise)
+        found = value(middle)
+        left = found < 0.0
+        # An end that stays twice counts half, so that it moves the next time.
+        return (
+            jnp.where(left, middle, a),
+            jnp.where(left, b, middle),
+            jnp.where(left, found, jnp.where(side > 0.0, 0.5 * at_a, at_a)),
+            jnp.where(left, jnp.where(side < 0.0, 0.5 * at_b, at_b), found),
+            jnp.where(left, -1.0, 1.0),
+            middle,
+        )
+
+    start = (low, high, value(low), value(high), jnp.zeros_like(low), high)
+    return jax.lax.fori_loop(0, _SECANTS, secant, start)[-1]
+
+
+class RigidLabelling(AbstractLabellingLoop):
+    """Of the rigid walker, which arrives just after its impacts.
+
+    Attributes:
+        periods: footsteps in a cycle of each known gait.
+    """
+
+    def __init__(self, periods: tuple[int, ...]) -> None:
+        self.periods = periods
+
+    def begin(self, start: Start) -> Progress:
+        walk: RigidWalk = start.solve
+        zero = jnp.zeros_like(walk.duration)
+        trace = empty_history(zero, len(walk.state) - 1, self.periods)
+        return Progress(initial_progress(walk), trace, zero, None)
+
+    def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
+        after, over = attempt_step(start.solve, now.solve)
+
+        def on_section() -> ArrivalHistory:
+            return after_arrival(
+                now.trace, _recurring_components(after.state), start.goals, self.periods, start.gap
+            )
+
+        trace = _trace_or(after.struck, on_section, now.trace)
+        strike = jnp.where(after.struck, after.t, now.strike)
+        late = after.t - strike > start.patience
+        verdict = jnp.where(late, int(Label.OUT_OF_STEPS), trace.verdict)
+        trace = trace._replace(verdict=verdict)
+        return Progress(after, trace, strike, None), over | (verdict != UNDECIDED)
+
+    def finish(self, start: Start, now: Progress) -> Outcome:
+        walked: RigidProgress = now.solve
+        return _outcome(
+            now.trace,
+            code=walked.code,
+            footsteps=walked.footsteps,
+            time=walked.t,
+            distance=state_with_hip(start.solve, walked).hip_x - start.solve.state.hip_x,
+            attempts=walked.attempts,
+        )
+
+
+def _outcome(
+    trace: ArrivalHistory,
+    *,
+    code: Scalar,
+    footsteps: Scalar,
+    time: Scalar,
+    distance: Scalar,
+    attempts: Scalar,
+) -> Outcome:
+    """A misfortune is certain; all footsteps walked without a verdict are not."""
+    kind = trace.verdict.dtype
+    spent = (code == int(Label.WALKING)) | (code == int(Label.OUT_OF_STEPS))
+    plain = jnp.where(code == int(Label.WALKING), int(Label.UNRESOLVED), code).astype(kind)
+    label = jnp.where(spent & (trace.verdict != UNDECIDED), trace.verdict, plain)
+    walks = label == int(Label.WALKING)
+    converges = walks | (label == int(Label.UNRESOLVED))
+    return Outcome(
+        label=label,
+        goal=jnp.where(walks, trace.goal, -1),
+        period=jnp.where(converges, trace.period, 0),
+        footsteps=footsteps,
+        time=time,
+        distance=distance,
+        rate=trace.rate,
+        closest=trace.closest,
+        attempts=attempts,
+        final=trace.recent[0],
+    )
+
+
+def _trace_or(
+    condition: Scalar, make: Callable[[], ArrivalHistory], old: ArrivalHistory
+) -> ArrivalHistory:
+    """A new trace where the condition holds; made only if it does in any start of the batch."""
+
+    def made() -> ArrivalHistory:
+        return jtu.tree_map(lambda a, b: jnp.where(condition, a, b), make(), old)
+
+    trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(condition), made, lambda: old)
+    return trace
+
+
+def _recurring_components(state: Any) -> tuple[Scalar, ...]:
+    """A state without the place along the slope, its first component."""
+    return tuple(state[1:])
+
+
+def _with_leg_names(exchanged: bool, state: Any) -> Any:
+    return exchange_legs(state) if exchanged else state

@@ -1,0 +1,1 @@
+"""Variational equations: tangents, saltation, first and second variation, adjoint."""

@@ -1,0 +1,185 @@
+"""Adjoint solve of the second variation along a known motion, by lanes."""
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.compiler import CompiledProgram, Program, Recording, call, call_recording
+from jaxbiped.variational._adjoint_step import Adjoints, adjoint_step
+from jaxbiped.variational._collocated_step import Rows, linearise_about
+from jaxbiped.variational._first_variation import (
+    FirstVariation,
+    FirstVariationInputs,
+    FirstVariationSolve,
+    Step,
+    field_order,
+)
+from jaxbiped.variational._flow import Arrival, Flow
+from jaxbiped.variational._hybrid_system import AbstractSystem
+from jaxbiped.variational._jets import Jet, reset_jet
+from jaxbiped.variational._solve_to_section import Nodes
+from jaxbiped.variational._switch_crossings import earlier_at
+from jaxbiped.variational._tangents import Seeded
+
+COUNT = 2
+"""Turned tangents: a multiplier's eigenvector has a real and an imaginary part."""
+
+
+class _Given(NamedTuple):
+    """Inputs.
+
+    Attributes:
+        args: parameters.
+        arrival: time and state where the motion arrives.
+        turned: what `carry_tangents` gave.
+        after: adjoints behind the arrival, of components in their own order.
+    """
+
+    args: PyTree
+    arrival: Any
+    turned: FirstVariation
+    after: Adjoints
+
+
+class _Now(NamedTuple):
+    """What is carried: adjoints, in order, and the state where a step starts; steps read so far."""
+
+    adjoints: Adjoints
+    state: Any
+    count: Any
+
+
+def carry_tangents(flow: Flow, nodes: Nodes, turned: Scalar) -> tuple[FirstVariation, Recording]:
+    """Turned tangents (v, c) carried along a motion to its arrival; and the steps of that."""
+    given = FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, turned, nodes.steps)
+    compiled = _compiled(_kind(flow), None)
+    room = nodes.ends.recorder.room
+    return call_recording(compiled, given, room=room, quick=True, tape=nodes.ends, once=True)
+
+
+def pull_back(
+    flow: Flow,
+    nodes: Nodes,
+    turned: FirstVariation,
+    steps: Recording,
+    after: Adjoints,
+    *,
+    final: bool,
+) -> Adjoints:
+    """Adjoints where a motion starts, from those behind its arrival.
+
+    Args:
+        flow: what moves.
+        nodes: of the motion.
+        turned, steps: from `carry_tangents` along it.
+        after: adjoints behind the arrival.
+        final: whether the cycle ends there: of that arrival tangents on the section are told.
+    """
+    given = _Given(flow.args.args, nodes.arrival, turned, after)
+    return call(_compiled(_kind(flow), final), given, tape=steps, quick=True)[0]
+
+
+class _Kind(NamedTuple):
+    """What programs are compiled for."""
+
+    system: AbstractSystem
+    arrival: Arrival
+    active: tuple[int, ...]
+    args: Any
+    state: Any
+
+
+def _kind(flow: Flow) -> _Kind:
+    args = jtu.tree_structure(flow.args.args)
+    return _Kind(flow.system, flow.arrival, flow.args.active, args, flow.structure)
+
+
+@functools.lru_cache(maxsize=256)
+def _compiled(kind: _Kind, final: bool | None) -> CompiledProgram:
+    """The program that carries turned tangents, or where `final` is given, that of adjoints."""
+
+    def numbers(*shape: int) -> Any:
+        return jax.ShapeDtypeStruct(shape, jnp.float64)
+
+    # Compiled by itself, the field is traced once, not at each of its many uses.
+    field = jax.jit(kind.system.vector_field)
+
+    def flow(given: Any) -> Flow:
+        nothing = jnp.zeros((0, 0))
+        seeded = Seeded(given.args, nothing, nothing, kind.active)
+        return Flow(kind.system, kind.arrival, field, seeded, kind.state)
+
+    c, p = kind.state.num_leaves, len(kind.active)
+    args = jtu.tree_unflatten(kind.args, [numbers()] * kind.args.num_leaves)
+    row, turned = numbers(1 + c), numbers(COUNT, c)
+    if final is None:
+        given = FirstVariationInputs(args, row, row, turned, numbers())
+        return CompiledProgram(FirstVariationSolve(flow, 1 + c).program(), given)
+    after = Adjoints(turned, numbers(c), numbers(p))
+    program = _AdjointSolve(flow, Step.shape(c, COUNT), final).program()
+    return CompiledProgram(
+        program, _Given(args, row, FirstVariation(turned, numbers(c), numbers()), after)
+    )
+
+
+class _AdjointSolve:
+    """The functions of the program: its tape's rows are steps, read backwards."""
+
+    def __init__(self, flow: Callable[[Any], Flow], step: Step, final: bool) -> None:
+        self.flow, self.step, self.final = flow, step, final
+
+    def program(self) -> Program:
+        """The program."""
+        size = sum(leaf.size for leaf in jtu.tree_leaves(self.step))
+        return Program(self.start, self.attempt, self.finish, tape=size, backwards=True)
+
+    def start(self, given: _Given) -> _Now:
+        """Adjoints before the arrival: all of it is linear in what is there."""
+        flow = self.flow(given)
+        order, parameters = field_order(flow)
+        state = flow.earlier(given.arrival, parameters)[1:]
+        z = jnp.concatenate([state, parameters])
+        after = given.after
+
+        def behind(before: Adjoints) -> tuple[Scalar, Scalar]:
+            first = jnp.concatenate([given.turned.turned, before.family[None]]).T
+            idle = jnp.zeros((COUNT, len(parameters)))
+            seeds = jnp.concatenate([idle, before.parameters[None]]).T
+            jet = Jet(first, before.second.T[:, None, :])
+            found = reset_jet(flow, z, jet, seeds, COUNT, final=self.final)
+            return found.first[:, COUNT], found.second[:, 0].T
+
+        _, pull = jax.vjp(behind, jax.tree.map(jnp.zeros_like, after))
+        (before,) = pull((after.family, after.second))
+        adjoints = Adjoints(
+            order.sorted(before.second),
+            order.sorted(before.family),
+            before.parameters + after.parameters,
+        )
+        return _Now(adjoints, given.turned.state, jnp.zeros(()))
+
+    def attempt(self, given: _Given, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
+        flow = self.flow(given)
+        order, parameters = field_order(flow)
+        step = Step.read(row, self.step)
+        rows = Rows(flow.apart, order, list(parameters))
+        crossed, ends = step.which > 0.0, (step.before, now.state)
+        linear = linearise_about(rows, *ends, step.points, step.share, crossed)
+        early = jax.lax.cond(
+            crossed,
+            lambda: earlier_at(flow, flow.surfaces, now.state, step.which, parameters),
+            lambda: jnp.zeros(len(now.state) + len(parameters)),
+        )
+        before, count = adjoint_step(rows, linear, step, early, now.adjoints), now.count + 1.0
+        return _Now(before, step.before, count), count >= given.turned.steps
+
+    def finish(self, given: _Given, now: _Now) -> Adjoints:
+        order, _ = field_order(self.flow(given))
+        second, family, parameters = now.adjoints
+        return Adjoints(order.restored(second), order.restored(family), parameters)

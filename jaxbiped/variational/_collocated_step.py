@@ -1,0 +1,243 @@
+"""Collocated step: the vector field about one step by Radau IIA, for lanes.
+
+The method is that of `_radau`; here the components whose rate is a component are eliminated by
+hand, and the step is one, not many.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxbiped._types import Scalar
+from jaxbiped.compiler import jacobian
+from jaxbiped.linalg._elimination import BlockFactors, factorise
+from jaxbiped.solve.rosenbrock._linearisation import linearise
+from jaxbiped.variational._radau_collocation import RADAU, Path
+from jaxbiped.variational._switch_crossings import SIDES, jump_of
+from jaxbiped.variational._switch_locator import MARGIN
+
+Field = Callable[[Sequence[Scalar], Sequence[Scalar]], list[Scalar]]
+"""Rates of all components, of components and active parameters."""
+
+
+class Order(NamedTuple):
+    """Components in the order that the algebra wants: those whose rate is a component first.
+
+    Attributes:
+        every: positions of all components in that order.
+        direct: how many come first; the rate of each is the component as far behind them.
+    """
+
+    every: tuple[int, ...]
+    direct: int
+
+    @property
+    def kept(self) -> tuple[int, ...]:
+        """Positions of the others."""
+        return self.every[self.direct :]
+
+    def sorted(self, vector: Any) -> Any:
+        """The last axis of an array in this order."""
+        return jnp.stack([vector[..., i] for i in self.every], axis=-1)
+
+    def restored(self, vector: Any) -> Any:
+        """The last axis of an array from this order in the components' own."""
+        return jnp.stack(
+            [vector[..., self.every.index(i)] for i in range(len(self.every))], axis=-1
+        )
+
+
+def order_of(field: Field, y: Sequence[Scalar], parameters: Sequence[Scalar]) -> Order:
+    """The order of a field's components."""
+    found = linearise(lambda t, y: field(y, parameters), jnp.zeros(()), list(y))
+    direct, kept = found.direct(), found.kept()
+    sources = list(direct.values())
+    rest = [i for i in kept if i not in sources]
+    return Order((*direct, *sources, *rest), len(direct))
+
+
+class Stages(NamedTuple):
+    """A step of y' = J y + b by Radau IIA, in the order of `order`; k components are kept.
+
+    Attributes:
+        order: of the components.
+        weights: of the rates at the three collocation points in the changes up to each, (3, 3).
+        by_direct: Jacobian of the kept rates by the d direct components there, (3, k, d).
+        factors: of the equations of the kept components at all points, 3 k of them.
+    """
+
+    order: Order
+    weights: Any
+    by_direct: Any
+    factors: BlockFactors
+
+    @staticmethod
+    def of(order: Order, share: Any, jacobians: Any) -> "Stages":
+        """From the Jacobians of the kept rates, (3, k, c), their columns in order."""
+        weights = RADAU * share
+        d, k = order.direct, len(order.kept)
+        by_direct, by_kept = jacobians[..., :d], jacobians[..., d:]
+        blocks = weights[:, None, :, None] * jnp.swapaxes(by_kept, 0, 1)[None]
+        if d:
+            # A direct component follows its rate: the equation of a second derivative.
+            once = weights[:, :, None, None] * by_direct[None]
+            twice = jnp.einsum("ijka,jl->ikla", once, weights)
+            nothing = jnp.zeros((3, k, 3, k - d))
+            blocks = blocks + jnp.concatenate([twice, nothing], axis=-1)
+        matrix = jnp.eye(3 * k) - blocks.reshape(3 * k, 3 * k)
+        return Stages(order, weights, by_direct, factorise(matrix, k))
+
+    def solve(self, right: Any, forcing: Any) -> Any:
+        """u of (I − A ⊗ J) u = r + (A ⊗ I) b, shape (3, c); r (3, c), b of the kept (3, k)."""
+        d = self.order.direct
+        direct, kept = right[:, :d], right[:, d:]
+        pushed = forcing + (self.by_direct @ direct[..., None])[..., 0] if d else forcing
+        found = self.factors.solve((kept + self.weights @ pushed).reshape(-1)).reshape(3, -1)
+        if not d:
+            return found
+        return jnp.concatenate([direct + self.weights @ found[:, :d], found], axis=1)
+
+    def carried(self, tangents: Any) -> Any:
+        """Tangents at the points, (v, 3, c), of those where the step starts, (v, c)."""
+        unforced = jnp.zeros((3, len(self.order.kept)))
+        every = [self.solve(jnp.stack([start] * 3), unforced) for start in tangents]
+        return jnp.stack(every)
+
+    def pulled(self, u: Any) -> tuple[Any, Any]:
+        """Derivatives of a sum of u by r, where that is one vector for all points, and by b.
+
+        Args:
+            u: weights in the sum, (3, c).
+
+        Returns:
+            Shapes (c,) and (3, k).
+        """
+        d = self.order.direct
+        direct, found = u[:, :d], u[:, d:]
+        if d:
+            follows = self.weights.T @ direct
+            found = found + jnp.concatenate([follows, jnp.zeros_like(found[:, d:])], axis=1)
+        kept = self.factors.solve_transposed(found.reshape(-1)).reshape(3, -1)
+        forcing = self.weights.T @ kept
+        by_kept = jnp.sum(kept, axis=0)
+        if not d:
+            return by_kept, forcing
+        by_direct = jnp.sum(direct, axis=0) + jnp.einsum("jkd,jk->d", self.by_direct, forcing)
+        return jnp.concatenate([by_direct, by_kept]), forcing
+
+
+class Rows:
+    """Rates and their derivatives at one point, of `field` for components in this `order`."""
+
+    def __init__(self, field: Field, order: Order, parameters: Any) -> None:
+        self.field, self.order, self.parameters = field, order, list(parameters)
+        # Compiled by themselves, these are traced once, not at each use.
+        self.by_state, self.curved = jax.jit(self._by_state), jax.jit(self._curved)
+
+    def velocity(self, y: Any) -> Any:
+        return jnp.stack(self.field(list(y), self.parameters))
+
+    def _by_state(self, y: Any) -> Any:
+        """Derivatives of the kept rates by the components, (k, c)."""
+        return self.order.sorted(jacobian(lambda z: self._kept(z, self.parameters), list(y)))
+
+    def gradient(self, y: Any) -> Any:
+        """Derivatives of the kept rates, (k, n)."""
+        return self._by_all(self._kept, list(y))
+
+    def _curved(self, y: Any, along: Any, weights: Any) -> Any:
+        """Derivatives of a sum of the kept rates' derivatives along tangents of the state, (n,).
+
+        Tangents (v, c), in the components' own order, and weights (v, k).
+        """
+
+        def turned(y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
+            changes = [
+                jax.jvp(lambda y: self._kept(y, q), (y,), (list(tangent),))[1] for tangent in along
+            ]
+            parts = [
+                weight * change
+                for row, each in zip(weights, changes, strict=True)
+                for weight, change in zip(row, each, strict=True)
+            ]
+            return [sum(parts[1:], parts[0])]
+
+        return self._by_all(turned, list(y))[0]
+
+    def _kept(self, y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
+        every = self.field(y, q)
+        return [every[i] for i in self.order.kept]
+
+    def _by_all(self, function: Callable[..., list[Scalar]], y: list[Scalar]) -> Any:
+        c = len(y)
+        found = jacobian(lambda z: function(z[:c], z[c:]), [*y, *self.parameters])
+        return jnp.concatenate([self.order.sorted(found[:, :c]), found[:, c:]], axis=1)
+
+
+class Linear(NamedTuple):
+    """The field about one step, all in order; n = c + p.
+
+    Attributes:
+        stages: the step's equations.
+        points: states at the collocation points, (3, c), in the components' own order.
+        by_parameter: derivatives of the kept rates there, (3, k, p).
+        at_start: of the kept rates by all where the step starts, (k, n).
+        velocity: rates there, (c,).
+        jump: of the derivatives of the kept rates by the components where the step ends, (k, c).
+    """
+
+    stages: Stages
+    points: Any
+    by_parameter: Any
+    at_start: Any
+    velocity: Any
+    jump: Any
+
+
+def collocate_step(rows: Rows, path: Path, crossed: Any) -> tuple[Any, Any, Any]:
+    """A step whose leaves have no leading axis: its collocation points, (3, c), in their own order.
+
+    Also their shares of time, (3,), and the rates where it begins.
+    """
+    part, share = (each[0] for each in jax.tree.map(lambda x: x[None], path).clock())
+    begins, ends = rows.velocity(path.before), rows.velocity(path.after)
+    points = _correct(rows, path, part, share, begins, ends)
+    # A step that ends on a switch belongs to the old side; a corrected point may lie beyond.
+    short = jnp.where(crossed, path.after - MARGIN * ends, points[2])
+    return jnp.concatenate([points[:2], short[None]]), share, begins
+
+
+def linearise_about(
+    rows: Rows, before: Any, after: Any, points: Any, share: Any, crossed: Any
+) -> Linear:
+    """The field about a step between two states, whose `points` and shares are known."""
+    order = rows.order
+    c = len(order.every)
+    found = jax.lax.map(rows.gradient, jnp.concatenate([points, before[None]]))
+    stages = Stages.of(order, share, found[:3, :, :c])
+
+    def jump() -> Any:
+        sides = after + jnp.asarray(SIDES)[:, None] * rows.velocity(after)
+        return jump_of(jax.lax.map(rows.by_state, sides)[None])[0]
+
+    jumps = jax.lax.cond(crossed, jump, lambda: jnp.zeros_like(found[3, :, :c]))
+    return Linear(
+        stages, points, found[:3, :, c:], found[3], order.sorted(rows.velocity(before)), jumps
+    )
+
+
+def _correct(rows: Rows, path: Path, part: Any, share: Any, begins: Any, ends: Any) -> Any:
+    """The collocation points: a cubic, once corrected."""
+    order = rows.order
+    h, change = path.span, path.after - path.before
+    start, end = h * begins, h * ends
+    second, third = 3.0 * change - 2.0 * start - end, start + end - 2.0 * change
+    s = part[:, None]
+    points = path.before + s * (start + s * (second + s * third))
+    velocities, found = jax.lax.map(lambda y: (rows.velocity(y), rows.by_state(y)), points)
+    stages = Stages.of(order, share, found)
+    residual = order.sorted(points - path.before - (RADAU * share) @ velocities)
+    unforced = jnp.zeros((3, len(order.kept)))
+    return points - order.restored(stages.solve(residual, unforced))

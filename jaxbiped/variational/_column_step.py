@@ -1,0 +1,200 @@
+"""Column step: the derivative of a Rosenbrock step, one direction at a time."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.compiler import jacobian
+from jaxbiped.solve._fusion_barrier import without_barriers
+from jaxbiped.solve.rosenbrock._linearisation import Components, split
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
+    RosenbrockTableau,
+    Stages,
+    end_weights,
+    error_weights,
+    stages_of,
+)
+from jaxbiped.variational._rosenbrock_tangents import kept_in_order
+from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
+
+
+class Differentiated(NamedTuple):
+    """A step and what the derivative of it needs (see `rosenbrock_columns` for the equations).
+
+    Components are in the order `order`: first those whose rate is a component, then the kept ones.
+
+    Attributes:
+        tableau, stages: of the step.
+        end, error: the state's new value and its error estimate.
+        order: the components' order.
+        by_state: derivatives A_i of the kept rates at the stages, shape (stages, kept, c).
+        by_curvature: derivatives B_i, likewise.
+        by_parameter: A_i + B_i for the active parameters, shape (stages, kept, p).
+    """
+
+    tableau: RosenbrockTableau
+    stages: Stages
+    end: PyTree
+    error: PyTree
+    order: list[int]
+    by_state: Any
+    by_curvature: Any
+    by_parameter: Any
+
+
+def differentiate_step(
+    tableau: RosenbrockTableau,
+    field: Callable[[Any, PyTree, PyTree], PyTree],
+    t0: Any,
+    t1: Any,
+    y0: PyTree,
+    args: Seeded,
+    *,
+    steered: Any,
+) -> Differentiated:
+    """A step of an autonomous system of scalars, with all that its derivatives share.
+
+    Of the arguments the active leaves are differentiated by, p of them; only where `steered`, else
+    these derivatives are zero.
+    """
+    start, join = split(y0)
+    parameters = active_leaves(args)
+
+    def rates(t: Scalar, y: Components, q: Sequence[Scalar]) -> Components:
+        return split(field(t, join(y), with_active(args, list(q))))[0]
+
+    span = jnp.asarray(t1 - t0)
+    with without_barriers():
+        stages = stages_of(tableau, lambda t, y: rates(t, y, parameters), t0, start, span, span)
+        order = [*stages.direct, *kept_in_order(stages)]
+
+        def kept_rates(y: Components, q: Sequence[Scalar]) -> Components:
+            every = rates(t0, y, q)
+            return [every[i] for i in kept_in_order(stages)]
+
+        by_state, by_curvature, by_parameter = _derivatives(
+            tableau, stages, kept_rates, parameters, steered
+        )
+    return Differentiated(
+        tableau=tableau,
+        stages=stages,
+        end=join(
+            [y + u for y, u in zip(start, stages.weighted(end_weights(tableau)), strict=True)]
+        ),
+        error=join(stages.weighted(error_weights(tableau))),
+        order=order,
+        by_state=_pick(by_state, order),
+        by_curvature=_pick(by_curvature, order),
+        by_parameter=by_parameter,
+    )
+
+
+def _pick(array: Any, places: Sequence[int]) -> Any:
+    return jnp.stack([array[..., i] for i in places], axis=-1)
+
+
+def _derivatives(
+    tableau: RosenbrockTableau,
+    stages: Stages,
+    kept_rates: Callable[[Components, Sequence[Scalar]], Components],
+    parameters: Sequence[Scalar],
+    steered: Any,
+) -> tuple[Any, Any, Any]:
+    """Of all stages A_i and B_i by components (stages, kept, c), A_i + B_i by parameters."""
+    start, size = stages.start, len(tableau.alpha)
+    points = [start] + [
+        [y + u for y, u in zip(start, stages.weighted(row), strict=True)] for row in tableau.a
+    ]
+    unit = [[1.0 if i == j else 0.0 for j in range(size)] for i in range(size)]
+    directions = [stages.weighted(row) for row in unit]
+    count = len(start)
+
+    def rates(z: Components) -> Components:
+        return kept_rates(z[:count], z[count:])
+
+    def apart(found: Any, known: Any) -> tuple[Any, Any]:
+        """By components, and by parameters what is known and what is found."""
+        nothing = jnp.zeros((len(found), len(parameters)))
+        by_parameter = known + found[:, count:]
+        return found[:, :count], jax.lax.cond(steered, lambda: by_parameter, lambda: nothing)
+
+    def at_point(point: Any) -> tuple[Any, Any]:
+        return apart(jacobian(rates, [*point, *parameters]), 0.0)
+
+    def at_start(both: tuple[Any, Any]) -> tuple[Any, Any]:
+        along, known = list(both[0]), both[1]
+
+        def turned(z: Components) -> Components:
+            return jax.jvp(lambda y: kept_rates(y, z[count:]), (z[:count],), (along,))[1]
+
+        return apart(jacobian(turned, [*start, *parameters]), known)
+
+    # Two short loops: what one keeps in registers and caches the other one need not.
+    stacked = [jnp.stack([jnp.stack(each) for each in array]) for array in (points, directions)]
+    by_point, known = jax.lax.map(at_point, stacked[0])
+    by_start, by_parameter = jax.lax.map(at_start, (stacked[1], known))
+    return by_point, by_start, by_parameter
+
+
+def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple[Any, Any]:
+    """The derivative of a step along one direction: of the new state, and of its error estimate.
+
+    `column` are the components' derivatives, shape (c,), in their own order; `forcing` that of the
+    kept rates at every stage by a parameter, shape (stages, kept), None for a direction of state
+    alone.
+    """
+    tableau, stages, order = step.tableau, step.stages, step.order
+    g, led = stages.step, len(stages.direct)
+    start = jnp.stack([column[i] for i in order])
+    nothing = jnp.zeros_like(start)
+    inverse, entries = _inverse(stages)
+    increments: list[Any] = []
+    for i in range(len(tableau.alpha)):
+        argument = _weighted_sum(tableau.a[i - 1] if i else (), increments, start)
+        coefficients = [tableau.gamma * c for c in tableau.c[i - 1]] if i else ()
+        memory = _weighted_sum(coefficients, increments, nothing)
+        if i == 0:
+            # Its argument is the start itself: the matrices are summed once for all directions.
+            right = (step.by_curvature[i] + step.by_state[i]) @ start
+        else:
+            right = step.by_curvature[i] @ start + step.by_state[i] @ argument
+        if forcing is not None:
+            right = right + forcing[i]
+        through = g * argument[led : 2 * led] + memory[:led]
+        solved = inverse @ (g * (right + entries @ through) + memory[led:])
+        followers = through + g * solved[:led]
+        increments.append(jnp.concatenate([followers, solved]))
+    back = [order.index(i) for i in range(len(column))]
+    end = _weighted_sum(end_weights(tableau), increments, start)
+    error = _weighted_sum(error_weights(tableau), increments, nothing)
+    return jnp.stack([end[i] for i in back]), jnp.stack([error[i] for i in back])
+
+
+def _inverse(stages: Stages) -> tuple[Any, Any]:
+    """(I − g J)⁻¹ of the kept components, and their J by the direct ones."""
+    kept = kept_in_order(stages)
+    places = [stages.kept.index(i) for i in kept]
+    inverse = jnp.stack([jnp.stack([stages.factors[i][j] for j in places]) for i in places])
+    if not stages.direct:
+        return inverse, jnp.zeros((len(kept), 0))
+    zero = jnp.zeros_like(stages.step)
+    entries = [
+        [
+            zero if entry is None else entry
+            for entry in (stages.jacobian[i][p] for p in stages.direct)
+        ]
+        for i in kept
+    ]
+    return inverse, jnp.stack([jnp.stack(row) for row in entries])
+
+
+def _weighted_sum(weights: Sequence[float], increments: Sequence[Any], start: Any) -> Any:
+    """start + Σ weights_j increments_j, one behind the other: sums that begin alike are shared."""
+    for weight, increment in zip(weights, increments, strict=False):
+        if weight != 0.0:
+            start = start + weight * increment
+    return start

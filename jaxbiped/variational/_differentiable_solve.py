@@ -1,0 +1,196 @@
+"""Differentiable solve: scenes solved by lanes, with derivatives of their own."""
+
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jax.custom_derivatives import SymbolicZero
+
+from jaxbiped._types import Scalar
+from jaxbiped.compiler import CompiledProgram, Recorded, Schedule, UnknownPrimitiveError, call
+from jaxbiped.dynamics._minimal_motion import vector_field
+from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._switches import switches
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, shapes_of
+from jaxbiped.solve._saved_outputs import Saved
+from jaxbiped.solve._units import units_of
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._solve_to_section import Precision
+from jaxbiped.variational._switch_locator import Watch
+from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._variational_solve import solve_variational
+from jaxbiped.variational._variational_types import VariationalSolution
+
+_LOOSER = 10.0
+"""Tolerance of derivatives, in units of the state's."""
+_FLOOR = 1e-4
+"""Size below which a derivative's error is absolute, along a direction of its own size."""
+_MOST_ATTEMPTS = 1_000_000
+_ROOM = 1 << 18
+"""Steps that there is room for at first; who takes more runs again, with room for as many."""
+_WATCH = Watch(field=vector_field, switches=switches)
+"""Derivatives are taken up to the time at which the plain solve ended."""
+
+
+class Setting(NamedTuple):
+    """What a program is made for, besides a scene's structure; see `AdaptiveSolve`.
+
+    Attributes:
+        solver, watch, counting, saved: see there.
+        quick: see `call`.
+    """
+
+    solver: AbstractRosenbrock
+    watch: tuple[str, ...]
+    counting: bool
+    quick: bool
+    saved: Saved = Saved()
+
+
+def solve_scene(solve: Solve, setting: Setting) -> Solved:
+    """Solves one simulation, or under `vmap` many.
+
+    Its derivatives are those of the final state, and by the duration that of the time; at the time
+    where a simulation ended otherwise, they are at that fixed time. They come from tangent columns
+    of exactly the leaves that are differentiated, under a tolerance of their own, in a solve of
+    their own: in forward mode one for all directions, in reverse mode its transpose.
+
+    Raises:
+        UnknownPrimitiveError: the scene holds an operation that lanes do not have.
+    """
+    leaves, structure = jtu.tree_flatten(solve)
+    if not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+        compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
+        return call(compiled, solve, quick=setting.quick)[0]
+    return Solved(*_unflatten(solve.state, _differentiable(setting, structure)(*leaves)))
+
+
+def solve_and_save(
+    solve: Solve, setting: Setting, *, times: np.ndarray | None = None, room: int = 0
+) -> tuple[Solved, Recorded | None]:
+    """The same with what the setting saves: records of the time and the state's eight components.
+
+    They are made at each of `times`, or for the first `room` arrivals at a section. It has no
+    derivatives.
+    """
+    compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
+    schedule = None if times is None else Schedule(times)
+    return call(compiled, solve, schedule, room=room, quick=setting.quick)
+
+
+def solve_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[Solved, np.ndarray]:
+    """One simulation, not traced, and the records of its at most so many steps, (n, numbers)."""
+    compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
+    one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], solve)
+
+    def run(room: int) -> tuple[Solved, Recorded]:
+        outputs, recorded = compiled.run(one, room=room, width=1, quick=setting.quick)
+        assert recorded is not None
+        return outputs, recorded
+
+    outputs, recorded = run(min(most, _ROOM))
+    if recorded.counts[0] > _ROOM:
+        # Memory is asked for by what a solve takes, not by what it might.
+        outputs, recorded = run(int(recorded.counts[0]))
+    return jtu.tree_map(lambda leaf: leaf[0], outputs), recorded.values[0, : recorded.counts[0]]
+
+
+@functools.lru_cache(maxsize=256)
+def compiled_solve(setting: Setting, scene: Any) -> CompiledProgram:
+    """The program for scenes of one structure (see `jax.tree.structure`)."""
+    body = AdaptiveSolve(
+        setting.solver, setting.watch, counting=setting.counting, saved=setting.saved
+    )
+    placeholder = jtu.tree_unflatten(scene, [0.0] * scene.num_leaves)
+    return CompiledProgram(body.program(), shapes_of(placeholder))
+
+
+@functools.lru_cache(maxsize=256)
+def is_expressible(setting: Setting, scene: Any) -> bool:
+    """Whether lanes have all operations of scenes of this structure (see `jax.tree.structure`)."""
+    try:
+        compiled_solve(setting, scene).check()
+    except UnknownPrimitiveError:
+        return False
+    return True
+
+
+@functools.lru_cache(maxsize=256)
+def _differentiable(setting: Setting, structure: Any) -> Callable[..., list[Scalar]]:
+    @jax.custom_jvp
+    def run(*leaves: Scalar) -> list[Scalar]:
+        solve = jtu.tree_unflatten(structure, leaves)
+        compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
+        found, _ = call(compiled, solve, quick=setting.quick)
+        return jtu.tree_leaves(found)
+
+    def rule(primals: Sequence[Scalar], tangents: Sequence[Any]) -> tuple[Any, Any]:
+        found = run(*primals)
+        solve = jtu.tree_unflatten(structure, primals)
+        moved = jtu.tree_unflatten(structure, tangents)
+        t, state, *counts = _unflatten(solve.state, found)
+        t_dot, state_dot = _tangents(setting, solve, moved, t, state)
+        none = [np.zeros(jnp.shape(count), dtype=jax.dtypes.float0) for count in counts]
+        return found, [t_dot, *state_dot, *none]
+
+    run.defjvp(rule, symbolic_zeros=True)
+    return run
+
+
+def _unflatten(like: Any, found: Sequence[Scalar]) -> tuple[Any, ...]:
+    t, *rest = found
+    size = len(like)
+    return t, type(like)(*rest[:size]), *rest[size:]
+
+
+def _tangents(
+    setting: Setting, solve: Solve, moved: Solve, t: Scalar, state: State
+) -> tuple[Scalar, list[Scalar]]:
+    """Derivatives of the time and of the final state along the tangents, linear in them."""
+    places = [i for i, dot in enumerate(moved.state) if not _is_zero(dot)]
+    scene_dots = jtu.tree_leaves(moved.scene, is_leaf=_is_zero)
+    active = tuple(i for i, dot in enumerate(scene_dots) if not _is_zero(dot))
+    total = [jnp.zeros_like(leaf) for leaf in state]
+    if places or active:
+        columns = _columns(setting, solve, places, active, t).columns
+        dots = [moved.state[i] for i in places] + [scene_dots[i] for i in active]
+        for k, dot in enumerate(dots):
+            total = [sum_ + columns[k, i] * dot for i, sum_ in enumerate(total)]
+    t_dot = jnp.zeros_like(t)
+    if not _is_zero(moved.duration):
+        t_dot = jnp.where(t >= solve.duration, 1.0, 0.0) * moved.duration
+        rates = vector_field(t, state, solve.scene)
+        total = [sum_ + rate * t_dot for sum_, rate in zip(total, rates, strict=True)]
+    return t_dot, total
+
+
+def _is_zero(tangent: Any) -> bool:
+    return isinstance(tangent, SymbolicZero)
+
+
+def _columns(
+    setting: Setting, solve: Solve, places: list[int], active: tuple[int, ...], t: Scalar
+) -> VariationalSolution:
+    """The final state's derivatives by components of the start and by leaves of the scene."""
+    c, m, p = len(solve.state), len(places), len(active)
+    start = np.zeros((c, m + p))
+    start[places, range(m)] = 1.0
+    leaves = jtu.tree_leaves(solve.scene)
+    sizes = [jnp.where(leaves[i] == 0.0, 1.0, jnp.abs(leaves[i])) for i in active]
+    inverse = units_of(solve.scene, solve.state).inverse
+    by_state = [jnp.asarray(_FLOOR * inverse[i]) for i in places]
+    floors = jnp.stack([*by_state, *(_FLOOR / size for size in sizes)])
+    return solve_variational(
+        _WATCH,
+        setting.solver,
+        Tangents(solve.state, jnp.asarray(start)),
+        Seeded(solve.scene, jnp.zeros((p, m + p)), floors, active),
+        jnp.ones(p),
+        precision=Precision(solve.rtol, _LOOSER * solve.rtol),
+        time_limit=t,
+        max_solver_steps=_MOST_ATTEMPTS,
+    )[0]

@@ -1,0 +1,222 @@
+"""First variation along a known motion in two directions, and the steps it takes, by lanes."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.compiler import Program
+from jaxbiped.variational._collocated_step import Order, Rows, Stages, collocate_step, order_of
+from jaxbiped.variational._curvature import LONG_AGO, SETTLED
+from jaxbiped.variational._flow import Flow
+from jaxbiped.variational._radau_collocation import Path
+from jaxbiped.variational._switch_crossings import crossing_of
+from jaxbiped.variational._tangents import active_leaves
+
+
+class Step(NamedTuple):
+    """A step by collocation of the motion and its v turned tangents.
+
+    Attributes:
+        before: state where it starts, (c,).
+        points, share: as from `collocate_step`.
+        fresh: whether it starts on a switch.
+        which: the number of the switch that it ends on, as in `Crossings`.
+        turned: tangents where it starts, in order, before the flow is taken out of them, (v, c).
+    """
+
+    before: Any
+    points: Any
+    share: Any
+    fresh: Any
+    which: Any
+    turned: Any
+
+    def row(self) -> Scalar:
+        """One number after the other."""
+        return jnp.concatenate([jnp.ravel(leaf).astype(float) for leaf in jax.tree.leaves(self)])
+
+    @staticmethod
+    def read(row: Scalar, like: "Step") -> "Step":
+        """Of a row, with arrays as large as those of another step."""
+        leaves, structure = jax.tree.flatten(like)
+        parts, place = [], 0
+        for leaf in leaves:
+            part = row[place : place + leaf.size].reshape(leaf.shape)
+            parts.append(part > 0.5 if leaf.dtype == bool else part)
+            place += leaf.size
+        return jax.tree.unflatten(structure, parts)
+
+    @staticmethod
+    def shape(components: int, count: int) -> "Step":
+        """Shapes of a step's arrays."""
+
+        def numbers(*shape: int) -> Any:
+            return jax.ShapeDtypeStruct(shape, jnp.float64)
+
+        return Step(
+            before=numbers(components),
+            points=numbers(3, components),
+            share=numbers(3),
+            fresh=jax.ShapeDtypeStruct((), jnp.bool_),
+            which=numbers(),
+            turned=numbers(count, components),
+        )
+
+
+class FirstVariationInputs(NamedTuple):
+    """Inputs.
+
+    Attributes:
+        args: parameters.
+        start, arrival: time and state where the motion starts and where it arrives, (1 + c,).
+        turned: tangents at the start, (v, c).
+        steps: how many the motion has.
+    """
+
+    args: PyTree
+    start: Any
+    arrival: Any
+    turned: Any
+    steps: Any
+
+
+class FirstVariation(NamedTuple):
+    """Outputs: tangents before the arrival (v, c), the state there, and the number of steps."""
+
+    turned: Any
+    state: Any
+    steps: Any
+
+
+class _Now(NamedTuple):
+    """What is carried.
+
+    Attributes:
+        node: state at the end of the last step, past a switch or not.
+        t, state: time and state, on the switch where there was one: `fresh`.
+        switched: time of the last switch.
+        turned: the tangents, in order.
+        read: nodes read; `taken` of them ended a step.
+        step: the last one, if the last node `ends` one.
+    """
+
+    node: Any
+    t: Any
+    state: Any
+    fresh: Any
+    switched: Any
+    turned: Any
+    read: Any
+    taken: Any
+    step: Step
+    ends: Any
+
+
+class FirstVariationSolve:
+    """The functions of the program: its tape's rows are time and state at the ends of steps.
+
+    The motion ends at the arrival, not at the last node, and begins and ends before its section:
+    that may be a switch, as touchdown is. At every step's start that is on no switch the part of
+    the flow is taken out of the tangents; see `_curvature`.
+    """
+
+    def __init__(self, flow: Callable[[Any], Flow], row: int) -> None:
+        self.flow, self.row = flow, row
+
+    def program(self) -> Program:
+        """The program."""
+        return Program(self.start, self.attempt, self.finish, record=self.record, tape=self.row)
+
+    def start(self, given: FirstVariationInputs) -> _Now:
+        flow = self.flow(given)
+        order, parameters = field_order(flow)
+        known = flow.earlier(given.start, parameters)
+        t, state = known[0], known[1:]
+        shape = Step.shape(len(state), given.turned.shape[0])
+        none, zero = jnp.asarray(False), jnp.zeros(())
+        return _Now(
+            node=state,
+            t=t,
+            state=state,
+            fresh=none,
+            switched=t - LONG_AGO,
+            turned=order.sorted(given.turned),
+            read=zero,
+            taken=zero,
+            step=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape),
+            ends=none,
+        )
+
+    def attempt(self, given: FirstVariationInputs, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
+        flow = self.flow(given)
+        order, parameters = field_order(flow)
+        read = now.read + 1.0
+        over = read >= given.steps
+        known = jnp.where(over, flow.earlier(given.arrival, parameters), row)
+        t, node = known[0], known[1:]
+        crossing = crossing_of(flow, flow.surfaces, now.node, node, parameters)
+        end = t - crossing.past
+        path = Path(
+            before=now.state,
+            after=crossing.landed,
+            start=now.t,
+            span=jnp.maximum(end - now.t, 0.0),
+            switched=now.switched,
+            fresh=now.fresh,
+        )
+        rows = Rows(flow.apart, order, list(parameters))
+        points, share, velocity = collocate_step(rows, path, crossing.crossed)
+        stages = Stages.of(order, share, jax.lax.map(rows.by_state, points))
+        begun, _ = without_flow(now.turned, order.sorted(velocity), now.fresh)
+        after = _Now(
+            node=node,
+            t=end,
+            state=crossing.landed,
+            fresh=crossing.crossed,
+            switched=jnp.where(crossing.crossed, end, now.switched),
+            turned=stages.carried(begun)[:, 2],
+            read=read,
+            taken=now.taken + 1.0,
+            step=Step(
+                before=now.state,
+                points=points,
+                share=share,
+                fresh=now.fresh,
+                which=crossing.which.astype(float),
+                turned=now.turned,
+            ),
+            ends=jnp.asarray(True),
+        )
+        soon = (end - now.switched < SETTLED) & ~crossing.crossed & ~over
+        waiting = now._replace(node=node, read=read, ends=jnp.asarray(False))
+        return jax.tree.map(lambda a, b: jnp.where(soon, a, b), waiting, after), over
+
+    def record(
+        self, given: FirstVariationInputs, now: _Now, time: Scalar
+    ) -> tuple[Scalar, list[Scalar]]:
+        """The steps."""
+        return now.ends, [now.step.row()]
+
+    def finish(self, given: FirstVariationInputs, now: _Now) -> FirstVariation:
+        order, _ = field_order(self.flow(given))
+        return FirstVariation(order.restored(now.turned), now.state, now.taken)
+
+
+def without_flow(turned: Scalar, velocity: Scalar, fresh: Scalar) -> tuple[Scalar, Scalar]:
+    """Tangents (v, c) without what they have of the flow, and what that is, (v,).
+
+    Where a step starts on a switch (`fresh`), nothing is taken out.
+    """
+    lost = jnp.where(fresh, 0.0, (turned @ velocity) / (velocity @ velocity))
+    return turned - lost[:, None] * velocity, lost
+
+
+def field_order(flow: Flow) -> tuple[Order, Scalar]:
+    """The order of components, and the active parameters."""
+    parameters = [jnp.asarray(leaf) for leaf in active_leaves(flow.args)]
+    state = [jnp.ones(())] * flow.structure.num_leaves
+    return order_of(flow.apart, state, parameters), jnp.stack(parameters)

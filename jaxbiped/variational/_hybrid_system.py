@@ -1,0 +1,164 @@
+"""Hybrid systems: the vector field, switches, endings and reset map that a return map needs."""
+
+import abc
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import PyTree
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._forces import foot_forces
+from jaxbiped.dynamics._impact import impact
+from jaxbiped.dynamics._minimal_motion import vector_field
+from jaxbiped.dynamics._redundant_motion import redundant_field
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._rolling import rolling, rolling_field
+from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
+from jaxbiped.dynamics._state import State, exchange_legs
+from jaxbiped.dynamics._switches import Switch, switches
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._ending import WATCHES, ending_events, rigid_ending
+
+
+class AbstractSystem(eqx.Module):
+    """An autonomous system whose periodic orbits can be found and differentiated.
+
+    The state is a pytree of scalars, and so are the parameters `args`. Subclass it to study a
+    system of your own: the walker is only one of them, `Walking`.
+
+    Attributes:
+        cyclic_coordinates: positions of the leaves that need not return, only advance: no rate may
+            depend on them.
+        reset_is_symmetry: whether `reset_map` maps motions to motions, as an exchange of legs does.
+            Second derivatives of cycles of several arrivals need it.
+    """
+
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = ()
+    reset_is_symmetry: ClassVar[bool] = False
+
+    @abc.abstractmethod
+    def vector_field(self, t: Any, y: PyTree, args: PyTree) -> PyTree:
+        """Time derivative of the state, in the form that `diffrax.ODETerm` takes."""
+
+    @abc.abstractmethod
+    def switches(self, args: PyTree, y: PyTree) -> tuple[Switch, ...]:
+        """Surfaces across which the vector field is not smooth."""
+
+    @abc.abstractmethod
+    def ending(self, args: PyTree, y: PyTree) -> Scalar:
+        """Code of the `Ending` that has come, 0 where the motion goes on."""
+
+    @abc.abstractmethod
+    def reset_map(self, args: PyTree, y: PyTree) -> PyTree:
+        """What is done to the state at each arrival: a symmetry, an impact, or nothing."""
+
+    @abc.abstractmethod
+    def load(self, args: PyTree, y: PyTree) -> Scalar | None:
+        """A quantity whose largest value along the orbit is wanted, or None."""
+
+
+def system_of(scene: Scene | RigidScene | RedundantScene) -> AbstractSystem:
+    """The system that a scene describes, in minimal coordinates."""
+    return Rolling() if isinstance(scene, RigidScene) else Walking()
+
+
+class Walking(AbstractSystem):
+    """The walker: legs exchanged at each footstep, the place along the slope left out."""
+
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = (State._fields.index("hip_x"),)
+    reset_is_symmetry: ClassVar[bool] = True
+
+    def vector_field(self, t: Any, y: State, args: Scene) -> State:
+        return vector_field(t, y, args)
+
+    def switches(self, args: Scene, y: State) -> tuple[Switch, ...]:
+        return switches(args, y)
+
+    def ending(self, args: Scene, y: State) -> Scalar:
+        return _ending(args, y)
+
+    def reset_map(self, args: Scene, y: State) -> State:
+        return exchange_legs(y)
+
+    def load(self, args: Scene, y: State) -> Scalar:
+        """Normal force on the foot that carries more [N]."""
+        return _load(args, y)
+
+
+class RedundantWalking(AbstractSystem):
+    """The walker in coordinates of each leg. Its constraints leave fewer directions than leaves.
+
+    `find_gait` tells its returns in minimal coordinates; by itself it is for `return_map`.
+    """
+
+    reset_is_symmetry: ClassVar[bool] = True
+
+    def vector_field(self, t: Any, y: Any, args: RedundantScene) -> Any:
+        return redundant_field(t, y, args)
+
+    def switches(self, args: Any, y: Any) -> tuple[Switch, ...]:
+        return switches(args, y)
+
+    def ending(self, args: Any, y: Any) -> Scalar:
+        return _ending(args, y)
+
+    def reset_map(self, args: Any, y: Any) -> Any:
+        return exchange_legs(y)
+
+    def load(self, args: Any, y: Any) -> Scalar:
+        """Normal force on the foot that carries more [N]."""
+        return _load(args, y)
+
+
+def _ending(args: Any, y: Any) -> Scalar:
+    code = jnp.asarray(0)
+    for name, happens in ending_events(WATCHES).items():
+        code = jnp.where(happens(0.0, y, args), int(name), code)
+    return code
+
+
+def _load(args: Any, y: Any) -> Scalar:
+    forces = foot_forces(args, y)
+    return jnp.maximum(forces.foot_1.normal, forces.foot_2.normal)
+
+
+def section_of(scene: Any, section: AbstractSection | None) -> AbstractSection:
+    """The section asked for, or the one that a scene's cycles begin at unless told otherwise.
+
+    Raises:
+        ArgumentError: a section other than heel strike for a rigid walker.
+    """
+    if not isinstance(scene, RigidScene):
+        return MidStance() if section is None else section
+    if section is not None and not isinstance(section, HeelStrike):
+        raise ArgumentError(
+            f"section = {section!r} is not allowed for a RigidScene: its cycles begin just after "
+            "the impact, at HeelStrike()."
+        )
+    return HeelStrike()
+
+
+class Rolling(AbstractSystem):
+    """The rigid walker: it rolls on leg 2, and exchanges support at each heel strike."""
+
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = (RigidState._fields.index("hip_x"),)
+
+    def vector_field(self, t: Any, y: RigidState, args: RigidScene) -> RigidState:
+        return rolling_field(t, y, args)
+
+    def switches(self, args: RigidScene, y: RigidState) -> tuple[Switch, ...]:
+        return ()
+
+    def ending(self, args: RigidScene, y: RigidState) -> Scalar:
+        return rigid_ending(y)
+
+    def reset_map(self, args: RigidScene, y: RigidState) -> RigidState:
+        return impact(args, y).state
+
+    def load(self, args: RigidScene, y: RigidState) -> Scalar:
+        """Normal force on the foot that rolls [N]; an impact has an impulse instead."""
+        return rolling(args, y).force.normal

@@ -1,0 +1,97 @@
+"""Saltation of tangents at a switch where the vector field jumps."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
+
+_BEYOND = 1e-3
+"""How far across a surface its other side is looked at, as a share of the distance to it."""
+
+
+class Saltation(NamedTuple):
+    """The jump of a column dy across a surface: change · (by_state · dy + by_parameter · dp).
+
+    A motion that is moved by dy meets the surface g = 0 earlier by g' dy / ġ, and is carried for
+    that long by the field f⁺ behind it in place of f⁻ before it: dy jumps by
+    (f⁺ − f⁻) (g' dy + g_p dp) / ġ⁻.
+
+    Attributes:
+        change: (f⁺ − f⁻)/ġ⁻, shape (c,).
+        by_state, by_parameter: derivatives of g by the state, shape (c,), and by the active
+            parameters, shape (p,).
+        which: which of the surfaces where the field jumps it is (booleans).
+    """
+
+    change: Scalar
+    by_state: Scalar
+    by_parameter: Scalar
+    which: Scalar
+
+
+def has_saltation(watch: Any, state: PyTree, args: PyTree) -> bool:
+    """Whether the field jumps anywhere at all; known before anything runs."""
+    return any(switch.force_jumps for switch in watch.switches(args, state))
+
+
+def jump_surface_values(watch: Any, state: PyTree, args: PyTree) -> Scalar:
+    """Values of the functions that are zero where the field jumps."""
+    return jnp.stack([s.value for s in watch.switches(args, state) if s.force_jumps])
+
+
+def saltation_at(watch: Any, state: PyTree, args: Seeded, happens: Scalar) -> Saltation:
+    """The leap at a state that lies just past a surface where the field jumps.
+
+    Of several surfaces it is the one that was passed last. Zero where it does not `happen`.
+    """
+    leaves, structure = jtu.tree_flatten(state)
+    moved = active_leaves(args)
+
+    def values(y: list[Scalar], p: list[Scalar]) -> list[Scalar]:
+        return list(
+            jump_surface_values(watch, jtu.tree_unflatten(structure, y), with_active(args, p))
+        )
+
+    def field(y: list[Scalar]) -> Scalar:
+        rates = watch.field(jnp.zeros_like(leaves[0]), jtu.tree_unflatten(structure, y), args.args)
+        return jnp.stack(jtu.tree_leaves(rates))
+
+    def beyond(k: int, value: Scalar, normal: Scalar) -> Scalar:
+        """The field on the other side of surface k, as near as rounding allows."""
+        rounding = 8.0 * jnp.finfo(value.dtype).eps
+        other = jnp.abs(value) * _BEYOND + rounding
+        shift = (jnp.where(value > 0.0, -other, other) - value) / jnp.sum(normal * normal)
+        return field([leaf + shift * part for leaf, part in zip(leaves, normal, strict=True)])
+
+    def compute() -> Saltation:
+        after = field(leaves)
+        slopes = jax.jacrev(values, argnums=(0, 1))(leaves, moved)
+        found, nearest = None, jnp.zeros(())
+        surfaces = values(leaves, moved)
+        for k, value in enumerate(surfaces):
+            which = jnp.arange(len(surfaces)) == k
+            normal, along = jnp.stack(slopes[k][0]), slopes[k][1]
+            before = beyond(k, value, normal)
+            rate = jnp.sum(normal * before)
+            safe = jnp.where(rate == 0.0, jnp.finfo(rate.dtype).tiny, rate)
+            by_parameter = jnp.stack(along) if along else jnp.zeros(0, dtype=rate.dtype)
+            saltation = Saltation((after - before) / safe, normal, by_parameter, which)
+            delay = jnp.abs(value / safe)
+            closer = delay < nearest
+            found = saltation if found is None else _where(closer, saltation, found)
+            nearest = delay if k == 0 else jnp.where(closer, delay, nearest)
+        assert found is not None
+        return found
+
+    found = fusion_barrier(happens, compute)
+    return found._replace(change=jnp.where(happens, found.change, 0.0))
+
+
+def _where(condition: Scalar, a: Saltation, b: Saltation) -> Saltation:
+    return Saltation(*(jnp.where(condition, x, y) for x, y in zip(a, b, strict=True)))

@@ -1,0 +1,61 @@
+"""Solves to a section by lanes, with derivatives."""
+
+from typing import Any
+
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.compiler import Recording
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._solve_to_section import Nodes, Precision, SectionArrival
+from jaxbiped.variational._switch_locator import Watch
+from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._variational_solve import solve_variational
+from jaxbiped.variational._variational_types import VariationalSolution
+
+
+def solve_to_section_by_lanes(
+    watch: Watch,
+    solver: AbstractRosenbrock,
+    y0: Tangents,
+    args: Seeded,
+    sizes: Scalar,
+    *,
+    precision: Precision,
+    time_limit: Any,
+    max_solver_steps: int,
+    steered: Any,
+) -> SectionArrival:
+    """`passage` for columns as `solve_variational` takes them; nodes are told as a `Recording`."""
+    found, recording = solve_variational(
+        watch,
+        solver,
+        y0,
+        args,
+        sizes,
+        precision=precision,
+        time_limit=time_limit,
+        max_solver_steps=max_solver_steps,
+        steered=steered,
+        save_nodes=True,
+    )
+    return SectionArrival(
+        y=Tangents(found.state, found.columns.T),
+        time=found.t,
+        time_columns=found.time_columns,
+        code=found.code,
+        peak=found.peak,
+        peak_columns=found.peak_columns,
+        jumps=found.jumps,
+        missed=found.missed,
+        attempted=found.attempted,
+        nodes=None if recording is None else _nodes(y0.state, found, recording),
+    )
+
+
+def _nodes(start: PyTree, found: VariationalSolution, recording: Recording) -> Nodes:
+    first = jnp.stack([jnp.zeros(()), *jtu.tree_leaves(start)])
+    last = jnp.stack([found.t, *jtu.tree_leaves(found.state)])
+    return Nodes(first, recording, last, found.accepted)

@@ -1,0 +1,257 @@
+"""Solve to a section: from a state to the next arrival."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve._ending import Ending
+from jaxbiped.solve._units import units_of
+from jaxbiped.solve.controllers._step_control import first_step, step_control
+from jaxbiped.variational._switch_locator import (
+    SwitchLocator,
+    SwitchLocatorState,
+    Watch,
+    plain_args,
+    plain_state,
+)
+from jaxbiped.variational._tangent_solver import (
+    TangentControl,
+    TangentSolver,
+    VariationalField,
+    worst_norm,
+)
+from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
+
+Along: TypeAlias = Callable[[Callable[[PyTree, PyTree], Any], Tangents, Seeded], tuple[Any, Any]]
+"""Values of a function of state and arguments, and their derivatives along columns."""
+
+
+class Precision(NamedTuple):
+    """How exactly to solve.
+
+    Attributes:
+        rtol: relative tolerance of the state; the absolute one is a hundredth of it in the
+            scene's units.
+        tangent_rtol: relative tolerance of the columns.
+    """
+
+    rtol: Any
+    tangent_rtol: Any
+
+
+class Nodes(NamedTuple):
+    """The ends of a solve's accepted steps; rows are times and states, one number after the other.
+
+    Attributes:
+        start: where the first step begins, shape (1 + c,).
+        ends: shape (room, 1 + c), by lanes a `Recording` of them. The last one lies just past the
+            section; no numbers are beyond it.
+        arrival: on the section, shape (1 + c,).
+        steps: how many there are.
+    """
+
+    start: Scalar
+    ends: Any
+    arrival: Scalar
+    steps: Scalar
+
+
+class SectionArrival(NamedTuple):
+    """An arrival at a section, or what came instead.
+
+    Attributes:
+        y: state on the section; with its columns there, where the solve carried any: the motion
+            of the arrival is taken off.
+        time: duration of the passage [s].
+        time_columns: derivatives of the time of arrival, shape (n,).
+        code: 0 for an arrival, else that of an `Ending`.
+        peak: largest value of the watched quantity, 0 where there is none; `peak_columns` its
+            derivatives, shape (n,), where the solve carried columns.
+        jumps: steps that ended past a switch where the vector field itself jumps.
+        missed: whether the last of them was the last step at all: columns did not leap there.
+        attempted: number of steps attempted.
+        nodes: the ends of the accepted steps, where saved.
+    """
+
+    y: Any
+    time: Scalar
+    time_columns: Any
+    code: Scalar
+    peak: Scalar
+    peak_columns: Any
+    jumps: Scalar
+    missed: Scalar
+    attempted: Scalar
+    nodes: Nodes | None
+
+
+def solve_to_section(
+    watch: Watch,
+    solver: diffrax.AbstractAdaptiveSolver,
+    y0: Any,
+    args: Any,
+    *,
+    precision: Precision,
+    time_limit: Any,
+    max_solver_steps: int,
+    columns_only_steer: bool = False,
+    save_nodes: bool = False,
+) -> SectionArrival:
+    """Solves from `y0` until the section of `watch`, a misfortune, or `time_limit` [s].
+
+    With `y0` a `Tangents` and `args` a `Seeded` the columns are carried along under
+    `precision.tangent_rtol`.
+    """
+    carries = isinstance(y0, Tangents)
+    norm = worst_norm if carries else rms_norm
+    units = units_of(plain_args(args), plain_state(y0))
+    # Columns come to the norm as the tangents' own control has scaled them.
+    carried = units
+    if carries:
+        one = jnp.ones((), y0.columns.dtype)
+        carried = units._replace(inverse=Tangents(units.inverse, one))
+    controller: Any = step_control(precision.rtol, 1e-2 * precision.rtol, norm, carried)
+    field: Any = watch.field
+    if carries:
+        controller = TangentControl.around(controller, precision.tangent_rtol, units)
+        solver = TangentSolver(watch, solver, columns_only_steer)
+        field = VariationalField(watch.field)
+    end = diffrax.SubSaveAt(t1=True)
+    every = diffrax.SubSaveAt(t0=True, steps=True, fn=_plain_node)
+    subs = [end, every] if save_nodes else [end]
+    limit = jnp.asarray(time_limit, dtype=jnp.result_type(*jtu.tree_leaves(y0)))
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(field),
+        solver,
+        t0=jnp.zeros_like(limit),
+        t1=limit,
+        dt0=first_step(limit, units.time),
+        y0=y0,
+        args=args,
+        saveat=diffrax.SaveAt(subs=subs, controller_state=True),
+        stepsize_controller=SwitchLocator.around(controller, watch),
+        max_steps=max_solver_steps,
+        throw=False,
+    )
+    times: Any = solution.ts
+    states: Any = solution.ys
+    landed: Any = solution.controller_state
+    last = jtu.tree_map(lambda leaf: leaf[-1], states[0])
+    y, time, time_columns = onto_section(watch, last, times[0][-1], args)
+    peak, peak_columns = jnp.zeros(()), None
+    if carries:
+        peak, rows = peak_of(watch, landed.at_peak, args)
+        # Columns that have yet to leap do not tell how a load right behind a jump changes.
+        peak_columns = jnp.where(landed.peak_saltation_pending, jnp.nan, rows)
+    return SectionArrival(
+        y=y,
+        time=time,
+        time_columns=time_columns,
+        code=_code(solution, landed),
+        peak=peak,
+        peak_columns=peak_columns,
+        jumps=landed.jumps,
+        missed=landed.saltation_pending,
+        attempted=solution.stats["num_steps"],
+        nodes=_nodes(times[1], states[1], time, y) if save_nodes else None,
+    )
+
+
+def _nodes(times: Scalar, states: PyTree, time: Scalar, y: Any) -> Nodes:
+    """From times and states of which the first are those of the start; infinite beyond the last."""
+    rows = jnp.stack([times, *jtu.tree_leaves(states)], axis=-1)
+    arrival = jnp.stack([time, *jtu.tree_leaves(plain_state(y))])
+    return Nodes(rows[0], rows[1:], arrival, jnp.sum(jnp.isfinite(times)) - 1)
+
+
+def _plain_node(t: Any, y: Any, args: Any) -> PyTree:
+    return y.state if isinstance(y, Tangents) else y
+
+
+def _code(solution: diffrax.Solution, landed: SwitchLocatorState) -> Scalar:
+    results = diffrax.RESULTS
+    out_of_steps = (solution.result == results.max_steps_reached) | (
+        solution.result == results.successful
+    )
+    failed = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), int(Ending.SOLVER_FAILED))
+    ended = jnp.where(landed.code != 0, landed.code, failed)
+    return jnp.where(landed.arrived, 0, ended)
+
+
+def arrival_at(watch: Watch, state: PyTree, args: PyTree) -> tuple[PyTree, Scalar]:
+    """The state on the section just before `state`, and how long before [s]."""
+    assert watch.section is not None
+    section = watch.section
+
+    def back(y: PyTree, rate: PyTree, time: Any) -> PyTree:
+        return jtu.tree_map(lambda s, r: s - time * r, y, rate)
+
+    def newton(y: PyTree) -> tuple[Scalar, PyTree]:
+        rate = watch.field(jnp.zeros(()), y, args)
+        value, slope = jax.jvp(lambda s: section(args, s)[0], (y,), (rate,))
+        return value / slope, rate
+
+    past, rate = newton(state)
+    # The overshoot is a small part of a step: a midpoint step back, and what that leaves.
+    middle = watch.field(jnp.zeros(()), back(state, rate, 0.5 * past), args)
+    near = back(state, middle, past)
+    # Without this second iteration derivatives would be wrong by a part as large as the overshoot.
+    left, rate = newton(near)
+    return back(near, rate, left), past + left
+
+
+def onto_section(
+    watch: Watch, y: Any, t: Any, args: Any, along: Along = along_columns
+) -> tuple[Any, Scalar, Any]:
+    """Takes the small overshoot back; its derivatives follow the arrival.
+
+    Gives what is on the section, the time, and the time's derivatives. `along` differentiates
+    along the columns.
+    """
+    time = jax.lax.stop_gradient(t)
+
+    def arrival(state: PyTree, scene: PyTree) -> tuple[PyTree, Scalar]:
+        reached, past = arrival_at(watch, state, scene)
+        return reached, time - past
+
+    if not isinstance(y, Tangents):
+        return *arrival(y, args), None
+    assert isinstance(args, Seeded)
+    (state, at), (columns, time_columns) = along(arrival, y, args)
+    return Tangents(state, as_columns(columns)), at, time_columns
+
+
+def peak_of(
+    watch: Watch, at_peak: Any, args: Seeded, along: Along = along_columns
+) -> tuple[Scalar, Scalar]:
+    """The largest load and its derivatives.
+
+    The solve landed just past the moment at which the load's rate is zero; that little time is
+    taken back, for the load's rate changes fast during an impact.
+    """
+    if watch.peak is None:
+        return jnp.zeros(()), jnp.zeros(args.seeds.shape[1])
+    load = watch.peak
+
+    def value(y: PyTree, a: PyTree) -> Scalar:
+        return load(a, y)
+
+    def rate(y: PyTree, a: PyTree) -> Scalar:
+        velocity = watch.field(jnp.zeros(()), y, a)
+        return jax.jvp(lambda y: load(a, y), (y,), (velocity,))[1]
+
+    highest, row = along(value, at_peak, args)
+    slope, slope_row = along(rate, at_peak, args)
+    state = at_peak.state
+    velocity = watch.field(jnp.zeros(()), state, args.args)
+    bend = jax.jvp(lambda y: rate(y, args.args), (state,), (velocity,))[1]
+    turned = bend < 0.0
+    past = jnp.where(turned, slope / jnp.where(turned, bend, 1.0), 0.0)
+    return highest - 0.5 * past * slope, row - past * slope_row

@@ -1,0 +1,275 @@
+"""Switch locator: a step-size controller whose steps end just past every switch."""
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._switches import Switch
+from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.variational._tangents import Seeded, Tangents
+
+_OVERSHOOT = 1e-4
+"""Largest part of a step that may lie past a switch."""
+MARGIN = 1e-12
+"""Time past a switch [s] that a step may always end, and aims at: the side must be beyond doubt."""
+_BISECTIONS = 40
+_ROUNDING = 1e-12
+
+
+class Watch(eqx.Module):
+    """What a solve lands on, and what ends it. All functions take (args, state).
+
+    Attributes:
+        field: vector field (t, state, args).
+        switches: the surfaces that no step may straddle.
+        section: value and whether a crossing counts; the solve ends where the value rises through
+            zero and it does. None: nothing to arrive at.
+        ending: code of a misfortune that ends the solve, 0 for none.
+        peak: a quantity whose largest value is to be known.
+    """
+
+    field: Callable[[Any, PyTree, PyTree], PyTree] = eqx.field(static=True)
+    switches: Callable[[PyTree, PyTree], tuple[Switch, ...]] = eqx.field(static=True)
+    section: Callable[[PyTree, PyTree], tuple[Scalar, Scalar]] | None = eqx.field(
+        static=True, default=None
+    )
+    ending: Callable[[PyTree, PyTree], Scalar] | None = eqx.field(static=True, default=None)
+    peak: Callable[[PyTree, PyTree], Any] | None = eqx.field(static=True, default=None)
+
+
+class SwitchLocatorState(NamedTuple):
+    """What a solve with `SwitchLocator` knows at its end, besides the state.
+
+    Attributes:
+        inner: state of the wrapped controller.
+        accepted: number of steps accepted.
+        landings: number of them that ended just past a switch.
+        jumps: number of them that ended past a switch where the vector field itself jumps.
+        leapt: whether the last accepted step did: columns have yet to leap there.
+        peak_leapt: whether the step with the largest value did.
+        arrived: whether the section was reached.
+        code: that of the misfortune that ended the solve, 0 for none.
+        peak: largest value of the watched quantity at the ends of steps; None where none is.
+        at_peak: the solve's whole state there.
+    """
+
+    inner: Any
+    accepted: Scalar
+    landings: Scalar
+    jumps: Scalar
+    saltation_pending: Scalar
+    peak_saltation_pending: Scalar
+    arrived: Scalar
+    code: Scalar
+    peak: Any
+    at_peak: Any
+
+
+class SwitchLocator(diffrax.AbstractAdaptiveStepSizeController):
+    """Wraps a controller; a step that crosses a switch is tried again, to end just past it.
+
+    So no step straddles a jump of the Jacobian, which would ruin derivatives taken through the
+    solver long before the state shows it. Where to end comes from the switch functions and their
+    rates at both ends of the step, by a cubic; a few attempts do. The first step of a solve never
+    counts as an arrival, so a solve may start on its section.
+    """
+
+    rtol: Any
+    atol: Any
+    norm: Callable[[PyTree], Any]
+    controller: Any
+    watch: Watch
+
+    @staticmethod
+    def around(controller: Any, watch: Watch) -> "SwitchLocator":
+        """Wraps a controller."""
+        return SwitchLocator(controller.rtol, controller.atol, controller.norm, controller, watch)
+
+    def wrap(self, direction: Any) -> "SwitchLocator":
+        """As diffrax asks; direction makes no difference here."""
+        return self
+
+    def init(self, terms: Any, t0: Any, t1: Any, y0: Any, dt0: Any, args: Any, *rest: Any) -> Any:
+        """The first step's end and the controller's state, as diffrax asks."""
+        first, inner = self.controller.init(terms, t0, t1, y0, dt0, args, *rest)
+        zero = jnp.asarray(0)
+        peak = None
+        if self.watch.peak is not None:
+            peak = jax.lax.stop_gradient(self.watch.peak(plain_args(args), plain_state(y0)))
+        at_peak = None if peak is None else y0
+        no = jnp.asarray(False)
+        return first, SwitchLocatorState(inner, zero, zero, zero, no, no, no, zero, peak, at_peak)
+
+    def adapt_step_size(
+        self,
+        t0: Any,
+        t1: Any,
+        y0: Any,
+        y1_candidate: Any,
+        args: Any,
+        y_error: Any,
+        error_order: Any,
+        controller_state: SwitchLocatorState,
+    ) -> Any:
+        """Accepts or rejects a step, as diffrax asks."""
+        keep, next_t0, next_t1, jump, inner, result = self.controller.adapt_step_size(
+            t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state.inner
+        )
+        parts = (plain_args(args), plain_state(y0), plain_state(y1_candidate))
+        scene, before, after = jax.lax.stop_gradient(parts)
+        crossed, part = self._crossings(t1 - t0, scene, before, after, controller_state)
+        before_switch, span = (t1 - t0) * part, t1 - t0
+        far = span - before_switch > jnp.maximum(_OVERSHOOT * before_switch, 4.0 * MARGIN)
+        again = crossed.any & far
+        target = t0 + before_switch * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
+        target = jax.lax.stop_gradient(target)
+        next_t1 = jnp.where(again, jnp.where(keep, target, jnp.minimum(next_t1, target)), next_t1)
+        next_t0 = jnp.where(again, t0, next_t0)
+        keep = keep & ~again
+        inner = jtu.tree_map(
+            lambda old, new: jnp.where(again, old, new), controller_state.inner, inner
+        )
+        landed = self._landed(inner, keep, crossed, scene, after, y1_candidate, controller_state)
+        ends = landed.arrived | (landed.code != 0)
+        ended = diffrax.RESULTS.where(
+            ends, diffrax.RESULTS.event_occurred, diffrax.RESULTS.successful
+        )
+        result = diffrax.RESULTS.where(result == diffrax.RESULTS.successful, ended, result)
+        # A state that is no longer a number leaves no step size to go on with.
+        lost = ~jnp.isfinite(next_t1)
+        result = diffrax.RESULTS.where(lost, diffrax.RESULTS.dt_min_reached, result)
+        return keep, next_t0, next_t1, jump | landed.saltation_pending, landed, result
+
+    def _crossings(
+        self, span: Any, scene: PyTree, before: PyTree, after: PyTree, landed: SwitchLocatorState
+    ) -> tuple["_Crossed", Scalar]:
+        """Which surfaces a step crosses, and the part of it that lies before the first."""
+        watch = self.watch
+        surfaces = functools.partial(_surfaces, watch, landed.peak, scene)
+        at_start, at_end = surfaces(before), surfaces(after)
+        crossed = [
+            ((a.value > 0.0) != (b.value > 0.0)) & (a.live | b.live)
+            for a, b in zip(at_start, at_end, strict=True)
+        ]
+        arrives = jnp.asarray(False)
+        if watch.section is not None:
+            arrives = crossed[-1] & (at_end[-1].value > 0.0) & (landed.accepted > 0)
+            crossed[-1] = arrives
+        others = (watch.peak is not None) + (watch.section is not None)
+        switching = crossed[: len(crossed) - others]
+        jumps = [c for c, s in zip(switching, at_end, strict=False) if s.force_jumps]
+        any_crossed = functools.reduce(jnp.logical_or, crossed, jnp.asarray(False))
+
+        def locate() -> Scalar:
+            parts = []
+            for state, found in ((before, at_start), (after, at_end)):
+                rate = watch.field(jnp.zeros_like(span), state, scene)
+                values = jnp.stack([s.value for s in found])
+                _, slopes = jax.jvp(lambda y: [s.value for s in surfaces(y)], (state,), (rate,))
+                parts += [values, span * jnp.stack(slopes)]
+            roots = _cubic_root(parts[0], parts[2], parts[1], parts[3])
+            return jnp.min(jnp.where(jnp.stack(crossed), roots, 1.0))
+
+        part = jnp.ones_like(span)
+        if crossed:
+            part = jnp.where(any_crossed, fusion_barrier(any_crossed, locate), part)
+        none = jnp.asarray(False)
+        found = _Crossed(
+            any_crossed,
+            functools.reduce(jnp.logical_or, switching, none),
+            functools.reduce(jnp.logical_or, jumps, none),
+            arrives,
+        )
+        return found, part
+
+    def _landed(
+        self,
+        inner: Any,
+        keep: Scalar,
+        crossed: "_Crossed",
+        scene: PyTree,
+        after: PyTree,
+        y1: Any,
+        old: SwitchLocatorState,
+    ) -> SwitchLocatorState:
+        code = old.code
+        if self.watch.ending is not None:
+            ending = functools.partial(self.watch.ending, scene, after)
+            code = jnp.where(keep, fusion_barrier(keep, ending), 0)
+        peak, at_peak, peak_saltation_pending = old.peak, old.at_peak, old.peak_saltation_pending
+        if self.watch.peak is not None:
+            value = fusion_barrier(keep, functools.partial(self.watch.peak, scene, after))
+            record = keep & (value > peak)
+            peak = jnp.where(record, value, peak)
+            peak_saltation_pending = jnp.where(record, crossed.jump, peak_saltation_pending)
+            at_peak = jtu.tree_map(lambda a, b: jnp.where(record, a, b), y1, at_peak)
+        return SwitchLocatorState(
+            inner=inner,
+            accepted=old.accepted + jnp.where(keep, 1, 0),
+            landings=old.landings + jnp.where(keep & crossed.switch, 1, 0),
+            jumps=old.jumps + jnp.where(keep & crossed.jump, 1, 0),
+            saltation_pending=jnp.where(keep, crossed.jump, old.saltation_pending),
+            peak_saltation_pending=peak_saltation_pending,
+            arrived=keep & crossed.section,
+            code=code,
+            peak=peak,
+            at_peak=at_peak,
+        )
+
+
+class _Crossed(NamedTuple):
+    any: Scalar
+    switch: Scalar
+    jump: Scalar
+    section: Scalar
+
+
+def plain_state(y: Any) -> PyTree:
+    """The state without its columns."""
+    return y.state if isinstance(y, Tangents) else y
+
+
+def plain_args(args: Any) -> PyTree:
+    """The arguments without their seeds."""
+    return args.args if isinstance(args, Seeded) else args
+
+
+def _surfaces(watch: Watch, peak: Any, scene: PyTree, state: PyTree) -> list[Switch]:
+    """Every surface to land on: switches, where the peak quantity turns, and last the section."""
+    found = list(watch.switches(scene, state))
+    if watch.peak is not None:
+        rate = watch.field(jnp.zeros_like(peak), state, scene)
+        quantity = functools.partial(watch.peak, scene)
+        value, slope = jax.jvp(quantity, (state,), (rate,))
+        # The same value computed twice may differ by its rounding.
+        found.append(Switch(slope, value >= peak - _ROUNDING * jnp.abs(peak)))
+    if watch.section is not None:
+        found.append(Switch(*watch.section(scene, state)))
+    return found
+
+
+def _cubic_root(start: Scalar, end: Scalar, start_slope: Scalar, end_slope: Scalar) -> Scalar:
+    """Where on (0, 1] a cubic with these values and slopes at 0 and 1 changes sign.
+
+    The upper end of the last bracket: the cubic has changed sign there.
+    """
+    second = 3.0 * (end - start) - 2.0 * start_slope - end_slope
+    third = 2.0 * (start - end) + start_slope + end_slope
+
+    def halve(_: Any, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+        lower, upper = ends
+        middle = 0.5 * (lower + upper)
+        value = start + middle * (start_slope + middle * (second + middle * third))
+        unchanged = (value > 0.0) == (start > 0.0)
+        return jnp.where(unchanged, middle, lower), jnp.where(unchanged, upper, middle)
+
+    ends = (jnp.zeros_like(start), jnp.ones_like(start))
+    return jax.lax.fori_loop(0, _BISECTIONS, halve, ends)[1]

@@ -1,0 +1,212 @@
+"""Tangent solver: state and derivatives stepped together, their errors controlled together."""
+
+import functools
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve._projected_solver import Projected
+from jaxbiped.solve._units import Units
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._rosenbrock_tangents import rosenbrock_tangents
+from jaxbiped.variational._saltation import has_saltation, jump_surface_values, saltation_at
+from jaxbiped.variational._switch_locator import Watch
+from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
+
+SHARE = 0.1
+"""Of a column's largest entry: what its smaller entries' errors are measured against."""
+
+
+class VariationalField(eqx.Module):
+    """The vector field of `Tangents`: f, and J Y + f_p for the columns."""
+
+    field: Callable[..., PyTree]
+
+    def __call__(self, t: Any, y: Tangents, args: Seeded) -> Tangents:
+        rate, columns = along_columns(lambda s, a: self.field(t, s, a), y, args)
+        return Tangents(rate, as_columns(columns))
+
+
+class TangentSolver(diffrax.AbstractAdaptiveSolver):
+    """Steps a state and its columns: the columns by the exact derivative of the solver's step.
+
+    They share the step's Jacobian and factorisation. Their error estimate is the derivative of
+    the state's; `TangentControl` reads it. Steps forwards in time.
+
+    Attributes:
+        watch: with the state's own vector field, and the surfaces where it jumps.
+        solver: any one-step solver that carries nothing from step to step.
+        columns_only_steer: whether the columns only choose the steps and are not themselves
+            differentiated: for reverse mode, whose derivatives then are these columns' transpose.
+    """
+
+    watch: Watch
+    solver: diffrax.AbstractAdaptiveSolver
+    columns_only_steer: bool = eqx.field(static=True, default=False)
+    term_structure: ClassVar = diffrax.AbstractTerm
+    interpolation_cls: ClassVar[Any] = diffrax.LocalLinearInterpolation
+
+    def order(self, terms: Any) -> int | None:
+        """Order of the solver."""
+        return self.solver.order(terms)
+
+    def error_order(self, terms: Any) -> Any:
+        """Order of the solver's error estimate."""
+        return self.solver.error_order(terms)
+
+    def init(self, terms: Any, t0: Any, t1: Any, y0: Tangents, args: Seeded) -> None:
+        """Nothing is carried from step to step."""
+        return None
+
+    def func(self, terms: Any, t0: Any, y0: Tangents, args: Seeded) -> Tangents:
+        """The vector field at a point."""
+        return terms.vf(t0, y0, args)
+
+    def step(
+        self,
+        terms: Any,
+        t0: Any,
+        t1: Any,
+        y0: Tangents,
+        args: Seeded,
+        solver_state: None,
+        made_jump: Any,
+    ) -> tuple[Tangents, Tangents, dict[str, Any], None, Any]:
+        """One step, as `diffrax.AbstractSolver.step` describes it."""
+        del terms, solver_state
+        y0 = _apply_saltation(self.watch, y0, args, made_jump)
+        if self.columns_only_steer:
+            y1, error = _plain_step(self, t0, t1, y0.state, args.args)
+            steering, errors = jax.lax.stop_gradient(_tangent_step(self, t0, t1, y0, args))
+            new, error = Tangents(y1, steering.columns), Tangents(error, errors.columns)
+        else:
+            new, error = _tangent_step(self, t0, t1, y0, args)
+        return new, error, dict(y0=y0, y1=new), None, diffrax.RESULTS.successful
+
+
+def _apply_saltation(watch: Watch, y: Tangents, args: Seeded, made_jump: Any) -> Tangents:
+    """The columns behind a jump of the field, where one has just been passed.
+
+    The state stays what it is, but JAX's own derivatives of it leap as well.
+    """
+    if not has_saltation(watch, y.state, args.args):
+        return y
+    still, held = jax.lax.stop_gradient((y.state, args))
+    saltation = saltation_at(watch, still, held, jax.lax.stop_gradient(jnp.asarray(made_jump)))
+    rows = saltation.by_state @ y.columns + saltation.by_parameter @ args.seeds
+    leaves, structure = jtu.tree_flatten(y.state)
+    nothing = jump_surface_values(watch, y.state, args.args)
+    nothing = nothing - jax.lax.stop_gradient(nothing)
+    shift = jnp.sum(jnp.where(saltation.which, nothing, 0.0))
+    moved = [leaf + change * shift for leaf, change in zip(leaves, saltation.change, strict=True)]
+    state = jtu.tree_unflatten(structure, moved)
+    return Tangents(state, y.columns + jnp.outer(saltation.change, rows))
+
+
+def _plain_step(
+    solver: TangentSolver, t0: Any, t1: Any, state: PyTree, args: PyTree
+) -> tuple[PyTree, PyTree]:
+    term = diffrax.ODETerm(solver.watch.field)
+    y1, error, *_ = solver.solver.step(term, t0, t1, state, args, None, False)
+    return y1, error
+
+
+@eqx.filter_jit  # for its trace cache
+def _tangent_step(
+    solver: TangentSolver, t0: Any, t1: Any, y0: Tangents, args: Seeded
+) -> tuple[Tangents, Tangents]:
+    inner = solver.solver
+    if isinstance(inner, Projected):
+        bare = TangentSolver(solver.watch, inner.solver, solver.columns_only_steer)
+        stepped, errors = _tangent_step(bare, t0, t1, y0, args)
+        state, columns = along_columns(lambda s, a: inner.project(a, s), stepped, args)
+        return Tangents(state, as_columns(columns)), errors
+    if isinstance(inner, AbstractRosenbrock):
+        found = rosenbrock_tangents(inner.tableau, solver.watch.field, t0, t1, y0, args)
+        if found is not None:
+            return found
+    step = functools.partial(_plain_step, solver, t0, t1)
+    (y1, error), (columns, column_errors) = along_columns(step, y0, args)
+    return Tangents(y1, as_columns(columns)), Tangents(error, as_columns(column_errors))
+
+
+class TangentControl(diffrax.AbstractAdaptiveStepSizeController):
+    """Lets the columns' errors into a controller's norm, with a tolerance of their own.
+
+    An entry's error is measured against its own size, a share of the largest entry of its column,
+    and the column's floor, each in its leaf's unit: a column that is zero, or fades away, must not
+    choose the steps.
+
+    Attributes:
+        controller: decides every step's size from the worse of the state's and the columns' norm.
+        tangent_rtol: tolerance of the columns, relative.
+        inverse_units: of the state's leaves, shape (c,).
+    """
+
+    rtol: Any
+    atol: Any
+    norm: Callable[[PyTree], Any]
+    controller: Any
+    tangent_rtol: Any
+    inverse_units: Any
+
+    @staticmethod
+    def around(controller: Any, tangent_rtol: Any, units: Units) -> "TangentControl":
+        """Wraps a controller whose norm is `worst_norm`."""
+        each = jnp.stack(jtu.tree_leaves(units.inverse))
+        return TangentControl(
+            controller.rtol, controller.atol, controller.norm, controller, tangent_rtol, each
+        )
+
+    def wrap(self, direction: Any) -> "TangentControl":
+        """As diffrax asks; direction makes no difference here."""
+        return self
+
+    def init(self, terms: Any, t0: Any, t1: Any, y0: Any, dt0: Any, *rest: Any) -> Any:
+        """The first step's end and the controller's state, as diffrax asks."""
+        return self.controller.init(terms, t0, t1, y0, dt0, *rest)
+
+    def adapt_step_size(
+        self,
+        t0: Any,
+        t1: Any,
+        y0: Tangents,
+        y1_candidate: Tangents,
+        args: Seeded,
+        y_error: Any,
+        error_order: Any,
+        controller_state: Any,
+    ) -> Any:
+        """Accepts or rejects a step, as diffrax asks."""
+        inverse = self.inverse_units[:, None]
+        size = jnp.maximum(jnp.abs(y0.columns), jnp.abs(y1_candidate.columns)) * inverse
+        floor = SHARE * jnp.max(size, axis=0) + args.floors
+        # The wrapped controller divides by its absolute tolerance; nothing else is left to it.
+        scaled = y_error.columns * inverse * (self.atol / (self.tangent_rtol * (size + floor)))
+        nothing = jnp.zeros_like(scaled)
+        return self.controller.adapt_step_size(
+            t0,
+            t1,
+            Tangents(y0.state, nothing),
+            Tangents(y1_candidate.state, nothing),
+            None,
+            Tangents(y_error.state, scaled),
+            error_order,
+            controller_state,
+        )
+
+
+def worst_norm(error: Any) -> Scalar:
+    """The largest root mean square among the state and each of its columns."""
+    if not isinstance(error, Tangents):
+        return rms_norm(error)
+    squares = jnp.sum(error.columns * error.columns, axis=0) / error.columns.shape[0]
+    return jnp.maximum(rms_norm(error.state), jnp.sqrt(jnp.max(squares)))

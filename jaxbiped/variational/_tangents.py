@@ -1,0 +1,75 @@
+"""Tangents: a state together with its derivatives in chosen directions."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+
+
+class Tangents(NamedTuple):
+    """A state and its derivatives in n directions.
+
+    Attributes:
+        state: pytree of scalars, c in all.
+        columns: derivatives of its leaves, in their order, shape (c, n).
+    """
+
+    state: PyTree
+    columns: Scalar
+
+
+class Seeded(eqx.Module):
+    """The arguments of a vector field and the directions in which they are differentiated.
+
+    Attributes:
+        args: pytree of scalars.
+        seeds: derivatives of the active leaves in each direction, shape (p, n).
+        floors: size below which a column's error is measured absolutely, shape (n,).
+        active: positions of the p leaves of `args` that any direction moves.
+    """
+
+    args: PyTree
+    seeds: Scalar
+    floors: Scalar
+    active: tuple[int, ...] = eqx.field(static=True)
+
+
+def active_leaves(args: Seeded) -> list[Scalar]:
+    """The leaves that any direction moves."""
+    leaves = jtu.tree_leaves(args.args)
+    return [leaves[i] for i in args.active]
+
+
+def with_active(args: Seeded, values: Sequence[Scalar]) -> PyTree:
+    """The arguments with their active leaves replaced."""
+    leaves, structure = jtu.tree_flatten(args.args)
+    for i, value in zip(args.active, values, strict=True):
+        leaves[i] = value
+    return jtu.tree_unflatten(structure, leaves)
+
+
+def along_columns(
+    function: Callable[[PyTree, PyTree], Any], y: Tangents, args: Seeded
+) -> tuple[Any, Any]:
+    """`function(state, args)` and its derivatives along the columns, leaves of shape (n, …)."""
+    state, structure = jtu.tree_flatten(y.state)
+
+    def of_leaves(state: list[Scalar], moved: list[Scalar]) -> Any:
+        return function(jtu.tree_unflatten(structure, state), with_active(args, moved))
+
+    def along(column: Scalar, seed: Scalar) -> Any:
+        tangents = (list(column), list(seed))
+        return jax.jvp(of_leaves, (state, active_leaves(args)), tangents)
+
+    return jax.vmap(along, in_axes=-1, out_axes=(None, 0))(y.columns, args.seeds)
+
+
+def as_columns(tangents: PyTree) -> Scalar:
+    """Derivatives with leaves of shape (n,) as one matrix of shape (c, n)."""
+    return jnp.stack(jtu.tree_leaves(tangents))

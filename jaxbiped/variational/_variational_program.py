@@ -1,0 +1,272 @@
+"""Variational solve as a program for lanes: a state with its derivatives, to a section."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.compiler import Program
+from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve._ending import Ending
+from jaxbiped.solve._final_step import clip_step
+from jaxbiped.solve.controllers._step_control import first_step, step_control
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._column_step import Differentiated, column_step, differentiate_step
+from jaxbiped.variational._saltation import has_saltation, saltation_at
+from jaxbiped.variational._solve_to_section import onto_section, peak_of
+from jaxbiped.variational._switch_locator import SwitchLocator, SwitchLocatorState, Watch
+from jaxbiped.variational._tangent_solver import SHARE
+from jaxbiped.variational._tangents import Seeded, Tangents, active_leaves, with_active
+from jaxbiped.variational._variational_types import VariationalProblem, VariationalSolution
+
+
+class _Now(NamedTuple):
+    t: Scalar
+    next_t: Scalar
+    state: PyTree
+    columns: tuple[Any, Any]
+    landed: SwitchLocatorState
+    peak_columns: tuple[Any, Any]
+    attempted: Scalar
+    kept: Scalar
+    lost: Scalar
+
+
+class AdaptiveColumns:
+    """The functions of a `Program` that solves a `VariationalProblem`.
+
+    Attributes:
+        solver: its steps.
+        watch: what it lands on, and what ends it.
+        active: positions of the p parameters among the leaves of the arguments.
+        save_nodes: whether the accepted steps are recorded.
+    """
+
+    def __init__(
+        self,
+        solver: AbstractRosenbrock,
+        watch: Watch,
+        active: tuple[int, ...],
+        *,
+        save_nodes: bool,
+    ) -> None:
+        self.solver, self.active = solver, active
+        # Compiled by themselves, these are traced once, not at each of their many uses.
+        whole = ((name, getattr(watch, name)) for name in ("field", "section", "ending", "peak"))
+        once = {name: jax.jit(function) for name, function in whole if function is not None}
+        self.watch = dataclasses.replace(watch, **once)
+        self.save_nodes = save_nodes
+        self.term: Any = diffrax.ODETerm(watch.field)
+
+    def program(self) -> Program:
+        """The program."""
+        record = self.record if self.save_nodes else None
+        return Program(self.start, self.attempt, self.finish, record=record)
+
+    def start(self, given: VariationalProblem) -> _Now:
+        zero, none = jnp.zeros_like(given.time_limit), jnp.asarray(False)
+        next_t, landed = self._controller(given, zero).init(
+            self.term,
+            zero,
+            given.time_limit,
+            given.state,
+            first_step(given.time_limit, given.units.time),
+            given.args,
+            None,
+            self.solver.error_order(self.term),
+        )
+        columns = (given.by_state, given.by_parameter)
+        count = jnp.zeros((), dtype=jnp.int64)
+        landed = jtu.tree_map(jnp.asarray, landed)
+        return _Now(zero, next_t, given.state, columns, landed, columns, count, none, none)
+
+    def attempt(self, given: VariationalProblem, now: _Now) -> tuple[_Now, Scalar]:
+        now = self._leapt(given, now)
+        times = (now.t, now.next_t)
+        step = differentiate_step(
+            self.solver.tableau,
+            self.watch.field,
+            *times,
+            now.state,
+            self._seeded(given),
+            steered=given.steered > 0.0,
+        )
+        moved, worst = self._columns(given, now, step)
+        error = jtu.tree_map(lambda e: jnp.where(jnp.isnan(e), jnp.inf, e), step.error)
+        keep, t, next_t, _, landed, result = self._controller(given, worst).adapt_step_size(
+            now.t,
+            now.next_t,
+            now.state,
+            step.end,
+            given.args,
+            error,
+            self.solver.error_order(self.term),
+            now.landed,
+        )
+        limit = given.time_limit
+        t, next_t = clip_step(keep, t, next_t, limit, given.almost)
+        state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), step.end, now.state)
+        columns, peaks = now.columns, now.peak_columns
+        if self.watch.peak is None:
+            columns = tuple(_select(keep, a, b) for a, b in zip(moved, columns, strict=True))
+            peaks = columns
+        else:
+            highest = keep & (landed.peak > now.landed.peak)
+            both = [
+                jax.lax.map(lambda each: _row(keep, highest, *each), (new, old, peak))
+                for new, old, peak in zip(moved, columns, peaks, strict=True)
+            ]
+            columns, peaks = (tuple(part) for part in zip(*both, strict=True))
+        attempted = now.attempted + 1
+        lost = jnp.asarray(result == diffrax.RESULTS.dt_min_reached)
+        over = (t >= limit) | jnp.asarray(result != diffrax.RESULTS.successful)
+        over = over | (attempted.astype(limit.dtype) >= given.most_attempts)
+        after = _Now(t, next_t, state, columns, landed, peaks, attempted, keep, lost)
+        return after, over
+
+    def finish(self, given: VariationalProblem, now: _Now) -> VariationalSolution:
+        ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), int(Ending.OUT_OF_STEPS))
+        ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
+        by_state, by_parameter = now.columns
+        by_parameter = jnp.where(given.steered > 0.0, by_parameter, jnp.nan)
+        seeded, columns = self._seeded(given), jnp.concatenate([by_state, by_parameter]).T
+        y, t = Tangents(now.state, columns), now.t
+        time_columns, peak = jnp.zeros(columns.shape[1]), jnp.zeros(())
+        peak_columns = time_columns
+        if self.watch.section is not None:
+            y, t, time_columns = onto_section(self.watch, y, t, seeded, _along_columns_in_turn)
+        if self.watch.peak is not None:
+            highest = Tangents(now.landed.at_peak, jnp.concatenate(now.peak_columns).T)
+            peak, peak_columns = peak_of(self.watch, highest, seeded, _along_columns_in_turn)
+            peak_columns = jnp.where(now.landed.peak_saltation_pending, jnp.nan, peak_columns)
+        return VariationalSolution(
+            t=t,
+            state=y.state,
+            columns=y.columns.T,
+            time_columns=time_columns,
+            code=jnp.where(now.landed.arrived, 0, ended),
+            attempted=now.attempted,
+            accepted=now.landed.accepted,
+            jumps=now.landed.jumps,
+            missed=now.landed.saltation_pending,
+            peak=peak,
+            peak_columns=peak_columns,
+        )
+
+    def _leapt(self, given: VariationalProblem, now: _Now) -> _Now:
+        """The columns behind a jump of the field, where the last accepted step passed one."""
+        if not has_saltation(self.watch, now.state, given.args):
+            return now
+        saltation = saltation_at(
+            self.watch, now.state, self._seeded(given), now.landed.saltation_pending
+        )
+
+        def moved(column: Any, forcing: Any) -> Any:
+            return column + saltation.change * (jnp.sum(saltation.by_state * column) + forcing)
+
+        by_state, by_parameter = now.columns
+        if by_state.shape[0]:
+            by_state = jax.lax.map(lambda column: moved(column, 0.0), by_state)
+        if by_parameter.shape[0]:
+            by_parameter = jax.lax.map(
+                lambda each: moved(each[0], each[1] * each[2]),
+                (by_parameter, saltation.by_parameter, given.sizes),
+            )
+        return now._replace(columns=(by_state, by_parameter))
+
+    def _seeded(self, given: VariationalProblem) -> Seeded:
+        m, p = given.by_state.shape[0], given.by_parameter.shape[0]
+        seeds = jnp.concatenate([jnp.zeros((p, m)), jnp.eye(p) * given.sizes], axis=1)
+        floors = jnp.concatenate([given.state_floors, given.parameter_floors])
+        return Seeded(given.args, seeds, floors, self.active)
+
+    def record(
+        self, given: VariationalProblem, now: _Now, time: Scalar
+    ) -> tuple[Scalar, list[Scalar]]:
+        """The time and the state at the end of an accepted step."""
+        return now.kept, [now.t, *jtu.tree_leaves(now.state)]
+
+    def _columns(
+        self, given: VariationalProblem, now: _Now, step: Differentiated
+    ) -> tuple[list[Any], Scalar]:
+        """The columns after the step, and the largest norm of their errors."""
+
+        inverse = jnp.stack(jtu.tree_leaves(given.units.inverse))
+
+        def moved(column: Any, floor: Scalar, forcing: Any | None) -> tuple[Any, Scalar]:
+            end, error = column_step(step, column, forcing)
+            sizes = jnp.maximum(jnp.abs(column), jnp.abs(end)) * inverse
+            least = SHARE * jnp.max(sizes) + floor
+            scaled = error * inverse / (given.tangent_rtol * (sizes + least))
+            square = jnp.sum(scaled * scaled) / len(scaled)
+            return end, jnp.where(jnp.isnan(square), jnp.inf, square)
+
+        found, norms = [], []
+        by_state, by_parameter = now.columns
+        if by_state.shape[0]:
+            columns, squares = jax.lax.map(
+                lambda each: moved(each[0], each[1], None), (by_state, given.state_floors)
+            )
+            found.append(columns)
+            norms.append(jnp.max(squares))
+        else:
+            found.append(by_state)
+        if by_parameter.shape[0]:
+            rows = jnp.moveaxis(step.by_parameter, -1, 0)
+
+            def carried() -> tuple[Any, Scalar]:
+                columns, squares = jax.lax.map(
+                    lambda each: moved(each[0], each[1], each[2] * each[3]),
+                    (by_parameter, given.parameter_floors, rows, given.sizes),
+                )
+                return columns, jnp.max(squares)
+
+            columns, square = jax.lax.cond(
+                given.steered > 0.0, carried, lambda: (by_parameter, jnp.zeros(()))
+            )
+            found.append(columns)
+            norms.append(square)
+        else:
+            found.append(by_parameter)
+        worst = jnp.zeros(())
+        for norm in norms:
+            worst = jnp.maximum(worst, norm)
+        return found, jnp.sqrt(worst)
+
+    def _controller(self, given: VariationalProblem, columns_norm: Scalar) -> SwitchLocator:
+        def norm(error: PyTree) -> Scalar:
+            return jnp.maximum(rms_norm(error), columns_norm)
+
+        control = step_control(given.rtol, 1e-2 * given.rtol, norm, given.units)
+        return SwitchLocator.around(control, self.watch)
+
+
+def _select(keep: Scalar, new: Any, old: Any) -> Any:
+    return jax.lax.map(lambda each: jnp.where(keep, *each), (new, old))
+
+
+def _row(keep: Scalar, highest: Scalar, new: Any, old: Any, peak: Any) -> tuple[Any, Any]:
+    return jnp.where(keep, new, old), jnp.where(highest, new, peak)
+
+
+def _along_columns_in_turn(
+    function: Callable[[PyTree, PyTree], Any], y: Tangents, args: Seeded
+) -> tuple[Any, Any]:
+    """`along_columns`, one column after the other."""
+    state, structure = jtu.tree_flatten(y.state)
+
+    def of_leaves(state: list[Scalar], moved: list[Scalar]) -> Any:
+        return function(jtu.tree_unflatten(structure, state), with_active(args, moved))
+
+    def along(each: tuple[Any, Any]) -> Any:
+        tangents = tuple([part[i] for i in range(part.shape[0])] for part in each)
+        return jax.jvp(of_leaves, (state, active_leaves(args)), tangents)[1]
+
+    found = jax.lax.map(along, (y.columns.T, args.seeds.T))
+    return of_leaves(state, active_leaves(args)), found

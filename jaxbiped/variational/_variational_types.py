@@ -1,0 +1,61 @@
+"""Variational problem and solution: what a solve with derivatives takes and gives."""
+
+from typing import Any, NamedTuple
+
+from jaxtyping import PyTree
+
+from jaxbiped.solve._units import Units
+
+
+class VariationalProblem(NamedTuple):
+    """One solve's inputs. Of n directions, m are of the state and p of parameters.
+
+    Attributes:
+        args, state: parameters and start, pytrees of scalars.
+        by_state: columns of the first m directions, shape (m, c).
+        by_parameter: of the others, shape (p, c).
+        sizes: by how much these move their parameter, shape (p,).
+        steered: whether these are carried at all (0 or 1).
+        state_floors, parameter_floors: below which errors of columns are absolute, (m,) and (p,).
+        rtol, tangent_rtol: tolerances of state and columns.
+        units: of the state's leaves and of time.
+        time_limit: longest time to the section [s]; from `almost` on, a step there ends there.
+        most_attempts: cap on attempted steps.
+    """
+
+    args: PyTree
+    state: PyTree
+    by_state: Any
+    by_parameter: Any
+    sizes: Any
+    steered: Any
+    state_floors: Any
+    parameter_floors: Any
+    rtol: Any
+    tangent_rtol: Any
+    units: Units
+    time_limit: Any
+    almost: Any
+    most_attempts: Any
+
+
+class VariationalSolution(NamedTuple):
+    """What a solve found: as in `Passage`, all columns as rows of shape (m + p, …).
+
+    Attributes:
+        t, state, columns, time_columns: on the section.
+        code, attempted, jumps, missed, peak, peak_columns: see there.
+        accepted: number of steps accepted.
+    """
+
+    t: Any
+    state: PyTree
+    columns: Any
+    time_columns: Any
+    code: Any
+    attempted: Any
+    accepted: Any
+    jumps: Any
+    missed: Any
+    peak: Any
+    peak_columns: Any

@@ -1,0 +1,85 @@
+"""Fractions of labels, and Wilson's interval against SciPy and a published table."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import binomtest
+
+import jaxbiped as jb
+
+# Newcombe, Stat. Med. 17 (1998) 857, table I, method 3: count, total, lower, upper.
+NEWCOMBE = [
+    (81, 263, 0.2553, 0.3662),
+    (15, 148, 0.0624, 0.1605),
+    (0, 20, 0.0, 0.1611),
+    (1, 29, 0.0061, 0.1718),
+]
+
+
+@pytest.mark.parametrize(("count", "total", "low", "high"), NEWCOMBE)
+def test_wilson_equals_the_published_table(count, total, low, high):
+    np.testing.assert_allclose(jb.basins.wilson_interval(count, total), (low, high), atol=5e-5)
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(1, 10**6), st.data(), st.floats(0.01, 0.999))
+def test_wilson_equals_scipy(total, data, confidence):
+    count = data.draw(st.integers(0, total))
+    expected = binomtest(count, total).proportion_ci(confidence, method="wilson")
+    found = jb.basins.wilson_interval(count, total, confidence=confidence)
+    np.testing.assert_allclose(found, (expected.low, expected.high), rtol=1e-9, atol=1e-12)
+
+
+def test_wilson_of_arrays_and_of_nothing():
+    low, high = jb.basins.wilson_interval([0, 0, 5], [0, 5, 5], confidence=0.9)
+    assert (low[0], high[0]) == (0.0, 1.0)
+    assert (low[1], high[2]) == (0.0, 1.0)
+    assert high[1] == pytest.approx(1.0 - low[2])
+    low, high = jb.basins.wilson_interval([[0], [5]], [5, 10, 20])
+    assert low.shape == high.shape == (2, 3)
+
+
+def test_fractions_count_what_is_labelled():
+    names = np.array([["stopped", "pending"], ["fell forward", "stopped"]])
+    found = jb.basins.fractions(names)
+    assert list(found) == ["stopped", "fell forward"]
+    low, high = jb.basins.wilson_interval(2, 3)
+    assert found["stopped"] == jb.basins.Fraction(2 / 3, float(low), float(high), 2)
+    assert found["fell forward"].count == 1
+
+
+def test_codes_are_names():
+    codes = np.array([0, 1, 1, 3, -1, 0, 8])
+    named = [str(jb.basins.Label(code)) for code in codes]
+    assert jb.basins.fractions(codes) == jb.basins.fractions(named)
+    assert set(jb.basins.fractions(codes)) == {"walking", "fell forward", "stopped", "unresolved"}
+    assert sum(part.estimate for part in jb.basins.fractions(codes).values()) == pytest.approx(1.0)
+
+
+def test_a_higher_confidence_is_a_wider_interval():
+    narrow, wide = (jb.basins.fractions(["a", "b"], confidence=c)["a"] for c in (0.5, 0.99))
+    assert wide.low < narrow.low < 0.5 < narrow.high < wide.high
+
+
+def test_nothing_labelled_has_no_fractions():
+    assert jb.basins.fractions(["pending", "pending"]) == {}
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: jb.basins.wilson_interval(3, 2), ("total", "2", "at least count = 3")),
+        (lambda: jb.basins.wilson_interval(-1, 2), ("count", "-1", "at least 0")),
+        (lambda: jb.basins.wilson_interval(np.nan, 2), ("count", "nan")),
+        (lambda: jb.basins.wilson_interval([1, 2], [3, 4, 5]), ("(2,)", "(3,)", "broadcast")),
+        (lambda: jb.basins.wilson_interval(1, 2, confidence=1.0), ("confidence", "1.0", "below 1")),
+        (lambda: jb.basins.fractions(["a"], confidence=0.0), ("confidence", "0.0", "above 0")),
+        (lambda: jb.basins.fractions([]), ("labels", "(0,)", "at least one")),
+        (lambda: jb.basins.fractions([0, 99]), ("labels", "99", "Label")),
+    ],
+)
+def test_bad_arguments_are_named(call, words):
+    with pytest.raises(jb.ArgumentError) as caught:
+        call()
+    assert all(word in str(caught.value) for word in words)

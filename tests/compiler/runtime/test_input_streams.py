@@ -1,0 +1,81 @@
+"""Programs that read a tape, a row at each attempt."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
+from jaxbiped.compiler.runtime._host_cpu import host
+from jaxbiped.compiler.runtime._primitive import call
+from jaxbiped.compiler.runtime._program import Program
+
+
+def _summing():
+    """Σ weight (a + 2 b) over as many rows (a, b) as the inputs say."""
+
+    def start(given):
+        return jnp.zeros(()), jnp.zeros(())
+
+    def attempt(given, carried, row):
+        weight, steps = given
+        total, count = carried
+        count = count + 1.0
+        return (total + weight * (row[0] + 2.0 * row[1]), count), count >= steps
+
+    number = jax.ShapeDtypeStruct((), jnp.float64)
+    return CompiledProgram(Program(start, attempt, lambda _, c: c, tape=2), (number, number))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 19])
+def test_every_simulation_reads_its_own_rows(count):
+    random = np.random.default_rng(count)
+    tape = random.standard_normal((count, 7, 2))
+    weight, steps = random.standard_normal(count), 1.0 + np.arange(count) % 7
+    for width in (1, host().width):
+        total, read = _summing().run((weight, steps), tape=tape, width=width).outputs
+        rows = np.arange(7) < steps[:, None]
+        expected = weight * np.sum((tape[..., 0] + 2.0 * tape[..., 1]) * rows, axis=1)
+        np.testing.assert_allclose(total, expected, rtol=1e-12, atol=1e-14)
+        np.testing.assert_array_equal(read, steps)
+
+
+def test_behind_the_last_row_comes_that_row_again():
+    total, _ = _summing().run((np.ones(1), np.full(1, 5.0)), tape=np.ones((1, 2, 2))).outputs
+    assert total[0] == 15.0
+
+
+def test_tapes_under_jit_and_vmap():
+    program = _summing()
+    tapes = jnp.arange(24.0).reshape(4, 3, 2)
+
+    def one(tape, weight):
+        return call(program, (weight, jnp.asarray(3.0)), tape=tape)[0][0]
+
+    together = jax.jit(jax.vmap(one, in_axes=(0, None)))(tapes, jnp.asarray(2.0))
+    np.testing.assert_array_equal(together, [one(tape, jnp.asarray(2.0)) for tape in tapes])
+
+
+@pytest.mark.parametrize(
+    ("tape", "said"),
+    [
+        (np.ones((1, 3, 2)), "tape has 1 arrays of rows: it must have 2."),
+        (None, "tape has 0 arrays of rows: it must have 2."),
+        (np.ones((2, 3, 1)), r"tape holds an array of shape \(3, 1\): it must be \(rows, 2\)"),
+        (np.ones((2, 0, 2)), r"shape \(0, 2\).* with at least one row"),
+        (np.ones((2, 2)), r"shape \(2,\)"),
+    ],
+)
+def test_a_tape_of_another_size_is_refused(tape, said):
+    """By an error that `python -O` keeps: the machine code would read what is not there."""
+    with pytest.raises(ValueError, match=said):
+        _summing().run((np.ones(2), np.ones(2)), tape=tape)
+
+
+def test_a_tape_can_be_read_backwards():
+    program = _summing()._program._replace(backwards=True)
+    number = jax.ShapeDtypeStruct((), jnp.float64)
+    backwards = CompiledProgram(program, (number, number))
+    tape = [np.arange(6.0).reshape(3, 2), np.arange(4.0).reshape(2, 2)]
+    total, _ = backwards.run((np.ones(2), np.ones(2)), tape=tape).outputs
+    np.testing.assert_array_equal(total, [4.0 + 10.0, 2.0 + 6.0])

@@ -1,0 +1,59 @@
+"""The cache of compiled code: safe to delete, rebuilt where it is damaged."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxbiped.compiler.runtime import _machine_code
+from tests.compiler.one_shot import compiled
+
+POINTS = np.linspace(-1.0, 1.0, 5)
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv(_machine_code.CACHE_VARIABLE, str(tmp_path))
+    monkeypatch.setattr(_machine_code, "_LOADED", {})
+    return tmp_path / "lanes"
+
+
+def _run(scale=3.0):
+    _machine_code._LOADED.clear()
+    program = compiled(lambda x: jnp.exp(x) * scale, ())
+    np.testing.assert_allclose(program.run([POINTS]).outputs, np.exp(POINTS) * scale)
+
+
+def test_compiled_code_is_stored_once_and_read_again(cache, monkeypatch):
+    _run()
+    (stored,) = cache.iterdir()
+    monkeypatch.setattr(_machine_code, "_module", None)  # compiling would fail now
+    _run()
+    assert list(cache.iterdir()) == [stored]
+
+
+@pytest.mark.parametrize("damage", [b"", b"short", b"\0" * 5000])
+def test_damaged_code_is_built_anew(cache, damage):
+    _run()
+    (stored,) = cache.iterdir()
+    whole = stored.read_bytes()
+    stored.write_bytes(damage)
+    _run()
+    assert stored.read_bytes() == whole
+
+
+def test_other_programs_have_code_of_their_own(cache):
+    _run()
+    _run(4.0)
+    assert len(list(cache.iterdir())) == 2
+
+
+def test_nothing_is_stored_where_nothing_is_wanted(cache, monkeypatch):
+    monkeypatch.setenv(_machine_code.CACHE_VARIABLE, "")
+    _run()
+    assert not cache.exists()
+
+
+def test_a_folder_that_cannot_be_written_does_no_harm(cache, monkeypatch):
+    cache.parent.joinpath("file").write_text("in the way")
+    monkeypatch.setenv(_machine_code.CACHE_VARIABLE, str(cache.parent / "file"))
+    _run()

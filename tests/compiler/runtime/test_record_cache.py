@@ -1,0 +1,194 @@
+"""Records that stay on the host: asked for later, or read by another program as its tape."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
+from jaxbiped.compiler.runtime._primitive import Recording, call, call_recording
+from jaxbiped.compiler.runtime._program import Program
+from jaxbiped.compiler.runtime._record_cache import RecordCache
+
+ROOM = 8
+NUMBER = jax.ShapeDtypeStruct((), jnp.float64)
+
+
+def _powers():
+    """Records factor, factor², … up to as high a power as the inputs say; gives the last."""
+
+    def attempt(given, carried):
+        factor, steps = given
+        power, count = carried
+        return (power * factor, count + 1.0), count + 1.0 >= steps
+
+    def record(given, carried, time):
+        return carried[1] > 0.0, [carried[1], carried[0]]
+
+    start = lambda given: (jnp.ones(()), jnp.zeros(()))
+    program = Program(start, attempt, lambda _, carried: carried[0], record=record)
+    return CompiledProgram(program, (NUMBER, NUMBER))
+
+
+def _doubled():
+    """Records twice the second number of each row; gives how many."""
+
+    def attempt(steps, carried, row):
+        count = carried[1] + 1.0
+        return (2.0 * row[1], count), count >= steps
+
+    def record(steps, carried, time):
+        return carried[1] > 0.0, [carried[1], carried[0]]
+
+    start = lambda steps: (jnp.zeros(()), jnp.zeros(()))
+    return CompiledProgram(
+        Program(start, attempt, lambda _, c: c[1], record=record, tape=2), NUMBER
+    )
+
+
+def _last_sum(*, backwards=False):
+    """Σ of the second numbers in as many rows as the input says."""
+
+    def attempt(steps, carried, row):
+        total, count = carried
+        return (total + row[1], count + 1.0), count + 1.0 >= steps
+
+    start = lambda steps: (jnp.zeros(()), jnp.zeros(()))
+    program = Program(start, attempt, lambda _, c: c[0], tape=2, backwards=backwards)
+    return CompiledProgram(program, NUMBER)
+
+
+@pytest.fixture(scope="module")
+def powers():
+    return _powers()
+
+
+@pytest.fixture
+def runs(powers, monkeypatch):
+    """How many simulations each run of the program took."""
+    counts, run_table = [], powers.run_table
+
+    def counted(table, **options):
+        counts.append(table.shape[1])
+        return run_table(table, **options)
+
+    monkeypatch.setattr(powers, "run_table", counted)
+    return counts
+
+
+def _recording(powers, factor, steps):
+    given = (jnp.asarray(factor), jnp.asarray(steps))
+    return call_recording(powers, given, room=ROOM, quick=True)
+
+
+def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
+    last, recording = _recording(powers, 3.0, 4.0)
+    counts, values = recording.columns(np.array([0.0, 1.0]))
+    nothing = [np.nan] * (ROOM - 4)
+    np.testing.assert_array_equal(counts, [0, 1, 2, 3, 4, *nothing])
+    np.testing.assert_array_equal(values, [1, 3, 9, 27, 81, *nothing])
+    assert float(last) == 81.0
+    assert runs == [1]
+    _recording(powers, 3.0, 4.0)
+    assert runs == [1, 1]
+
+
+def test_what_is_no_longer_held_is_run_again(powers, runs, monkeypatch):
+    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._HELD_BACK", RecordCache(most=0))
+    _, recording = _recording(powers, 1.5, 2.0)
+    _, values = recording.columns(np.array([0.0, 1.0]))
+    np.testing.assert_array_equal(values[:3], [1.0, 1.5, 2.25])
+    assert runs == [1, 1]
+
+
+def test_a_recording_is_another_programs_tape(powers, runs):
+    reader = _last_sum()
+
+    def both(factor, steps):
+        _, recording = _recording(powers, factor, steps)
+        total, _ = call(reader, steps, tape=recording)
+        return total, recording.columns(jnp.zeros(2))[1]
+
+    factors, steps = jnp.array([2.0, 3.0, 0.5]), jnp.array([3.0, 1.0, 5.0])
+    totals, values = jax.jit(jax.vmap(both))(factors, steps)
+    np.testing.assert_allclose(totals, [14.0, 3.0, 0.96875])
+    np.testing.assert_allclose(np.nansum(values, axis=1), totals)
+    assert runs == [3]
+    assert float(both(jnp.asarray(2.0), jnp.asarray(3.0))[0]) == 14.0
+
+
+def test_what_is_read_but_once_is_then_no_longer_held(powers, runs):
+    given = (jnp.asarray(0.25), jnp.asarray(2.0))
+    _, recording = call_recording(powers, given, room=ROOM, quick=True, once=True)
+    reader = _last_sum()
+    sums = [float(call(reader, jnp.asarray(2.0), tape=recording)[0]) for _ in range(3)]
+    assert sums == [0.3125] * 3
+    assert runs == [1, 1, 1]
+
+
+def test_a_recording_can_be_read_backwards(powers):
+    reader = _last_sum(backwards=True)
+
+    def last_two(factor, steps):
+        _, recording = _recording(powers, factor, steps)
+        return call(reader, jnp.asarray(2.0), tape=recording)[0]
+
+    factors, steps = jnp.array([2.0, 3.0, 0.5]), jnp.array([3.0, 4.0, 5.0])
+    sums = jax.jit(jax.vmap(last_two))(factors, steps)
+    np.testing.assert_allclose(sums, [12.0, 108.0, 0.09375])
+
+
+@pytest.mark.parametrize("most", [0, 1 << 20])
+def test_what_reads_a_recording_may_record_as_well(powers, monkeypatch, most):
+    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._HELD_BACK", RecordCache(most=most))
+    doubled, reader = _doubled(), _last_sum()
+
+    def total(factor, steps):
+        _, recording = _recording(powers, factor, steps)
+        count, twice = call_recording(doubled, steps, room=ROOM, quick=True, tape=recording)
+        return count, call(reader, steps, tape=twice)[0], twice.columns(jnp.zeros(1))[0]
+
+    factors, steps = jnp.array([2.0, 3.0]), jnp.array([3.0, 2.0])
+    counts, sums, numbers = jax.jit(jax.vmap(total))(factors, steps)
+    np.testing.assert_array_equal(counts, steps)
+    np.testing.assert_allclose(sums, [28.0, 24.0])
+    np.testing.assert_array_equal(numbers[:, :4], [[0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0, np.nan]])
+
+
+def test_more_than_are_run_at_once(powers):
+    reader = _last_sum()
+
+    def total(factor):
+        _, recording = _recording(powers, factor, jnp.asarray(2.0))
+        return call(reader, jnp.asarray(2.0), tape=recording)[0]
+
+    factors = jnp.linspace(0.1, 2.0, 1200)
+    np.testing.assert_allclose(jax.vmap(total)(factors), factors + factors**2)
+
+
+def test_leaves_can_be_stacked(powers):
+    _, one = _recording(powers, 2.0, 3.0)
+    _, other = _recording(powers, 4.0, 2.0)
+    stacked = jax.tree.map(lambda *pair: jnp.stack(pair), one, other)
+    _, values = jax.vmap(Recording.columns)(stacked, jnp.zeros((2, 2)))
+    np.testing.assert_array_equal(values[:, 2], [4.0, 16.0])
+
+
+def test_what_came_first_goes_first():
+    ran = []
+
+    def run(table):
+        ran.extend(table[0])
+        return table.copy(), np.ones((table.shape[1], 3, 1)), np.full(table.shape[1], 2)
+
+    # Two records of one number each: 16 bytes a simulation.
+    held = RecordCache(most=40)
+    for number in (1.0, 2.0, 3.0):
+        np.testing.assert_array_equal(held.ran("program", np.array([[number]]), run), [[number]])
+    held.rows("program", np.array([[3.0, 2.0]]), run)
+    assert ran == [1.0, 2.0, 3.0]
+    rows = held.rows("program", np.array([[1.0, 3.0]]), run)
+    assert [each.shape for each in rows] == [(2, 1), (2, 1)]
+    assert ran == [1.0, 2.0, 3.0, 1.0]
+    held.rows("another", np.array([[3.0]]), run)
+    assert ran == [1.0, 2.0, 3.0, 1.0, 3.0]

@@ -1,0 +1,64 @@
+"""Φ, J and J̇q̇ of linkages against derivatives taken by JAX."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of
+from tests.linkages import (
+    four_bar,
+    four_bar_state,
+    hanging,
+    pinned_pendulum,
+    with_euler_parameters,
+)
+
+LINKAGES = {"pendulum": pinned_pendulum, "four-bar": four_bar}
+
+
+@pytest.mark.parametrize("orientation", ["angle", "euler"])
+@pytest.mark.parametrize("kind", LINKAGES)
+def test_derivatives_are_exact(kind, orientation):
+    linkage = LINKAGES[kind](orientation)
+    size = linkage.coordinates * len(linkage.bodies)
+    generator = np.random.default_rng(1)
+    q, v = jnp.asarray(generator.normal(size=(2, size)))
+
+    def off(q):
+        return jnp.stack(constraints_of(linkage, list(q), [jnp.zeros(())] * size).violation)
+
+    @jax.jit
+    def both(q, v):
+        at = constraints_of(linkage, list(q), list(v))
+        dense = [jnp.stack([row.get(c, jnp.zeros(())) for c in range(size)]) for row in at.rows]
+        written = jnp.stack(dense), jnp.stack(at.rate), jnp.stack(at.bias)
+        jacobian = jax.jacfwd(off)(q)
+        turned = jax.jvp(lambda q: jax.jvp(off, (q,), (v,))[1], (q,), (v,))[1]
+        return written, (jacobian, jacobian @ v, -turned)
+
+    written, expected = both(q, v)
+    for a, b in zip(written, expected, strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-13, atol=1e-13)
+
+
+def test_states_of_the_linkages_are_consistent():
+    for orientation in ("angle", "euler"):
+        for linkage, state in (
+            (pinned_pendulum(orientation), hanging(0.3, -0.7, rates=(1.0, -2.0))),
+            (four_bar(orientation), four_bar_state(1.1, 2.0)),
+        ):
+            state = with_euler_parameters(state) if orientation == "euler" else state
+            at = constraints_of(linkage, *(list(map(jnp.asarray, part)) for part in state))
+            np.testing.assert_allclose(np.array(at.violation), 0.0, atol=1e-15)
+            np.testing.assert_allclose(np.array(at.rate), 0.0, atol=1e-9)
+
+
+def test_euler_parameters_have_the_same_energy():
+    state = hanging(0.4, -0.9, rates=(1.3, -2.1))
+    masses, euler_masses = (
+        np.array(masses_of(pinned_pendulum(kind))) for kind in ("angle", "euler")
+    )
+    energy = 0.5 * masses @ np.array(state.v) ** 2
+    other = 0.5 * euler_masses @ np.array(with_euler_parameters(state).v) ** 2
+    assert other == pytest.approx(energy, rel=1e-14)

@@ -1,0 +1,70 @@
+"""A trajectory as a labelled dataset."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import xarray
+
+import jaxbiped as jb
+
+
+def test_round_trip_through_a_file(seed_walk, tmp_path):
+    scene, walk = seed_walk
+    dataset = jb.trajectory_dataset(scene, walk)
+    dataset.to_netcdf(tmp_path / "walk.nc")
+    with xarray.open_dataset(tmp_path / "walk.nc") as read:
+        np.testing.assert_array_equal(read.theta_1, walk.state.theta_1)
+        assert read.attrs["ending"] == "walking"
+        assert read.attrs["normal.K"] == 1e6
+        assert read.normal_force.dims == ("leg", "time")
+        assert read.normal_force.units == "N"
+        expected = jb.dynamics.foot_forces(scene, walk.state).foot_2.normal
+        np.testing.assert_array_equal(read.normal_force.sel(leg=2), expected)
+        total = read.kinetic_energy + read.gravitational_energy + read.elastic_energy
+        assert float(total[-1] - total[0]) < 0.0
+
+
+def test_a_frictionless_walk_has_no_tangential_force():
+    seed = jb.seed_scene()
+    scene = jb.Scene(seed.walker, seed.ground, seed.normal, jb.laws.Frictionless())
+    fall = jb.simulate(scene, jb.seed_state(), duration=0.1)
+    assert "tangential_force" not in jb.trajectory_dataset(scene, fall)
+    batch = fall.__class__(fall.t[None], fall.state, fall.ending, 0, 0, None)
+    with pytest.raises(ValueError, match="batch"):
+        jb.trajectory_dataset(scene, batch)
+
+
+_SEED = dict(K=1e6, c=1e7, n=1.5, mass=2.0), dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1e3)
+_LAWS = {
+    **{name: {"normal": jb.laws.normal_law_like(name, **_SEED[0])} for name in jb.laws.NORMAL_LAWS},
+    **{
+        name: {"friction": jb.laws.friction_law_like(name, **_SEED[1])}
+        for name in jb.laws.FRICTION_LAWS
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def short_walk():
+    return jb.simulate(jb.seed_scene(), jb.seed_state(), duration=0.05)
+
+
+@pytest.mark.parametrize("name", _LAWS)
+def test_every_law_goes_into_a_file(name, short_walk, tmp_path):
+    """With a motion of the seed's own law, where no law needs a program of its own."""
+    scene = dataclasses.replace(jb.seed_scene(), **_LAWS[name])
+    state = short_walk.state
+    if isinstance(scene.friction, jb.laws.AbstractBristleLaw):
+        straight = np.zeros_like(state.hip_x)
+        state = jb.dynamics.BristleState(**state._asdict(), bristle_1=straight, bristle_2=straight)
+    motion = dataclasses.replace(short_walk, state=state)
+    jb.trajectory_dataset(scene, motion).to_netcdf(tmp_path / "walk.nc")
+    ((part, law),) = _LAWS[name].items()
+    known = {field: value for field, value in vars(law).items() if value is not None}
+    with xarray.open_dataset(tmp_path / "walk.nc") as read:
+        assert read.attrs[part] == type(law).__name__
+        for field, value in known.items():
+            assert read.attrs[f"{part}.{field}"] == float(value)
+        assert set(state._fields) <= set(read.data_vars)
+        assert np.isfinite(read.normal_force).all()

@@ -1,0 +1,95 @@
+"""What a scene does not use is not there: operations of compiled vector fields, by scene."""
+
+import dataclasses
+import re
+from collections import Counter
+
+import jax
+import jax.numpy as jnp
+import pytest
+
+import jaxbiped as jb
+
+SEED = jb.seed_scene()
+PEAKED = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
+BRISTLES = jb.laws.LuGre(mu_static=0.5, mu_kinetic=0.4, v_s=1e-3, sigma_0=5e4, sigma_1=100.0)
+
+
+def scene(**parts):
+    return dataclasses.replace(SEED, **parts)
+
+
+def compiled(scene):
+    """Operations of the vector field as XLA compiles it: those within its fusions."""
+    state = jb.seed_state()
+    if isinstance(scene.friction, jb.laws.Dahl | jb.laws.LuGre):
+        state = jb.dynamics.BristleState(
+            **state._asdict(), bristle_1=jnp.zeros(()), bristle_2=jnp.zeros(())
+        )
+    program = (
+        jax.jit(lambda y, args: jb.dynamics.vector_field(0.0, y, args))
+        .lower(state, scene)
+        .compile()
+    )
+    found = Counter(re.findall(r"= \S+ (\w+[-\w]*)\(", program.as_text()))
+    return found, len(state)
+
+
+def test_an_exponential_only_with_stribeck_or_a_power():
+    linear = jb.laws.KelvinVoigt(K=3e4, D=5e3)
+    peaked, _ = compiled(scene(normal=linear))
+    flat, _ = compiled(scene(normal=linear, friction=jb.laws.Threlfall(mu=0.4, v0=1e-4)))
+    none, _ = compiled(scene(normal=linear, friction=jb.laws.Frictionless()))
+    viscous, _ = compiled(scene(normal=linear, friction=jb.laws.Viscous(k=100.0)))
+    assert peaked["exponential"] >= 2
+    assert flat["exponential"] >= 2
+    assert none["exponential"] == viscous["exponential"] == 0
+    coulomb, _ = compiled(
+        scene(normal=linear, friction=jb.laws.RegularisedCoulomb(mu=0.4, v_d=1e-4))
+    )
+    assert coulomb["tanh"] >= 2
+    assert none["tanh"] == peaked["tanh"] == 0
+    assert none["sign"] == 0
+
+
+def test_no_bristle_state_without_bristles():
+    _, plain = compiled(SEED)
+    _, bent = compiled(scene(friction=BRISTLES))
+    assert (plain, bent) == (8, 10)
+
+
+def test_one_foots_contact_where_only_one_can_touch():
+    both, _ = compiled(scene(clearance=jb.laws.AlwaysTouching()))
+    one, _ = compiled(scene(clearance=jb.laws.OneFoot(leg=2)))
+    assert 0 < one["exponential"] <= both["exponential"] // 2
+    one, both = (
+        jb.measure.operation_counts(scene(clearance=rule))["libm log"]
+        for rule in (jb.laws.OneFoot(leg=2), jb.laws.AlwaysTouching())
+    )
+    assert 0 < 2 * one == both
+
+
+def test_operations_fall_as_scenes_use_less():
+    def total(scene):
+        return sum(jb.measure.operation_counts(scene).values())
+
+    frictionless = scene(friction=jb.laws.Frictionless())
+    assert total(jb.RigidScene(SEED.walker, SEED.ground)) < total(frictionless)
+    assert total(frictionless) < total(scene(friction=jb.laws.Viscous(k=100.0))) < total(SEED)
+    assert total(scene(clearance=jb.laws.AlwaysTouching())) < total(SEED)
+    assert total(scene(clearance=jb.laws.OneFoot(leg=2))) < 0.75 * total(SEED)
+    assert total(SEED) < total(scene(friction=BRISTLES))
+
+
+def test_a_foot_that_never_touches_falls_through_the_ground():
+    only_leg_1 = scene(clearance=jb.laws.OneFoot(leg=1))
+    forces = jb.dynamics.foot_forces(only_leg_1, jb.seed_state())
+    assert float(forces.foot_2.normal) == float(forces.foot_2.tangential) == 0.0
+    assert float(jb.dynamics.foot_forces(SEED, jb.seed_state()).foot_2.normal) > 0.0
+    for engine in ("lanes", "xla"):
+        fall = jb.simulate(
+            only_leg_1, jb.seed_state(), duration=1.0, save="end", engine=engine, watch=("fall",)
+        )
+        assert fall.outcome in (jb.Ending.FELL_FORWARD, jb.Ending.FELL_BACK)
+    with pytest.raises(jb.ArgumentError, match="leg = 3"):
+        jb.laws.OneFoot(leg=3)

@@ -1,0 +1,174 @@
+"""The laws by name: what resembles the seed's law in each, and that both engines take them."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+
+NORMAL = dict(K=1e6, c=1e7, n=1.5, mass=2.0)
+FRICTION = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
+BRISTLES = ("dahl", "lugre")
+EXACT = ("ristow-schafer", "smooth-ristow-schafer")
+ONE = jnp.asarray(1.0)
+
+
+@pytest.mark.parametrize("name", jb.laws.NORMAL_LAWS)
+def test_normal_laws_stand_like_the_seeds(name):
+    law = jb.laws.normal_law_like(name, **NORMAL)
+    assert type(law) is jb.laws.NORMAL_LAWS[name]
+    at = (jnp.asarray((2.0 * 9.8 / 1e6) ** (2 / 3)), jnp.asarray(0.0))
+    weight, (stiffness, damper) = jax.value_and_grad(lambda x: law.force(*x))(at)
+    assert float(weight) == pytest.approx(19.6, rel=1e-9)
+    ratio = float(damper) / (2 * np.sqrt(2.0 * float(stiffness)))
+    seed_ratio = 1e7 * float(at[0]) / (2 * np.sqrt(2.0 * 1.5 * 19.6 / float(at[0])))
+    assert ratio == pytest.approx(0.0 if name == "hertz" else seed_ratio, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_the_seeds_own_normal_laws_keep_their_parameters(name):
+    law = jb.laws.normal_law_like(name, K=2e6, c=3e6, n=1.7, mass=1.0)
+    assert (float(law.K), float(law.c), float(law.n)) == (2e6, 3e6, 1.7)
+
+
+@pytest.mark.parametrize("name", ["hertz", "hunt-crossley"])
+def test_the_exponent_is_kept_where_there_is_one(name):
+    assert float(jb.laws.normal_law_like(name, **NORMAL | {"n": 1.8}).n) == pytest.approx(1.8)
+
+
+@pytest.mark.parametrize("name", [name for name in jb.laws.FRICTION_LAWS if name not in BRISTLES])
+def test_friction_laws_resemble_the_seeds(name):
+    law = jb.laws.friction_law_like(name, **FRICTION)
+    assert type(law) is jb.laws.FRICTION_LAWS[name]
+    at = lambda v: -float(law.force(ONE, jnp.asarray(v)))
+    if name == "frictionless":
+        assert at(1e-4) == 0.0
+        return
+    assert 0.37 < at(1e-4) <= 0.5 + 1e-12
+    if name != "viscous":
+        assert at(1.0) == pytest.approx(0.4 if name != "threlfall" else 0.38, rel=2e-3)
+    rise = -float(jax.grad(law.force, 1)(ONE, jnp.asarray(6e-5)))
+    assert 1e3 < rise < 2 * 0.5 / 1e-4
+    if hasattr(law, "mu_static"):
+        slip = np.geomspace(1e-6, 1e-1, 2001)
+        size = -law.force(jnp.ones(2001), jnp.asarray(slip))
+        assert 0.8e-4 < slip[np.argmax(size)] < 2e-4
+        assert 0.48 < float(size.max()) <= 0.5 + 1e-12
+
+
+@pytest.mark.parametrize("name", ["coulomb", "stribeck", "bengisu-akay", "andersson"])
+def test_friction_laws_with_the_seeds_slope_at_rest(name):
+    law = jb.laws.friction_law_like(name, **FRICTION)
+    mu = 0.4 if name == "coulomb" else 0.5
+    assert -float(jax.grad(law.force, 1)(ONE, jnp.asarray(0.0))) == pytest.approx(2 * mu / 1e-4)
+
+
+@pytest.mark.parametrize(("name", "peak", "give"), [("dahl", 0.4, 4e-4), ("lugre", 0.5, 1e-5)])
+def test_bristle_laws_resemble_the_seeds(name, peak, give):
+    law = jb.laws.friction_law_like(name, **FRICTION)
+    assert type(law) is jb.laws.FRICTION_LAWS[name]
+
+    def steady(slip):
+        slip = jnp.asarray(slip)
+        # The rate is linear in the bristle: this is where it vanishes.
+        free = law.rate(slip, 0.0 * ONE)
+        return float(law.coefficient(slip, free / (free - law.rate(slip, ONE))))
+
+    assert steady(1e-6) == pytest.approx(peak, rel=1e-4)
+    assert steady(1.0) == -steady(-1.0) == pytest.approx(0.4, rel=1e-9)
+    stiffness = float(jax.grad(law.rate)(jnp.asarray(1e-9), 0.0 * ONE))
+    assert peak / stiffness == pytest.approx(give, rel=1e-9)
+    if name == "lugre":
+        assert steady(1e-3) == pytest.approx(0.4 + 0.1 / np.e, rel=1e-9)
+        # 1 kg on bristles under 20 N comes to rest without swinging.
+        assert 20.0 * float(law.sigma_1) == pytest.approx(2.0 * np.sqrt(20.0 * stiffness))
+
+
+@pytest.mark.slow
+def test_the_gait_on_dahls_bristles_is_found():
+    law = jb.laws.friction_law_like("dahl", **FRICTION)
+    scene = eqx.tree_at(lambda s: s.friction, jb.seed_scene(), law)
+    gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
+    assert gait.outcome is jb.gait.Search.FOUND
+    assert float(gait.unit_multiplier_error) < 1e-4
+    # Softer than the seed's friction, the gait is a little shorter and slower.
+    assert float(gait.measures.step_length) == pytest.approx(0.174836, abs=1e-5)
+    assert float(gait.measures.period) == pytest.approx(0.444504, abs=1e-5)
+
+
+def test_they_are_differentiable_in_the_seeds_parameters():
+    def force(K):
+        law = jb.laws.normal_law_like("tsuji", **NORMAL | {"K": K})
+        return law.force(jnp.asarray(5e-4), jnp.asarray(0.1))
+
+    difference = (force(1e6 + 1.0) - force(1e6 - 1.0)) / 2.0
+    np.testing.assert_allclose(jax.jit(jax.grad(force))(1e6), difference, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: jb.laws.normal_law_like("rubber", **NORMAL), ("name", "rubber", "hunt-crossley")),
+        (lambda: jb.laws.friction_law_like("ice", **FRICTION), ("name", "ice", "brown-mcphee")),
+        (lambda: jb.laws.normal_law_like("tsuji", **NORMAL | {"mass": -1.0}), ("mass", "-1")),
+        (lambda: jb.laws.normal_law_like("tsuji", **NORMAL | {"mass": "m"}), ("mass", "number")),
+        (lambda: jb.laws.normal_law_like("tsuji", **NORMAL, g=0.0), ("g", "0", "above 0")),
+        (lambda: jb.laws.normal_law_like("hertz", **NORMAL | {"K": -1.0}), ("K", "-1")),
+        (lambda: jb.laws.friction_law_like("viscous", **FRICTION | {"v0": 0.0}), ("v0", "0")),
+        (lambda: jb.laws.friction_law_like("stribeck", **FRICTION | {"xi": 0.0}), ("xi", "0")),
+        (lambda: jb.laws.friction_law_like("lugre", **FRICTION | {"xi": 0.0}), ("xi", "0")),
+        (lambda: jb.laws.friction_law_like("dahl", **FRICTION | {"mu_kinetic": 0.0}), ("mu", "0")),
+        (
+            lambda: jb.laws.friction_law_like("coulomb", **FRICTION | {"mu_static": -1.0}),
+            ("mu_static",),
+        ),
+    ],
+)
+def test_bad_arguments_are_named(make, words):
+    with pytest.raises(jb.ArgumentError) as caught:
+        make()
+    assert str(caught.value).startswith(words[0] + " = ")
+    assert all(word in str(caught.value) for word in words)
+
+
+def _walk(normal, friction, engine):
+    scene = eqx.tree_at(
+        lambda s: (s.normal, s.friction),
+        jb.seed_scene(),
+        (
+            jb.laws.normal_law_like(normal, **NORMAL),
+            jb.laws.friction_law_like(friction, **FRICTION),
+        ),
+    )
+    return jb.simulate(scene, jb.seed_state(), duration=0.05, save="end", engine=engine)
+
+
+# A compilation each: so two laws at a time.
+PAIRS = [
+    (list(jb.laws.NORMAL_LAWS)[k % len(jb.laws.NORMAL_LAWS)], friction)
+    for k, friction in enumerate(jb.laws.FRICTION_LAWS)
+]
+
+
+@pytest.mark.parametrize(("normal", "friction"), PAIRS)
+def test_all_laws_run_by_lanes(normal, friction):
+    walk = _walk(normal, friction, "lanes")
+    if friction == "frictionless":
+        assert str(walk.outcome) == "stopped"
+        return
+    assert str(walk.outcome) == "walking"
+    # As the seed's laws, by the independent program of tests/reference.py; Dahl's bristles give.
+    near = 1e-4 if friction == "dahl" else 3e-5
+    assert float(walk.final.hip_x) == pytest.approx(0.02197, abs=near)
+    assert float(walk.final.theta_1) == pytest.approx(-0.21805, abs=3e-4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("normal", "friction"), [("tsuji", "stribeck")])
+def test_both_engines_agree(normal, friction):
+    by_lanes, by_xla = (_walk(normal, friction, engine) for engine in ("lanes", "xla"))
+    assert int(by_lanes.accepted) == int(by_xla.accepted)
+    for ours, theirs in zip(by_lanes.final, by_xla.final, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)

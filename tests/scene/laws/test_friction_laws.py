@@ -1,0 +1,292 @@
+"""Laws of friction: their stated properties and derivatives."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import jaxbiped as jb
+from tests.scene.laws.derivatives import Force
+
+
+def numbers(low, high):
+    # XLA takes subnormal numbers for zero.
+    return st.floats(low, high, allow_subnormal=False)
+
+
+MU, SPEED = numbers(0.0, 2.0), numbers(1e-6, 1.0)
+CURVE = {"mu_static": MU, "mu_kinetic": MU, "v_s": SPEED, "p": numbers(0.3, 3.0)}
+
+
+@st.composite
+def _ambrosio(draw):
+    v0 = draw(SPEED)
+    return jb.laws.Ambrosio(mu=draw(MU), v0=v0, v1=v0 * draw(numbers(1.01, 10.0)))
+
+
+@st.composite
+def _brown_mcphee(draw):
+    low, high = sorted((draw(MU), draw(MU)))
+    viscous = {"mu_v": draw(numbers(0.0, 10.0)), "N_t": draw(numbers(0.1, 50.0))}
+    options = viscous if draw(st.booleans()) else {}
+    return jb.laws.BrownMcPhee(mu_static=high, mu_dynamic=low, v_t=draw(SPEED), **options)
+
+
+SOME = {
+    "Viscous": st.builds(jb.laws.Viscous, k=numbers(0.0, 1e4)),
+    "Threlfall": st.builds(jb.laws.Threlfall, mu=MU, v0=SPEED),
+    "Ambrosio": _ambrosio(),
+    "Stribeck": st.builds(jb.laws.Stribeck, **CURVE, k_v=numbers(0.0, 10.0), v_d=SPEED),
+    "Andersson": st.builds(jb.laws.Andersson, **CURVE, k=numbers(1.0, 1e5)),
+    "BrownMcPhee": _brown_mcphee(),
+}
+STRIBECK = dict(mu_static=0.5, mu_kinetic=0.4, v_s=1e-3)
+SHARP = jb.laws.Stribeck(**STRIBECK, p=0.5, k_v=0.1, v_d=1e-4)
+CORNERED = jb.laws.Andersson(**STRIBECK, p=1.0, k=1e4)
+LAWS = {
+    "viscous": jb.laws.Viscous(k=3.0),
+    "threlfall": jb.laws.Threlfall(mu=0.4, v0=1e-3),
+    "ambrosio": jb.laws.Ambrosio(mu=0.4, v0=1e-4, v1=1e-3),
+    "stribeck": jb.laws.Stribeck(**STRIBECK, p=2.0, k_v=0.1, v_d=1e-4),
+    "stribeck, p = 0.5": SHARP,
+    "andersson": jb.laws.Andersson(**STRIBECK, p=1.5, k=1e4),
+    "andersson, p = 1": CORNERED,
+    "brown-mcphee": jb.laws.BrownMcPhee(mu_static=0.5, mu_dynamic=0.4, v_t=1e-3),
+    "brown-mcphee, viscous": jb.laws.BrownMcPhee(
+        mu_static=0.5, mu_dynamic=0.4, v_t=1e-3, mu_v=0.7, N_t=15.0
+    ),
+}
+SWITCHES = {
+    "threlfall": (-1e-3, 0.0, 1e-3),
+    "ambrosio": (-1e-3, -1e-4, 1e-4, 1e-3),
+    "stribeck, p = 0.5": (0.0,),
+    "andersson, p = 1": (0.0,),
+}
+every_law = pytest.mark.parametrize("which", LAWS)
+force = eqx.filter_jit(lambda law, load, slip: law.force(load, slip))
+slope_of = eqx.filter_jit(
+    lambda law, slip: jax.grad(lambda v: law.force(jnp.asarray(10.0), v))(slip)
+)
+
+
+def pulled(law, slip, load=10.0):
+    """Friction over load along the slip, at many speeds."""
+    slip = jnp.asarray(slip, float)
+    return -np.asarray(law.force(jnp.full_like(slip, load), slip)) / load
+
+
+@pytest.mark.parametrize("kind", SOME)
+def test_opposes_slip_is_odd_and_vanishes_at_rest_and_without_load(kind):
+    @settings(deadline=None, max_examples=60)
+    @given(SOME[kind], numbers(0.0, 1e3), numbers(-5.0, 5.0))
+    def check(law, load, slip):
+        at = lambda n, v: float(force(law, jnp.asarray(n), jnp.asarray(v)))
+        found = at(load, slip)
+        assert found * slip <= 0.0
+        assert at(load, -slip) == -found
+        assert at(load, 0.0) == 0.0
+        assert at(0.0, slip) == 0.0
+
+    check()
+
+
+def test_forces_are_the_formulas():
+    v, curve = 3e-4, lambda p: 0.4 + 0.1 * np.exp(-((0.3) ** p))
+    u = 0.3
+    smooth = 0.4 * np.tanh(4 * u) + 0.1 * u / (u * u / 4 + 0.75) ** 2
+    expected = {
+        "viscous": 3.0 * v,
+        "threlfall": 0.4 * (1 - np.exp(-0.9)),
+        "ambrosio": 0.4 * 2 / 9,
+        "stribeck": curve(2.0) * np.tanh(3.0) + 0.1 * v,
+        "stribeck, p = 0.5": curve(0.5) * np.tanh(3.0) + 0.1 * v,
+        "andersson": curve(1.5) * np.tanh(3.0),
+        "andersson, p = 1": curve(1.0) * np.tanh(3.0),
+        "brown-mcphee": smooth,
+        "brown-mcphee, viscous": smooth + 0.7 * v * np.tanh(4 * 10 / 15) / 10,
+    }
+    for which, law in LAWS.items():
+        np.testing.assert_allclose(pulled(law, [v, -v]), [expected[which], -expected[which]], 1e-12)
+
+
+def test_what_they_reach():
+    assert pulled(LAWS["threlfall"], [1e-3, 2e-3, 1.0]) == pytest.approx(0.4 * (1 - np.exp(-3)))
+    np.testing.assert_allclose(pulled(LAWS["ambrosio"], [1e-4, 1e-3, 1.0]), [0.0, 0.4, 0.4])
+    for which in ("andersson", "brown-mcphee"):
+        np.testing.assert_allclose(pulled(LAWS[which], [1.0]), [0.4], rtol=1e-6)
+    np.testing.assert_allclose(pulled(LAWS["stribeck"], [1.0]), [0.5], rtol=1e-12)
+
+
+@pytest.mark.parametrize("which", ["stribeck", "andersson"])
+def test_the_stribeck_peak_lies_between_its_speeds_and_tends_to_the_static_coefficient(which):
+    heights = []
+    for sharpness in (10.0, 100.0, 1000.0):
+        options = dict(STRIBECK, p=2.0)
+        law = (
+            jb.laws.Stribeck(**options, k_v=0.0, v_d=1e-3 / sharpness)
+            if which == "stribeck"
+            else jb.laws.Andersson(**options, k=1e3 * sharpness)
+        )
+        slip = np.geomspace(1e-3 / sharpness, 1e-3, 4001)
+        size = pulled(law, slip)
+        top = int(np.argmax(size))
+        assert 0 < top < slip.size - 1
+        heights.append(size[top])
+        slope = jax.grad(lambda v, law=law: law.force(jnp.asarray(1.0), v))(slip[top])
+        assert abs(float(slope)) * slip[top] < 1e-3
+    assert heights == sorted(heights)
+    assert 0.4 < heights[0] < heights[-1] < 0.5
+    assert heights[-1] > 0.4999
+
+
+def test_brown_and_mcphee_peak_at_v_t():
+    law = LAWS["brown-mcphee"]
+    assert pulled(law, [1e-3])[0] == pytest.approx(0.5 - 0.4 * (1 - np.tanh(4.0)), rel=1e-12)
+    slip = np.linspace(0.0, 1e-2, 100001)
+    size = pulled(law, slip)
+    # The tanh that still rises moves the peak a little beyond.
+    assert slip[np.argmax(size)] == pytest.approx(1e-3, rel=0.03)
+    assert size.max() == pytest.approx(0.5, rel=1e-3)
+
+
+@settings(deadline=None, max_examples=30)
+@given(_brown_mcphee(), st.sampled_from([-1.0, 1.0]))
+def test_brown_and_mcphee_is_continuously_differentiable_through_rest(law, side):
+    slope = lambda v: slope_of(law, jnp.asarray(v))
+    at_rest = (4 * law.mu_dynamic + (law.mu_static - law.mu_dynamic) / 0.75**2) / law.v_t
+    viscous = 0.0 if law.N_t is None else law.mu_v * jnp.tanh(40.0 / law.N_t)
+    assert float(slope(0.0)) == pytest.approx(-float(10 * at_rest + viscous), rel=1e-12)
+    for part in (1e-9, 1e-5):
+        near = float(slope(side * part * float(law.v_t)))
+        assert near == pytest.approx(float(slope(0.0)), rel=1e-6, abs=1e-12)
+
+
+@every_law
+def test_forces_are_continuous_across_every_switch(which):
+    for v in (*SWITCHES.get(which, ()), 0.0):
+        side = 1e-9 * abs(v) if v else 1e-13
+        below, above = pulled(LAWS[which], [v - side, v + side])
+        assert abs(above - below) < 1e-7
+
+
+@every_law
+def test_switches_are_where_a_derivative_jumps_and_nowhere_else(which):
+    law, told = LAWS[which], SWITCHES.get(which, ())
+    slip = np.unique([*np.linspace(-3e-3, 3e-3, 2001), *told])
+    zeros = {v for f in law.switches(jnp.asarray(slip)) for v in slip[np.asarray(f) == 0.0]}
+    assert zeros == set(told)
+    places = (-1e-3, -1e-4, 0.0, 1e-4, 1e-3)
+    assert [v for v, jump in zip(places, _jumps(law, places), strict=True) if jump > 0.03] == [
+        *told
+    ]
+
+
+def _jumps(law, places):
+    """The larger jump of the first and second derivative, relative to their size nearby."""
+    slope = jax.grad(lambda slip: law.force(jnp.asarray(1.0), slip))
+    derivatives = jax.jit(jax.vmap(lambda slip: jax.jvp(slope, (slip,), (jnp.ones_like(slip),))))
+    v = jnp.array(places)
+    side = jnp.where(v == 0.0, 1e-10, 1e-6 * jnp.abs(v))
+    nearby = jnp.linspace(-3e-3, 3e-3, 60)
+    found = derivatives(jnp.concatenate([v - side, v + side, nearby]))
+    jumps = [
+        abs(d[: v.size] - d[v.size : 2 * v.size]) / (1e-9 + abs(d[2 * v.size :]).max())
+        for d in found
+    ]
+    return np.maximum(*jumps)
+
+
+@every_law
+def test_gradients_equal_differences(which):
+    """At random, on the switches (between the sides), beside them and at rest."""
+    law, draw = LAWS[which], np.random.default_rng(5)
+    function = Force(law)
+    x = function.at(
+        draw.uniform(0.1, 40.0, 80), draw.choice([-1, 1], 80) * 10.0 ** draw.uniform(-6, 0, 80)
+    )
+    scales, size = np.abs(x), x[:, -2:-1]
+    np.testing.assert_allclose(
+        function.exact(x, scales) / size, function.difference(x, scales) / size, 1e-6, 1e-8
+    )
+    told = np.array(SWITCHES.get(which, ()))
+    x = function.at(10.0, np.concatenate([told * (1 + 1e-6), told * (1 - 1e-6), [1e-9, -1e-9]]))
+    exact, one_sided = function.beside(x, np.abs(x))
+    np.testing.assert_allclose(exact, one_sided, 1e-6, 1e-7)
+    x = function.at(10.0, np.append(told, 0.0))
+    scales = np.abs(x)
+    scales[:, -1] = 1e-5
+    exact, least, greatest = function.within_sides(x, scales)
+    assert np.isfinite(exact).all()
+    slack = 1e-6 + 2e-3 * np.abs(exact)
+    assert (least - slack <= exact).all()
+    assert (exact <= greatest + slack).all()
+
+
+def test_the_slope_at_rest_is_that_of_the_tanh():
+    def derivatives(p):
+        law = jb.laws.Stribeck(**STRIBECK, p=p, k_v=0.2, v_d=1e-4)
+        slope = jax.grad(lambda v: law.force(jnp.asarray(1.0), v))
+        return jax.value_and_grad(slope)(jnp.asarray(0.0))
+
+    slope, second = jax.jit(jax.vmap(derivatives))(jnp.array([0.3, 0.5, 1.0, 1.5, 2.0]))
+    np.testing.assert_allclose(slope, -(0.5 / 1e-4 + 0.2))
+    assert bool(jnp.isfinite(second).all())
+
+
+def test_threlfall_slope_at_rest():
+    slope = jax.grad(LAWS["threlfall"].force, 1)(jnp.asarray(1.0), jnp.asarray(0.0))
+    assert float(slope) == pytest.approx(-0.4 * 3 / 1e-3)
+
+
+def test_brown_and_mcphee_without_a_viscous_part_leave_it_out():
+    program = lambda law: str(jax.make_jaxpr(law.force)(1.0, 1.0))
+    assert program(LAWS["brown-mcphee"]).count("tanh") == 1
+    assert program(LAWS["brown-mcphee, viscous"]).count("tanh") == 2
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: jb.laws.Viscous(k=-1.0), ("k", "-1", "s/m")),
+        (lambda: jb.laws.Threlfall(mu=-0.1, v0=1.0), ("mu", "-0.1")),
+        (lambda: jb.laws.Threlfall(mu=0.1, v0=0.0), ("v0", "0", "m/s")),
+        (lambda: jb.laws.Ambrosio(mu=-0.1, v0=1.0, v1=2.0), ("mu", "-0.1")),
+        (lambda: jb.laws.Ambrosio(mu=0.1, v0=0.0, v1=2.0), ("v0", "0", "above 0")),
+        (lambda: jb.laws.Ambrosio(mu=0.1, v0=2.0, v1=1.5), ("v1 − v0", "-0.5", "above 0")),
+        (lambda: jb.laws.Ambrosio(mu=0.1, v0=2.0, v1="fast"), ("v1", "fast", "number")),
+        (lambda: jb.laws.Stribeck(**STRIBECK, p=0.0, k_v=0.0, v_d=1.0), ("p", "0")),
+        (lambda: jb.laws.Stribeck(**STRIBECK, p=1.0, k_v=-0.5, v_d=1.0), ("k_v", "-0.5")),
+        (lambda: jb.laws.Stribeck(**STRIBECK, p=1.0, k_v=0.0, v_d=-1.0), ("v_d", "-1")),
+        (lambda: jb.laws.Andersson(**STRIBECK | {"v_s": 0.0}, p=1.0, k=1.0), ("v_s", "0")),
+        (lambda: jb.laws.Andersson(**STRIBECK, p=1.0, k=float("nan")), ("k", "nan")),
+        (
+            lambda: jb.laws.Andersson(**STRIBECK | {"mu_static": -1}, p=1.0, k=1.0),
+            ("mu_static", "-1"),
+        ),
+        (
+            lambda: jb.laws.BrownMcPhee(mu_static=0.3, mu_dynamic=0.4, v_t=1.0),
+            ("mu_static", "0.3", "mu_dynamic = 0.4"),
+        ),
+        (
+            lambda: jb.laws.BrownMcPhee(mu_static=0.4, mu_dynamic=-1.0, v_t=1.0),
+            ("mu_dynamic", "-1"),
+        ),
+        (lambda: jb.laws.BrownMcPhee(mu_static=0.4, mu_dynamic=0.4, v_t=0.0), ("v_t", "0")),
+        (
+            lambda: jb.laws.BrownMcPhee(mu_static=0.4, mu_dynamic=0.4, v_t=1.0, mu_v=1.0),
+            ("N_t", "None", "mu_v"),
+        ),
+        (
+            lambda: jb.laws.BrownMcPhee(mu_static=0.4, mu_dynamic=0.4, v_t=1.0, mu_v=1.0, N_t=0.0),
+            ("N_t", "0", "above 0"),
+        ),
+    ],
+)
+def test_bad_arguments_are_named(make, words):
+    with pytest.raises(jb.ArgumentError) as caught:
+        make()
+    assert str(caught.value).startswith(words[0] + " = ")
+    assert all(word in str(caught.value) for word in words)

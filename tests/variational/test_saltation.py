@@ -1,0 +1,54 @@
+"""A gait whose contact force jumps at touchdown: its derivatives leap there."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+
+pytestmark = pytest.mark.slow
+
+LAW = jb.laws.normal_law_like("kelvin-voigt", K=1e6, c=1e7, n=1.5, mass=2.0)
+SCENE = dataclasses.replace(jb.seed_scene(), normal=LAW)
+STEPS = {"K": 100.0, "D": 10.0, "slope": 1e-4}
+
+
+@pytest.fixture(scope="module")
+def gait():
+    return jb.find_gait(SCENE, accuracy="tight", parameters=tuple(STEPS))
+
+
+def test_the_gait_is_found_and_its_trivial_multiplier_is_one(gait):
+    assert gait.outcome is jb.gait.Search.FOUND
+    assert bool(gait.stable)
+    assert float(gait.unit_multiplier_error) < 1e-4
+    # Where a walk from the seed's start settles.
+    assert float(gait.measures.period) == pytest.approx(0.44028, abs=1e-5)
+    assert float(gait.measures.step_length) == pytest.approx(0.17971, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_sensitivities_equal_differences(gait, name):
+    step, k = STEPS[name], gait.parameters.index(name)
+    middle = float((SCENE.normal.K, SCENE.normal.D, SCENE.ground.slope)[list(STEPS).index(name)])
+
+    def measures(value):
+        moved = jb.with_parameters(SCENE, {name: value})
+        found = jb.find_gait(
+            moved, gait.measures.state, accuracy="tight", parameters=(), radius_sensitivities=False
+        )
+        assert found.outcome is jb.gait.Search.FOUND
+        return np.array([float(found.measures.period), float(found.measures.step_length)])
+
+    expected = (measures(middle + step) - measures(middle - step)) / (2.0 * step)
+    slopes = gait.sensitivities
+    ours = [float(slopes.period[k]), float(slopes.step_length[k])]
+    assert ours == pytest.approx(expected, rel=1e-4)
+
+
+def test_what_would_need_more_is_not_a_number(gait):
+    """The peak lies right behind the jump, and the radius takes second derivatives."""
+    assert np.all(np.isnan(gait.sensitivities.peak_normal))
+    assert np.all(np.isnan(gait.sensitivities.spectral_radius))
+    assert np.isfinite(float(gait.measures.peak_normal))
