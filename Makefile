@@ -8,7 +8,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 OUT := out/walk
 
 # What `make figures` runs, at full size: all, or those named by `make figures ONLY="ladder"`.
-EXPERIMENTS := $(filter-out _%,$(patsubst experiments/%.py,%,$(wildcard experiments/*.py)))
+EXPERIMENTS := $(filter-out _% quote,$(patsubst experiments/%.py,%,$(wildcard experiments/*.py)))
 ONLY ?= $(EXPERIMENTS)
 
 .PHONY: walk gait check test lint types notebooks figures clean
@@ -38,12 +38,15 @@ types: $(VENV)/.installed-dev
 notebooks: $(VENV)/.installed-dev
 	$(BIN)/python notebooks/execute.py
 
-# Runs experiments at full size, one after the other; timings want an idle machine. The numbers are
-# kept in experiments/results, and what the pages quote of them is printed at the end.
+# Runs experiments at full size, one after the other, and keeps their numbers in experiments/results;
+# what the pages quote of these is printed at the end. Timings want an idle machine: on another,
+# UNTIMED=--untimed leaves them out.
 figures: $(VENV)/.installed-dev
+	mkdir -p out/figures
 	for name in $(ONLY); do \
-		$(BIN)/python experiments/$$name.py --out out/figures \
-			--json experiments/results/$$name.json || exit 1; \
+		$(BIN)/python experiments/$$name.py --out out/figures --json out/figures/$$name.json \
+			&& $(BIN)/python experiments/quote.py --keep out/figures/$$name.json $(UNTIMED) \
+			|| exit 1; \
 	done
 	$(BIN)/python experiments/quote.py
 

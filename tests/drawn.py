@@ -1,11 +1,43 @@
 """What a figure shows: its labels, its lines, and whether anybody could see them."""
 
+import contextlib
 import re
+from pathlib import Path
 
 import numpy as np
+import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image
 
 _UNIT = re.compile(r"[(\[].+[)\]]|, relative")
+
+
+LEGS = np.array([[0x00, 0x72, 0xB2], [0xD5, 0x5E, 0x00]])
+"""Colours of leg 1 and leg 2, wherever they are drawn."""
+
+
+@contextlib.contextmanager
+def saved_figures():
+    """The figures that are saved meanwhile, by the names of their files."""
+    figures, save = {}, Figure.savefig
+
+    def kept(figure, target, *arguments, **options):
+        if isinstance(target, str | Path):
+            figures[Path(target).name] = figure
+        return save(figure, target, *arguments, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", kept)
+        yield figures
+
+
+def leg_pixels(path):
+    """How many pixels of a picture's last frame have the colour of leg 1, and of leg 2."""
+    with Image.open(path) as image:
+        image.seek(getattr(image, "n_frames", 1) - 1)
+        pixels = np.asarray(image.convert("RGB")).astype(int)
+    return [int((abs(pixels - colour).max(axis=-1) < 8).sum()) for colour in LEGS]
 
 
 def labels_of(figure):

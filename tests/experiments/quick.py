@@ -18,6 +18,8 @@ from typing import Any, NamedTuple
 import pytest
 from matplotlib.figure import Figure
 
+from tests.drawn import saved_figures
+
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "experiments"
 
@@ -45,18 +47,11 @@ def _numbers(folder):
 
 
 def _run_here(name, folder):
-    figures, save = {}, Figure.savefig
-
-    def kept(figure, target, *arguments, **options):
-        if isinstance(target, str | Path):
-            figures[Path(target).name] = figure
-        return save(figure, target, *arguments, **options)
-
     words = [name, "--quick", "--out", str(folder), "--json", str(folder / "numbers.json")]
-    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(io.StringIO()):
+    silent = contextlib.redirect_stdout(io.StringIO())
+    with pytest.MonkeyPatch.context() as patch, silent, saved_figures() as figures:
         patch.setattr(sys, "argv", words)
         patch.syspath_prepend(str(FOLDER))
-        patch.setattr(Figure, "savefig", kept)
         place = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
         module = importlib.util.module_from_spec(place)
         place.loader.exec_module(module)

@@ -1,16 +1,23 @@
+import numpy as np
 import pytest
 
-from tests.experiments.quick import quick_numbers
+from tests.drawn import assert_is_drawn, labels_of, points_of
+from tests.experiments.quick import quick_run
 
 pytestmark = pytest.mark.slow
 
 
 def test_the_seeds_basin(tmp_path):
-    numbers = quick_numbers(
-        "basin_seed",
-        tmp_path,
-        keys={"fractions", "boundary", "refined", "tolerances", "pushes", "along"},
-        pictures={"basin_seed.png", "basin_seed_refined.png", "basin_seed_along.png"},
+    numbers, figures = quick_run("basin_seed", tmp_path)
+    assert set(figures) == {"basin_seed.png", "basin_seed_refined.png", "basin_seed_along.png"}
+    for figure in figures.values():
+        assert_is_drawn(figure, unitless={"fraction of the starts"})
+    plane, refined = (figures[f"basin_seed{end}.png"] for end in ("", "_refined"))
+    assert len(labels_of(plane)) == 2
+    assert labels_of(plane) == labels_of(refined)
+    walks = figures["basin_seed_along.png"].axes[0]
+    np.testing.assert_allclose(
+        points_of(walks, "walking period-1")[0][:, 1], numbers["along"]["c"]["walking"][1]
     )
     fractions = numbers["fractions"]
     assert sum(part["estimate"] for part in fractions.values()) == pytest.approx(1.0)

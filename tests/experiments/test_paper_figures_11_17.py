@@ -1,6 +1,7 @@
 import pytest
 
-from tests.experiments.quick import quick_numbers
+from tests.drawn import assert_is_drawn, labels_of
+from tests.experiments.quick import quick_run
 
 pytestmark = pytest.mark.slow
 
@@ -16,12 +17,14 @@ FIGURES = {
 
 
 def test_judges_the_papers_sentences(tmp_path):
-    numbers = quick_numbers(
-        "paper_figures_11_17",
-        tmp_path,
-        keys={"methods", "integrators", "costs", "verdicts"},
-        pictures={f"{figure}.png" for figure in FIGURES},
-    )
+    numbers, figures = quick_run("paper_figures_11_17", tmp_path)
+    assert set(figures) == {f"{figure}.png" for figure in FIGURES}
+    for name, figure in figures.items():
+        assert_is_drawn(figure)
+        # Violations in metres over seconds, or times.
+        assert any("(s)" in label or "(ms)" in label for label in labels_of(figure)) or (
+            name == "fig14_time_ratio.png"
+        )
     methods = numbers["methods"]
     assert methods["described"]["max_violation_m"] < 1e-14
     assert methods["standard"]["last_half_m"] > 1.5 * methods["standard"]["first_half_m"]
