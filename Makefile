@@ -6,6 +6,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 OUT := out/walk
+# A file's tests share compiled programs; files begin in the order of tests/conftest.py.
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 # What `make figures` runs, at full size: all, or those named by `make figures ONLY="ladder"`.
 EXPERIMENTS := $(filter-out _% quote,$(patsubst experiments/%.py,%,$(wildcard experiments/*.py)))
@@ -22,10 +24,10 @@ gait: $(VENV)/.installed
 
 # Lint, types and the unit tests; docs/testing.md says which tests these are.
 check: lint types
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
+	$(PYTEST) -m "not slow"
 
 test: lint types
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(PYTEST)
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

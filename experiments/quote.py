@@ -68,6 +68,37 @@ def row(*cells: str) -> str:
     return f"| {' | '.join(cells)} |"
 
 
+def percents(number: float) -> str:
+    """A fraction as the pages write it."""
+    return f"{100.0 * number:.1f}"
+
+
+def of_basin_seed(numbers: dict[str, Any]) -> Iterator[str]:
+    """How much of the slice walks, how folded boundaries are, and what changes the basin."""
+    walks, boundary = numbers["fractions"]["walking period-1"], numbers["boundary"]
+    interval = f"[{percents(walks['low'])}, {percents(walks['high'])}]"
+    yield f"Of that slice {percents(walks['estimate'])} % {interval} walks"
+    yield (
+        f"the boundary of what walks has dimension {boundary['walking or not']['dimension']:.2f}, "
+        f"that of all labels {boundary['all labels']['dimension']:.2f}"
+    )
+    for name, said in (("c", "falls with damping"), ("K", "grows with stiffness")):
+        (first, *_), *_, (last, *_) = numbers["along"][name]["walking"]
+        yield f"{said} ({percents(first)} to {percents(last)} %"
+    yield f"{min(row['distance'] for row in numbers['pushes']):.4f} (units of"
+    yield f"rays alone find {numbers['pushes'][0]['distance']:.4f}"
+
+
+def of_basin_simplest(numbers: dict[str, Any]) -> Iterator[str]:
+    """How thin the simplest walker's basin is."""
+    shares = {slope: found["fractions"][-1] for slope, found in numbers["slopes"].items()}
+    (low, first), (high, second) = shares.items()
+    yield (
+        f"{100.0 * first['estimate']:.2f} % of a square at a slope of {low} and "
+        f"{100.0 * second['estimate']:.2f} % at {high}"
+    )
+
+
 def of_gradient_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
     """The unit multiplier's error against tolerance, stepping for the state and ours."""
     points = numbers["points"]["exact laws"]
@@ -131,6 +162,8 @@ def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
 
 
 QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
+    "basin_seed": of_basin_seed,
+    "basin_simplest": of_basin_simplest,
     "force_models": of_force_models,
     "gradient_accuracy": of_gradient_accuracy,
     "ladder": of_ladder,

@@ -39,6 +39,12 @@ def _few_programs_are_kept():
         gc.collect()
 
 
+def pytest_collection_modifyitems(items):
+    """Files with slow tests begin first, so that no worker is left alone with one at the end."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
 LONGEST_UNIT = 10.0
 """Seconds that a test of `make check` may take on an idle machine before it is called slow."""
 
