@@ -159,37 +159,47 @@ def _heard():
 
 
 @pytest.mark.usefixtures("_heard")
-def test_an_interrupt_ends_a_run():
-    """It raises, and leaves no thread of its own at work."""
-    program, before = _endless(), set(threading.enumerate())
+def test_an_interrupt_ends_a_run(monkeypatch):
+    """It raises, and none of its threads is still at work on memory that may be given back."""
+    program, at_work = _endless(), []
+
+    def counted(work, workers, stop, *, quick):
+        def one():
+            at_work.append(threading.get_ident())
+            work()
+            at_work.remove(threading.get_ident())
+
+        _threads.run_in_threads(one, workers, stop, quick=quick)
+
+    monkeypatch.setattr(_compiled_program, "run_in_threads", counted)
     program.code(host().width)
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
         program.run(np.zeros(100))
-    timer.join()
-    assert set(threading.enumerate()) == before
+    assert not at_work
 
 
-class _Interrupted(threading.Thread):
-    """A thread for which one waits in vain: the user interrupts the first look at it."""
+class _Interrupted(threading.Event):
+    """The end of a work for which one waits in vain: the user interrupts the first look at it."""
 
     waits = 0
 
-    def join(self, timeout=None):
+    def wait(self, timeout=None):
         type(self).waits += 1
         if timeout is not None:
             raise KeyboardInterrupt
-        super().join()
+        return super().wait()
 
 
 def test_an_interrupt_is_heard_at_the_first_look(monkeypatch):
     """Counted, for how long it takes depends on the machine."""
     monkeypatch.setattr(_Interrupted, "waits", 0)
-    monkeypatch.setattr(_threads, "threading", types.SimpleNamespace(Thread=_Interrupted))
+    names = types.SimpleNamespace(Thread=threading.Thread, Event=_Interrupted)
+    monkeypatch.setattr(_threads, "threading", names)
     with pytest.raises(KeyboardInterrupt):
         _endless().run(np.zeros(100), threads=3)
-    # One look, and then each of the three is awaited without end.
+    # One look, and then the end of each of the three is awaited.
     assert _Interrupted.waits == 1 + 3
 
 
