@@ -43,6 +43,7 @@ def shown_in(page):
     return "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", RUN, ids=path_of)
 def test_a_page_runs_from_top_to_bottom_and_prints_what_it_says(page, tmp_path, monkeypatch):
     """A comment behind a `print(…)` is what that prints, as far as an ellipsis."""
