@@ -54,10 +54,11 @@ def clear_caches() -> None:
     The next calls compile again and give the same numbers. Safe at any time and in any thread:
     what a running call uses lives until it ends. Compiled code on disk stays.
     """
-    for cache in list(_CACHES.values()):
-        cache.clear()
-    # Programs and their traces refer to each other.
-    gc.collect()
+    for _ in range(2):  # what goes in the first round may give buffers back
+        for cache in list(_CACHES.values()):
+            cache.clear()
+        # Programs and their traces refer to each other.
+        gc.collect()
 
 
 def cache_info() -> dict[str, CacheInfo]:

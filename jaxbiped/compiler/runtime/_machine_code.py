@@ -15,6 +15,8 @@ from jaxbiped.compiler.runtime._host_cpu import Host
 
 CACHE_VARIABLE = "JAXBIPED_CACHE"
 """Environment variable: the folder for compiled code; empty for none on disk."""
+_DISK_BYTES = 1 << 30
+"""What the folder may hold; code that was read or written longest ago goes first."""
 _DIGEST = 32
 
 
@@ -109,6 +111,7 @@ def _read(path: Path) -> bytes | None:
     """Stored code; None where there is none, or not what was written."""
     try:
         content = path.read_bytes()
+        os.utime(path)
     except OSError:
         return None
     digest, code = content[:_DIGEST], content[_DIGEST:]
@@ -123,5 +126,17 @@ def _write(path: Path, code: bytes) -> None:
         with os.fdopen(handle, "wb") as file:
             file.write(hashlib.sha256(code).digest() + code)
         os.replace(temporary, path)
+        _prune(path.parent)
     except OSError:
         return
+
+
+def _prune(folder: Path) -> None:
+    """Removes what is too much for the disk: who misses it compiles it again."""
+    files = [(entry.stat(), entry.path) for entry in os.scandir(folder) if entry.is_file()]
+    excess = sum(stat.st_size for stat, _ in files) - _DISK_BYTES
+    for stat, name in sorted(files, key=lambda file: file[0].st_mtime_ns):
+        if excess <= 0:
+            return
+        Path(name).unlink(missing_ok=True)
+        excess -= stat.st_size
