@@ -3,10 +3,12 @@
 What is kept makes the next call faster and changes no number. `docs/memory.md` lists it.
 """
 
+import contextlib
 import functools
 import gc
 import os
 import threading
+import weakref
 from collections.abc import Callable
 from typing import Any, Generic, NamedTuple, ParamSpec, Protocol, TypeVar
 
@@ -15,7 +17,7 @@ import equinox as eqx
 CACHE_BYTES_VARIABLE = "JAXBIPED_CACHE_BYTES"
 """Environment variable: bytes for records of simulations and for buffers; 0 to keep none."""
 _CACHE_BYTES = 1 << 30
-PROGRAMS = 128
+PROGRAMS = 64
 """Compiled programs that each maker of such keeps; the one unused for longest goes first."""
 
 _P = ParamSpec("_P")
@@ -110,21 +112,34 @@ class Once(Generic[_T]):
 def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]]:
     """Decorator: keeps a function's last `bound` results by its hashable positional arguments.
 
-    As `functools.lru_cache`, but calls with the same arguments at the same time make one result.
+    As `functools.lru_cache`, but there are never two results of the same arguments: calls at the
+    same time make one, and one that somebody still has is found again when it was forgotten here.
+    A trace that holds a program, for one, goes on with the same.
     """
 
     def decorate(function: Callable[..., _T]) -> Callable[..., _T]:
         lock = threading.Lock()
+        alive: weakref.WeakValueDictionary[Any, Any] = weakref.WeakValueDictionary()
 
         @functools.lru_cache(maxsize=bound)
         def result_of(*args: Any) -> Once[_T]:
             return Once()
 
+        def make(args: tuple[Any, ...]) -> _T:
+            with lock:
+                known = alive.get(args)
+            if known is not None:
+                return known
+            made = function(*args)
+            with lock, contextlib.suppress(TypeError):  # plain values have no identity to keep
+                made = alive.setdefault(args, made)
+            return made
+
         @functools.wraps(function)
         def cached(*args: Any) -> _T:
             with lock:
                 result = result_of(*args)
-            return result(lambda: function(*args))
+            return result(lambda: make(args))
 
         def info() -> CacheInfo:
             return CacheInfo(result_of.cache_info().currsize, bound, "entries")

@@ -79,14 +79,14 @@ def test_threads_while_another_one_clears(expected):
     over, cleared = threading.Event(), []
 
     def clear():
-        while not over.wait(0.2 if cleared else 0.0):
+        while not over.wait(0.5 if cleared else 0.0):
             jb.clear_caches()
             cleared.append(True)
 
     clearing = threading.Thread(target=clear)
     clearing.start()
     try:
-        results = _all_at_once(2)
+        results = _all_at_once(1)
     finally:
         over.set()
         clearing.join()
