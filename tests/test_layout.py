@@ -53,3 +53,14 @@ def test_public_names_have_docstrings():
         thing = getattr(jb, name)
         if not name.startswith("_") and callable(thing):
             assert thing.__doc__, name
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_what_outlives_a_call_is_kept_by_the_caches(path):
+    if path.name == "_caches.py":
+        return
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Attribute):
+            assert node.attr not in ("lru_cache", "cache", "filter_jit"), "see jaxbiped/_caches.py"
+        decorators = getattr(node, "decorator_list", [])
+        assert "jax.jit" not in map(ast.unparse, decorators), "cached_jit, see jaxbiped/_caches.py"
