@@ -4,12 +4,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import diffrax
-import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import Array
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
@@ -88,7 +88,7 @@ def prepare_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
     return by_lanes if setting.saved.within else _compiled
 
 
-_compiled = eqx.filter_jit(by_lanes)
+_compiled = cached_jit(by_lanes)
 
 
 def _step_by_step(

@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING, Any
 
 import diffrax
-import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from jaxbiped._caches import cached_jit
 from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._accuracy import rms_norm
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from jaxbiped.simulate._simulate import Simulation
 
 
-@eqx.filter_jit
+@cached_jit
 def by_xla(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`. A trajectory saved step by step keeps its full length."""
     controller: Any = step_control(run.rtol, run.atol, rms_norm, run.units)

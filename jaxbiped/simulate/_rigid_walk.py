@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._checks import (
     ArgumentError,
     check_choice,
@@ -167,7 +168,7 @@ def _by_xla(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
     )
 
 
-@eqx.filter_jit
+@cached_jit
 def _loop(walk: RigidWalk, room: int) -> tuple[RigidProgress, Any]:
     def advance(
         loop: tuple[RigidProgress, Any, Scalar],

@@ -1,12 +1,12 @@
 """Rigid walk as a program for lanes."""
 
-import functools
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
+from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import CompiledProgram, Program, Recorded, call
 from jaxbiped.dynamics._rigid_state import RigidState
@@ -41,7 +41,7 @@ def rigid_walk_by_lanes(
     return call(_compiled(structure, room > 0, waits), walk, room=room, quick=True)
 
 
-@functools.lru_cache(maxsize=64)
+@bounded_cache(PROGRAMS)
 def _compiled(structure: Any, recording: bool, waits: bool) -> CompiledProgram:
     number: Any = jax.ShapeDtypeStruct((), jnp.float64)
     scene = jtu.tree_unflatten(structure, [number] * structure.num_leaves)

@@ -1,13 +1,12 @@
 """Following of starts until each is certain, by either engine."""
 
-import functools
-import threading
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._adaptive_program import Solve
@@ -30,8 +29,6 @@ _LONGEST = 1e6
 """Simulated time [s] that no start takes: its footsteps or its patience end it before."""
 _PATIENCE = 50.0
 """Longest time between two footsteps, in units of √(l/g)."""
-
-_MAKING = threading.Lock()
 
 
 class Effort(NamedTuple):
@@ -81,15 +78,14 @@ def follow_starts(
         solve = Solve(**common, almost=last, atol=atol, units=units, patience=same(np.inf))
     waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
-    with _MAKING:
-        course = _labelling_loop(scene.compliant, effort.solver, periods, effort.engine)
+    course = _labelling_loop(scene.compliant, effort.solver, periods, effort.engine)
     if not count:
         return _empty_outcome(len(states) - 1)
     run = label_by_lanes if effort.engine == "lanes" else label_by_xla
     return run(course, jtu.tree_map(np.asarray, starts))
 
 
-@functools.cache  # the same object each time, so that nothing is compiled again
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
 def _labelling_loop(
     compliant: bool, solver: AbstractRosenbrock, periods: tuple[int, ...], engine: str
 ) -> AbstractLabellingLoop:

@@ -2,12 +2,12 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.sweep._labelling_loop import AbstractLabellingLoop, Outcome, Progress, Start
 
@@ -56,17 +56,17 @@ def label_by_xla(course: AbstractLabellingLoop, starts: Start, *, slots: int = S
     return whole
 
 
-@eqx.filter_jit
+@cached_jit
 def _begin(course: AbstractLabellingLoop, starts: Start) -> Progress:
     return jax.vmap(course.begin)(starts)
 
 
-@eqx.filter_jit
+@cached_jit
 def _finish(course: AbstractLabellingLoop, starts: Start, now: Progress) -> Outcome:
     return jax.vmap(course.finish)(starts, now)
 
 
-@eqx.filter_jit
+@cached_jit
 def _round(
     course: AbstractLabellingLoop, starts: Start, now: Progress, over: Scalar
 ) -> tuple[Progress, Scalar]:
@@ -87,7 +87,7 @@ def _round(
     return now, over
 
 
-@eqx.filter_jit
+@cached_jit
 def _refill(
     course: AbstractLabellingLoop,
     given: Start,

@@ -1,6 +1,5 @@
 """Adjoint solve of the second variation along a known motion, by lanes."""
 
-import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -9,6 +8,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import CompiledProgram, Program, Recording, call, call_recording
 from jaxbiped.variational._adjoint_step import Adjoints, adjoint_step
@@ -100,7 +100,7 @@ def _kind(flow: Flow) -> _Kind:
     return _Kind(flow.system, flow.arrival, flow.args.active, args, flow.structure)
 
 
-@functools.lru_cache(maxsize=256)
+@bounded_cache(PROGRAMS)
 def _compiled(kind: _Kind, final: bool | None) -> CompiledProgram:
     """The program that carries turned tangents, or where `final` is given, that of adjoints."""
 

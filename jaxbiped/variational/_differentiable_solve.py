@@ -1,6 +1,5 @@
 """Differentiable solve: scenes solved by lanes, with derivatives of their own."""
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -10,6 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
+from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import CompiledProgram, Recorded, Schedule, UnknownPrimitiveError, call
 from jaxbiped.dynamics._minimal_motion import vector_field
@@ -99,7 +99,7 @@ def solve_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[So
     return jtu.tree_map(lambda leaf: leaf[0], outputs), recorded.values[0, : recorded.counts[0]]
 
 
-@functools.lru_cache(maxsize=256)
+@bounded_cache(PROGRAMS)
 def compiled_solve(setting: Setting, scene: Any) -> CompiledProgram:
     """The program for scenes of one structure (see `jax.tree.structure`)."""
     body = AdaptiveSolve(
@@ -109,7 +109,7 @@ def compiled_solve(setting: Setting, scene: Any) -> CompiledProgram:
     return CompiledProgram(body.program(), shapes_of(placeholder))
 
 
-@functools.lru_cache(maxsize=256)
+@bounded_cache(PROGRAMS)
 def is_expressible(setting: Setting, scene: Any) -> bool:
     """Whether lanes have all operations of scenes of this structure (see `jax.tree.structure`)."""
     try:
@@ -119,7 +119,7 @@ def is_expressible(setting: Setting, scene: Any) -> bool:
     return True
 
 
-@functools.lru_cache(maxsize=256)
+@bounded_cache(PROGRAMS)
 def _differentiable(setting: Setting, structure: Any) -> Callable[..., list[Scalar]]:
     @jax.custom_jvp
     def run(*leaves: Scalar) -> list[Scalar]:

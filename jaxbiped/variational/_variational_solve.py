@@ -1,12 +1,12 @@
 """Variational solves by lanes, compiled and called."""
 
-import functools
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
+from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import CompiledProgram, Recording, call, call_recording
 from jaxbiped.solve._final_step import just_before_end
@@ -68,7 +68,7 @@ def solve_variational(
     return call(compiled, inputs, quick=quick)[0], None
 
 
-@functools.lru_cache(maxsize=256)
+@bounded_cache(PROGRAMS)
 def _compiled(
     watch: Watch,
     solver: AbstractRosenbrock,

@@ -4,6 +4,7 @@ import hashlib
 import os
 import tempfile
 import threading
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ _DIGEST = 32
 
 
 class MachineCode:
-    """A loaded function. It stays for the life of the process.
+    """A loaded function. Who calls its address has to keep it: without it the code is freed.
 
     Attributes:
         address: of its entry.
@@ -29,7 +30,8 @@ class MachineCode:
         self.address: int = engine.get_function_address(entry)
 
 
-_LOADED: dict[str, MachineCode] = {}
+_LOADED: weakref.WeakValueDictionary[str, MachineCode] = weakref.WeakValueDictionary()
+"""Code that some program still has, by what it was made from."""
 _LOCK = threading.Lock()
 
 
@@ -42,9 +44,10 @@ def machine_code(text: str, entry: str, host: Host, *, as_written: bool) -> Mach
     parts = [text, entry, str(as_written), *map(str, host), *_versions()]
     name = hashlib.sha256("\n".join(parts).encode()).hexdigest()
     with _LOCK:
-        if name not in _LOADED:
-            _LOADED[name] = _load(text, entry, host, as_written, _folder(), name)
-        return _LOADED[name]
+        code = _LOADED.get(name)
+        if code is None:
+            code = _LOADED[name] = _load(text, entry, host, as_written, _folder(), name)
+        return code
 
 
 def assembly(text: str, host: Host, *, as_written: bool) -> str:

@@ -1,5 +1,7 @@
 """The cache of compiled code: safe to delete, rebuilt where it is damaged."""
 
+import weakref
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ POINTS = np.linspace(-1.0, 1.0, 5)
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv(_machine_code.CACHE_VARIABLE, str(tmp_path))
-    monkeypatch.setattr(_machine_code, "_LOADED", {})
+    monkeypatch.setattr(_machine_code, "_LOADED", weakref.WeakValueDictionary())
     return tmp_path / "lanes"
 
 
