@@ -37,7 +37,8 @@ def test_one_simulation_many_and_a_batch_are_the_same(engine):
 def test_both_engines_take_the_same_steps():
     for x in (2.0, 1e5):
         lanes, xla = (engine.run(Request(ROOT, jnp.asarray(x))).outputs for engine in ENGINES)
-        np.testing.assert_array_equal(lanes, xla)
+        assert lanes[1] == xla[1]
+        np.testing.assert_allclose(lanes[0], xla[0], rtol=3e-16)  # products may be fused
 
 
 @pytest.mark.parametrize("engine", ENGINES)
