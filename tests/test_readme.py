@@ -27,6 +27,7 @@ def test_every_block_of_the_page_is_found():
     assert len(BLOCKS) == README.read_text().count("```python") > 5
 
 
+@pytest.mark.slow
 def test_the_first_block_prints_what_the_page_says(printed):
     said = re.findall(r"^print\(.*\)  # (\w[\w.]*)", BLOCKS[0], flags=re.MULTILINE)
     assert len(said) == 2

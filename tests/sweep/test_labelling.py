@@ -12,6 +12,8 @@ from tests.basins.truth import rigid_fate, seed_fate
 from tests.rigid_walkers import FIRST_DOUBLING, STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, rows, same, simplest_grid, stacked
 
+pytestmark = pytest.mark.slow
+
 SEED_STARTS = [
     *[(0.0, -0.8), (0.02, -0.7), (-0.01, -0.65)],
     *[(0.05, -1.5), (0.11, -1.8), (0.11, -1.5), (0.17, -1.8)],

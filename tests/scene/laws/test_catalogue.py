@@ -86,6 +86,7 @@ def test_bristle_laws_resemble_the_seeds(name, peak, give):
         assert 20.0 * float(law.sigma_1) == pytest.approx(2.0 * np.sqrt(20.0 * stiffness))
 
 
+@pytest.mark.slow
 def test_the_gait_on_dahls_bristles_is_found():
     law = jb.laws.friction_law_like("dahl", **FRICTION)
     scene = eqx.tree_at(lambda s: s.friction, jb.seed_scene(), law)
@@ -164,6 +165,7 @@ def test_all_laws_run_by_lanes(normal, friction):
     assert float(walk.final.theta_1) == pytest.approx(-0.21805, abs=3e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("normal", "friction"), [("tsuji", "stribeck")])
 def test_both_engines_agree(normal, friction):
     by_lanes, by_xla = (_walk(normal, friction, engine) for engine in ("lanes", "xla"))
