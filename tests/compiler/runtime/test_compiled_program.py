@@ -17,6 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
+from jaxbiped.compiler import LANES
 from jaxbiped.compiler.runtime import _compiled_program, _threads
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._host_cpu import host
@@ -25,7 +26,7 @@ from jaxbiped.compiler.runtime._threads import default_threads
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._units import units_of
-from jaxbiped.variational._differentiable_solve import Setting, compiled_solve
+from jaxbiped.variational._differentiable_solve import Setting, request_of
 
 SCENE = jb.seed_scene()
 SEED = np.array([float(leaf) for leaf in jb.seed_state()])
@@ -34,7 +35,8 @@ WATCH = ("fall", "stop", "stumble")
 
 def _program():
     setting = Setting(jb.solvers.Rodas4(), WATCH, counting=False, quick=True)
-    return compiled_solve(setting, jtu.tree_structure(SCENE))
+    one = jtu.tree_map(lambda leaf: leaf[0], _inputs([SEED]))
+    return LANES.compile(request_of(one, setting))
 
 
 def _inputs(starts, duration=0.3, most=20000.0, scene=SCENE):
