@@ -45,6 +45,9 @@ def boundary_dimension(
             to a quarter of the shortest axis. The far ends of a grid that does not hold a whole
             number of the largest boxes are left out.
 
+    Returns:
+        The dimension with its standard error, and the boxes counted at each side.
+
     Raises:
         ArgumentError: no boundary at three sizes, sides with a refined boundary, a side larger
             than the grid or not dividing the largest, or an argument that is not allowed.

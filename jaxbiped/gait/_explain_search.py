@@ -19,6 +19,9 @@ def explain_search(scene: Any, gait: Gait) -> str:
     Args:
         scene: the scene that was searched, whole numbers and all; not a batch.
         gait: what `find_gait` returned for it.
+
+    Returns:
+        One sentence, without a full stop.
     """
     if gait.outcome is not Search.FOUND:
         return f"no gait found: {_search_sentence(gait)}{_branch(scene, gait)}"

@@ -104,6 +104,12 @@ def find_gait(
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> gait = jb.find_gait(jb.ladder()["rigid"], parameters=(), radius_sensitivities=False)
+        >>> str(gait.outcome), round(float(gait.measures.period), 4)
+        ('found', 0.4438)
     """
     check_type("scene", scene, Scene, RigidScene, RedundantScene)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)

@@ -51,6 +51,9 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
         starts: leaves of shape (n,), see `rolling_starts`.
         options: those of `find_gait`, but for parameters and radius_sensitivities.
 
+    Returns:
+        The distinct gaits, and which of the n searches came to which.
+
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
     """

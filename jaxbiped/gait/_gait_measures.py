@@ -48,6 +48,9 @@ def gait_measures(
         scene, guess, period, section, accuracy, engine: as for `find_gait`.
         gradient: how to differentiate.
 
+    Returns:
+        The gait's measures, scalars in SI units.
+
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
         RuntimeError: a second derivative through `Implicit()`, or reverse mode through `Forward()`.

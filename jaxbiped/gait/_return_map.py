@@ -77,6 +77,10 @@ def return_map(
         engine: "xla", "lanes" or "auto" (see `ENGINES`), which here is "xla" for a system of your
             own. By lanes all directions of a derivative share one solve.
 
+    Returns:
+        State at the arrival, time that it took [s], and the code of what ended the motion before
+        it, leaves shaped as the start's.
+
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
         RuntimeError: reverse mode through `Forward()`.

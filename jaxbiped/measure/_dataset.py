@@ -37,6 +37,13 @@ def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset"
     hold how the motion ended and every parameter of the scene. Write it with `to_netcdf` (or
     `to_zarr`, with zarr installed).
 
+    Args:
+        scene: what was simulated.
+        trajectory: the motion; only one, not a batch.
+
+    Returns:
+        The dataset, one entry along `time` for each time saved.
+
     Raises:
         ValueError: a batch of trajectories.
     """

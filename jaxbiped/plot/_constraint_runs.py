@@ -31,6 +31,9 @@ def constraint_runs(runs: Sequence[ConstraintRun]) -> Figure:
     Args:
         runs: what `jaxbiped.compare_constraints` found.
 
+    Returns:
+        A new figure.
+
     Raises:
         ArgumentError: no runs.
     """

@@ -22,6 +22,18 @@ def parameter_names(scene: Scene | RigidScene | RedundantScene) -> tuple[str, ..
 
     A name is the parameter's own, `K`; where two parts have one of that name, `normal.K`. Those of
     a redundant scene are those of what it models.
+
+    Args:
+        scene: of any kind.
+
+    Returns:
+        The names, one for each numeric leaf of the scene.
+
+    Examples:
+        >>> import jaxbiped as jb
+
+        >>> jb.parameter_names(jb.seed_scene())[:5]
+        ('K', 'c', 'xi', 'm', 'J')
     """
     if isinstance(scene, RedundantScene):
         return parameter_names(scene.scene)
@@ -31,7 +43,20 @@ def parameter_names(scene: Scene | RigidScene | RedundantScene) -> tuple[str, ..
 
 
 def parameter_values(scene: Scene | RigidScene) -> dict[str, Any]:
-    """A scene's parameters by name (see `parameter_names`), their own leaves."""
+    """A scene's parameters by name (see `parameter_names`), their own leaves.
+
+    Args:
+        scene: of any kind.
+
+    Returns:
+        Values by name, SI units, in the order of `parameter_names`.
+
+    Examples:
+        >>> import jaxbiped as jb
+
+        >>> float(jb.parameter_values(jb.seed_scene())["K"])
+        1000000.0
+    """
     by_leaf = dict(zip(_names_by_leaf(scene), jtu.tree_leaves(scene), strict=True))
     return {name: by_leaf[name] for name in parameter_names(scene)}
 
@@ -54,8 +79,23 @@ def select_parameters(
 def with_parameters(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
     """The scene with other values of these parameters (see `parameter_names`), checked anew.
 
+    Args:
+        scene: of any kind.
+        values: new values by name, SI units; arrays of shape (n,) make a batch of scenes for
+            `vmap`.
+
+    Returns:
+        A new scene of the same kind; the one given is not changed.
+
     Raises:
         ArgumentError: a name that the scene does not have, or a value that is not allowed.
+
+    Examples:
+        >>> import jaxbiped as jb
+
+        >>> scene = jb.with_parameters(jb.seed_scene(), {"slope": 0.01, "K": 2e6})
+        >>> float(scene.ground.slope), float(scene.normal.K)
+        (0.01, 2000000.0)
     """
     if isinstance(scene, RedundantScene):
         modelled = with_parameters(scene.scene, values)

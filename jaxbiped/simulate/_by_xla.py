@@ -4,7 +4,9 @@ from typing import TYPE_CHECKING, Any
 
 import diffrax
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
 from jaxtyping import Array
 
 from jaxbiped.dynamics._minimal_motion import vector_field
@@ -95,3 +97,15 @@ def _ending(
     masks: Any = solution.event_mask
     events = dict(zip(names, masks or [], strict=True))
     return ending_code(events, done=done, out_of_steps=out_of_steps)
+
+
+def trim(trajectory: Trajectory) -> Trajectory:
+    """Cuts unused room off a single trajectory; one that is being traced keeps it."""
+    if trajectory.dense is None or isinstance(trajectory.t, jax.core.Tracer):
+        return trajectory
+    length = int(trajectory.accepted) + 1
+    return eqx.tree_at(
+        lambda each: (each.t, each.state),
+        trajectory,
+        (trajectory.t[:length], jtu.tree_map(lambda leaf: leaf[:length], trajectory.state)),
+    )

@@ -113,6 +113,10 @@ def compare_constraints(
         repeats: runs of which the fastest counts.
         progress: whether to show a bar on stderr.
 
+    Returns:
+        A `ConstraintRun` for every pair of method and integrator, the integrators of one method
+        together.
+
     Raises:
         ArgumentError: an argument that is not allowed.
     """

@@ -43,6 +43,9 @@ def nearest_failure(
         tolerance: of the distance.
         options: others of `minimal_fatal_shock`.
 
+    Returns:
+        The push to the nearest failing start, and its distance in the scales above.
+
     Raises:
         ArgumentError: no gait is known, or an argument of `minimal_fatal_shock` is not allowed.
     """

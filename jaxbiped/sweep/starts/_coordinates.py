@@ -45,7 +45,20 @@ UNITS = {
 
 
 def coordinate_names(scene: Scene | RigidScene) -> tuple[str, ...]:
-    """All coordinates that starts of a scene can differ in."""
+    """All coordinates that starts of a scene can differ in.
+
+    Args:
+        scene: the walker, compliant or rigid.
+
+    Returns:
+        Names of the state's coordinates, leg 2 standing, and then of the scene's parameters.
+
+    Examples:
+        >>> import jaxbiped as jb
+
+        >>> jb.starts.coordinate_names(jb.seed_scene())[:2]
+        ('theta_stance', 'theta_swing')
+    """
     leaves = RigidState._fields if isinstance(scene, RigidScene) else None
     own = [name for name, leaf in COORDINATES.items() if leaves is None or leaf in leaves]
     return (*own, *parameter_names(scene))
