@@ -55,7 +55,7 @@ def _measures(codes: np.ndarray) -> dict[str, Any]:
 def refined(labelling: jb.Labelling, cells: int, levels: int) -> jb.basins.RefinedBoundary:
     """The slice's boundaries, halved so many times from a coarse grid."""
     lower, upper = zip(THETA, OMEGA, strict=True)
-    return jb.basins.refined_boundary(
+    return jb.basins.refine_boundary(
         jb.label_at(labelling, ("theta_swing", "omega_swing")),
         lower,
         upper,

@@ -29,6 +29,7 @@ from jaxbiped.scene._ground import Ground as Ground
 from jaxbiped.scene._ladder import ladder as ladder
 from jaxbiped.scene._linkage_scene import LinkageScene as LinkageScene
 from jaxbiped.scene._parameters import parameter_names as parameter_names
+from jaxbiped.scene._parameters import parameter_quantities as parameter_quantities
 from jaxbiped.scene._parameters import parameter_values as parameter_values
 from jaxbiped.scene._parameters import with_parameters as with_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene as RedundantScene

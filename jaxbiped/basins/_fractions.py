@@ -49,7 +49,6 @@ def wilson_interval(
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> low, high = jb.basins.wilson_interval(30, 100)
         >>> round(float(low), 4), round(float(high), 4)
         (0.2189, 0.3958)
@@ -92,7 +91,6 @@ def fractions(labels: npt.ArrayLike, *, confidence: float = 0.95) -> dict[str, F
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> found = jb.basins.fractions([0, 0, 0, 1])
         >>> {name: (float(each.estimate), each.count) for name, each in found.items()}
         {'walking': (0.75, 3), 'fell forward': (0.25, 1)}

@@ -52,7 +52,6 @@ def label_name(label: int, period: int = 0) -> str:
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> jb.basins.label_name(0, 2), jb.basins.label_name(1)
         ('walking period-2', 'fell forward')
     """
@@ -75,7 +74,6 @@ def label_names(label: npt.ArrayLike, period: npt.ArrayLike) -> np.ndarray:
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> jb.basins.label_names([0, 7], [1, 0]).tolist()
         ['walking period-1', 'slid']
     """

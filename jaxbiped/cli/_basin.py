@@ -28,7 +28,7 @@ from jaxbiped.sweep._labelling import Labelling, effort_of
 from jaxbiped.sweep._prepare import labelling
 from jaxbiped.sweep._sweep import CHUNK, sweep
 from jaxbiped.sweep._zarr_store import check_store
-from jaxbiped.sweep.starts._coordinates import COORDINATES
+from jaxbiped.sweep.starts._coordinates import COORDINATES, coordinate_quantities
 from jaxbiped.sweep.starts._given_starts import GivenStarts
 from jaxbiped.sweep.starts._starts import AbstractStarts
 
@@ -208,11 +208,12 @@ def _write_results(
         from jaxbiped import plot
 
         y, x = names
+        quantities = coordinate_quantities(known.scene)
         figure = plot.basin(
             found.label.values,
             found[x].values,
             found[y].values,
-            names=(x, y),
+            names=(quantities[x], quantities[y]),
             period=found.period.values,
             mark=_mark(known, x, y),
         )

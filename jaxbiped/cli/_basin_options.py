@@ -70,7 +70,7 @@ class StartsOptions:
 
     def _axes(self, scene: Scene | RigidScene) -> dict[str, tuple[float, float, int]]:
         """First, last and count of each axis, the horizontal one last."""
-        usual = _USUAL_RIGID if isinstance(scene, RigidScene) else _USUAL
+        usual = _USUAL if scene.compliant else _USUAL_RIGID
         named = [text for text in (*self.more, self.y, self.x) if text is not None]
         axes: dict[str, tuple[float, float, int]] = {}
         for text in named or reversed(usual):
@@ -136,4 +136,4 @@ def read_starts(path: Path, scene: Scene | RigidScene) -> object:
                 f"{len(State._fields)}."
             )
     whole = State(*[jnp.asarray(column) for column in np.array(numbers).T])
-    return rigid_state(whole) if isinstance(scene, RigidScene) else whole
+    return whole if scene.compliant else rigid_state(whole)

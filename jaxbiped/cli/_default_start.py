@@ -12,7 +12,6 @@ from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State, seed_state
 from jaxbiped.gait._default_guess import default_guess
-from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
@@ -29,7 +28,7 @@ def default_start(scene: Any) -> State | RigidState:
     For the seed's own scene it is the seed's start to the last bit.
     """
     seed, own = seed_state(), seed_scene()
-    if isinstance(scene, RigidScene):
+    if not scene.compliant:
         return default_guess(scene)
     if _fitted_to(scene.walker, scene.normal, scene.ground.g) == _fitted_to(
         own.walker, own.normal, own.ground.g

@@ -1,16 +1,14 @@
 """`jaxbiped models`: what can be modelled, and what it costs."""
 
 import dataclasses
-import inspect
-import re
 from pathlib import Path
 from typing import Any
 
 from jaxbiped._checks import check_writable_file
+from jaxbiped._parameter import parameter_infos
 from jaxbiped._progress import stage
 from jaxbiped.cli._report import Report, table
-from jaxbiped.dynamics._bristle_state import state_type
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.measure._operation_counts import operation_counts
 from jaxbiped.scene._ladder import ladder
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -61,33 +59,24 @@ class Models:
 
 def _law(name: str, scene: Scene, law: Any) -> dict[str, Any]:
     """A law that stands in the seed's scene, with the value of each parameter there."""
-    units = _units(type(law))
     return {
         "name": name,
         "class": type(law).__name__,
         "parameters": {
-            field.name: {"value": float(getattr(law, field.name)), "unit": units[field.name]}
-            for field in dataclasses.fields(law)
-            if getattr(law, field.name) is not None
+            name: {"value": float(getattr(law, name)), "unit": info.quantity.unit_in_text}
+            for name, info in parameter_infos(law).items()
+            if getattr(law, name) is not None
         },
         "operations": sum(operation_counts(scene).values()),
     }
 
 
 def _rung(name: str, scene: Scene | RigidScene) -> dict[str, Any]:
-    kind = RigidState if isinstance(scene, RigidScene) else state_type(scene)
     return {
         "name": name,
-        "states": len(kind._fields),
+        "states": len(state_type(scene)._fields),
         "operations": sum(operation_counts(scene).values()),
     }
-
-
-def _units(law: type) -> dict[str, str]:
-    """Units of a law's parameters, from its docstring."""
-    text = inspect.getdoc(law) or ""
-    found = re.findall(r"^    (\w+): (?:[^\[]|\n)*?\[([^\]]+)\]", text, flags=re.MULTILINE)
-    return dict(found)
 
 
 def _print(report: Report, numbers: dict[str, Any]) -> None:

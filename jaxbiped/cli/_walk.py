@@ -21,7 +21,6 @@ from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._footsteps import Footsteps, footsteps
-from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._simulate import Simulation
 from jaxbiped.solve._ending import Ending
@@ -111,12 +110,12 @@ class Walk:
         }
         numbers["warnings"] = walk_warnings(scene, numbers, rtol=rtol)
         report = Report(self.output.json)
-        if isinstance(scene, RedundantScene):
+        if scene.redundant:
             numbers["constraints"] = constraint_numbers(scene, trajectory)
         _print(report, numbers)
         for sentence in numbers["warnings"]:
             report.say(f"WARNING: {sentence}")
-        if isinstance(scene, RedundantScene):
+        if scene.redundant:
             report.say(constraint_sentence(numbers["constraints"]))
         if self.output.out is not None:
             with stage("drawing the figures and the animation"):

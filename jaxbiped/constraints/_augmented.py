@@ -4,9 +4,11 @@ from typing import ClassVar
 
 import equinox as eqx
 
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._checks import check_at_least
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
-from jaxbiped.constraints._penalised import augmented_multipliers, check_augmented
+from jaxbiped.constraints._penalised import augmented_multipliers
 
 
 class Augmented(AbstractConstraintMethod):
@@ -28,14 +30,16 @@ class Augmented(AbstractConstraintMethod):
         ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
     """
 
-    A: Parameter = eqx.field(converter=as_float, default=1e7)
-    omega: Parameter = eqx.field(converter=as_float, default=10.0)
-    zeta: Parameter = eqx.field(converter=as_float, default=1.0)
+    A: Parameter = parameter("penalty", "$A$", "kg", positive=True, default=1e7)
+    omega: Parameter = parameter(
+        "constraint frequency", r"$\omega$", "1/s", minimum=0.0, default=10.0
+    )
+    zeta: Parameter = parameter("constraint damping ratio", r"$\zeta$", minimum=0.0, default=1.0)
     iterations: int = eqx.field(static=True, default=3)
     needs_independent: ClassVar[bool] = False
 
     def __check_init__(self) -> None:
-        check_augmented(self.A, self.omega, self.zeta, self.iterations)
+        check_at_least("iterations", self.iterations, "1", 1)
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
         return augmented_multipliers(system, self.A, self.omega, self.zeta, self.iterations)

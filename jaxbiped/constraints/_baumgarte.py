@@ -2,10 +2,8 @@
 
 from typing import ClassVar
 
-import equinox as eqx
-
-from jaxbiped._checks import check_not_negative
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.constraints._constraint_method import (
     AbstractConstraintMethod,
     Constrained,
@@ -27,13 +25,9 @@ class Baumgarte(AbstractConstraintMethod):
         ArgumentError: a or b below 0.
     """
 
-    a: Parameter = eqx.field(converter=as_float, default=5.0)
-    b: Parameter = eqx.field(converter=as_float, default=5.0)
+    a: Parameter = parameter("constraint damping", "$a$", "1/s", minimum=0.0, default=5.0)
+    b: Parameter = parameter("constraint frequency", "$b$", "1/s", minimum=0.0, default=5.0)
     needs_independent: ClassVar[bool] = True
-
-    def __check_init__(self) -> None:
-        check_not_negative("a", self.a, "1/s")
-        check_not_negative("b", self.b, "1/s")
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
         return exact_multipliers(system, stabilised(system, 2.0 * self.a, self.b * self.b))

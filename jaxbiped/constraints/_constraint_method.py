@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import equinox as eqx
 
+from jaxbiped._parameter import check_parameters
 from jaxbiped._types import Scalar
 from jaxbiped.linalg._symmetric import factorise, solve
 
@@ -45,6 +46,9 @@ class AbstractConstraintMethod(eqx.Module):
     """
 
     needs_independent: AbstractClassVar[bool]
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
 
     @abc.abstractmethod
     def multipliers(self, system: Constrained) -> list[Scalar]:

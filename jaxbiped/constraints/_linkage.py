@@ -5,11 +5,10 @@ import equinox as eqx
 from jaxbiped._checks import (
     ArgumentError,
     check_choice,
-    check_finite,
-    check_positive,
     check_type,
 )
-from jaxbiped._types import Parameter, as_float
+from jaxbiped._parameter import check_parameters, parameter
+from jaxbiped._types import Parameter
 
 ORIENTATIONS = ("angle", "euler")
 """How a body's orientation is written.
@@ -30,12 +29,11 @@ class Body(eqx.Module):
         ArgumentError: a mass or an inertia that is not above 0.
     """
 
-    mass: Parameter = eqx.field(converter=as_float)
-    inertia: Parameter = eqx.field(converter=as_float)
+    mass: Parameter = parameter("body mass", "$m$", "kg", positive=True)
+    inertia: Parameter = parameter("body inertia", "$J$", "kg m^2", positive=True)
 
     def __check_init__(self) -> None:
-        check_positive("mass", self.mass, "kg")
-        check_positive("inertia", self.inertia, "kg m^2")
+        check_parameters(self)
 
 
 class Joint(eqx.Module):
@@ -53,15 +51,14 @@ class Joint(eqx.Module):
         ArgumentError: a coordinate that is not finite, or a body joined to itself.
     """
 
-    point_1: tuple[Parameter, Parameter] = eqx.field(converter=lambda p: tuple(map(as_float, p)))
-    point_2: tuple[Parameter, Parameter] = eqx.field(converter=lambda p: tuple(map(as_float, p)))
-    body_1: int = eqx.field(static=True)
+    point_1: tuple[Parameter, Parameter] = parameter("pin in body 1", "$s_1$", "m", pair=True)
+    point_2: tuple[Parameter, Parameter] = parameter("pin in body 2", "$s_2$", "m", pair=True)
+    # mypy takes a call of `parameter` for a default.
+    body_1: int = eqx.field(static=True)  # type: ignore[misc]
     body_2: int | None = eqx.field(static=True, default=None)
 
     def __check_init__(self) -> None:
-        for name in ("point_1", "point_2"):
-            for value in getattr(self, name):
-                check_finite(name, value)
+        check_parameters(self)
         if self.body_1 == self.body_2:
             raise ArgumentError(
                 f"body_2 = {self.body_2} is not allowed: a joint needs two bodies, or the ground."

@@ -1,22 +1,8 @@
 """Penalty and augmented Lagrangian systems, shared by the methods that use them."""
 
-from jaxbiped._checks import check_at_least, check_not_negative, check_positive
 from jaxbiped._types import Scalar
 from jaxbiped.constraints._constraint_method import Constrained, gram, inverse_masses, stabilised
 from jaxbiped.linalg._symmetric import Factors, factorise, solve
-
-
-def check_penalty(A: Scalar, omega: Scalar, zeta: Scalar) -> None:
-    """Raises `ArgumentError` for A not above 0, or ω or ζ below 0."""
-    check_positive("A", A, "kg")
-    check_not_negative("omega", omega, "1/s")
-    check_not_negative("zeta", zeta)
-
-
-def check_augmented(A: Scalar, omega: Scalar, zeta: Scalar, iterations: int) -> None:
-    """`check_penalty`, and raises `ArgumentError` for fewer than one iteration."""
-    check_penalty(A, omega, zeta)
-    check_at_least("iterations", iterations, "1", 1)
 
 
 def penalty_system(

@@ -2,11 +2,10 @@
 
 from typing import ClassVar
 
-import equinox as eqx
-
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
-from jaxbiped.constraints._penalised import check_penalty, penalty_system
+from jaxbiped.constraints._penalised import penalty_system
 from jaxbiped.linalg._symmetric import solve
 
 
@@ -31,13 +30,12 @@ class Penalty(AbstractConstraintMethod):
         ArgumentError: A not above 0, or ω or ζ below 0.
     """
 
-    A: Parameter = eqx.field(converter=as_float, default=1e10)
-    omega: Parameter = eqx.field(converter=as_float, default=10.0)
-    zeta: Parameter = eqx.field(converter=as_float, default=1.0)
+    A: Parameter = parameter("penalty", "$A$", "kg", positive=True, default=1e10)
+    omega: Parameter = parameter(
+        "constraint frequency", r"$\omega$", "1/s", minimum=0.0, default=10.0
+    )
+    zeta: Parameter = parameter("constraint damping ratio", r"$\zeta$", minimum=0.0, default=1.0)
     needs_independent: ClassVar[bool] = False
-
-    def __check_init__(self) -> None:
-        check_penalty(self.A, self.omega, self.zeta)
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
         return solve(*penalty_system(system, self.A, self.omega, self.zeta))

@@ -6,9 +6,9 @@ import jax.numpy as jnp
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State, check_state
 from jaxbiped.scene._scene import Scene
-from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 
 class BristleState(NamedTuple):
@@ -31,9 +31,9 @@ class BristleState(NamedTuple):
     bristle_2: Scalar
 
 
-def state_type(scene: Scene) -> Any:
-    """The type of a scene's states."""
-    return BristleState if isinstance(scene.friction, AbstractBristleLaw) else State
+@state_type.register
+def _(scene: Scene) -> Any:
+    return BristleState if scene.has_bristles else State
 
 
 def state_for(scene: Scene, state: Any, name: str = "state") -> Any:

@@ -24,7 +24,6 @@ from jaxbiped.dynamics._redundant_state import (
 )
 from jaxbiped.dynamics._state import check_leaves
 from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 FURTHEST = Violation(position=0.01, rate=0.1, normalisation=0.01)
 """A start that is further off its constraints is refused [m, m/s, –]."""
@@ -115,7 +114,7 @@ def _check_state_of_scene(scene: RedundantScene, state: Any) -> Any:
             f"state is a {type(state).__name__}, but orientation = {scene.orientation!r} needs a "
             f"{kind.__name__}."
         )
-    remembers = isinstance(scene.friction, AbstractBristleLaw)
+    remembers = scene.has_bristles
     if remembers and state.bristle_1 is None:
         straight = jnp.zeros_like(state.x_1)
         state = state._replace(bristle_1=straight, bristle_2=straight)

@@ -8,6 +8,7 @@ from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._forces import foot_force
+from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
@@ -146,3 +147,8 @@ def vector_field(t: Any, state: State, scene: Scene) -> State:
         omega_1=second.alpha_1,
         omega_2=second.alpha_2,
     )
+
+
+@field_of.register
+def _(scene: Scene) -> Any:
+    return vector_field

@@ -14,6 +14,7 @@ from jaxbiped.constraints._linkage_constraints import (
 )
 from jaxbiped.dynamics._feet import feet, feet_of
 from jaxbiped.dynamics._forces import foot_force
+from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.dynamics._linkage_motion import LinkageMotion, motion_under
 from jaxbiped.dynamics._minimal_motion import Accelerations, accelerations, bristle_rates
 from jaxbiped.dynamics._redundant_state import Leg, legs_of
@@ -113,6 +114,11 @@ def redundant_field(t: Any, state: Any, scene: RedundantScene) -> Any:
     if isinstance(scene.friction, AbstractBristleLaw):
         memory = bristle_rates(scene.friction, scene, state)
     return with_coordinates(state, v, moved.accelerations)._replace(**memory)
+
+
+@field_of.register
+def _(scene: RedundantScene) -> Any:
+    return redundant_field
 
 
 def violation(scene: RedundantScene, state: Any) -> Violation:

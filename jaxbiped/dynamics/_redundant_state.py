@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._bristle_state import BristleState
+from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._walker_linkage import leg_of
@@ -123,6 +124,11 @@ def legs_of(scene: Any, state: Any) -> tuple[Leg, Leg]:
     return _leg(scene, state, 1), _leg(scene, state, 2)
 
 
+@state_type.register
+def _(scene: RedundantScene) -> Any:
+    return EulerState if scene.orientation == "euler" else RedundantState
+
+
 def redundant_state(scene: RedundantScene, state: Any) -> Any:
     """The consistent state of a redundant scene that is the same as a minimal one.
 
@@ -134,7 +140,7 @@ def redundant_state(scene: RedundantScene, state: Any) -> Any:
         A `RedundantState`, or an `EulerState` where the scene has Euler parameters.
     """
     _, distance = leg_of(scene.walker)
-    kind = EulerState if scene.orientation == "euler" else RedundantState
+    kind = state_type(scene)
     fields: dict[str, Any] = {}
     for leg, angle, rate in (
         ("1", state.theta_1, state.omega_1),

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._rigid_scene import RigidScene
 
@@ -26,6 +27,11 @@ class RigidState(NamedTuple):
     theta_2: Scalar
     omega_1: Scalar
     omega_2: Scalar
+
+
+@state_type.register
+def _(scene: RigidScene) -> type[RigidState]:
+    return RigidState
 
 
 def whole_state(scene: RigidScene, state: RigidState) -> State:

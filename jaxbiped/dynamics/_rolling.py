@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._forces import FootForce
+from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._walker import Walker
@@ -184,3 +185,8 @@ def rolling_field(t: Any, state: RigidState, scene: RigidScene) -> RigidState:
         omega_1=motion.alpha_1,
         omega_2=motion.alpha_2,
     )
+
+
+@field_of.register
+def _(scene: RigidScene) -> Any:
+    return rolling_field

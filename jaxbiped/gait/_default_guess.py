@@ -7,11 +7,11 @@ import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._bristle_state import BristleState, state_type
+from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._feet import standing_height
+from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._rigid_state import rigid_state
 from jaxbiped.dynamics._state import State, seed_state
-from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
@@ -20,7 +20,7 @@ from jaxbiped.scene._walker import Walker
 def default_guess(scene: Any) -> Any:
     """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight."""
     seed, own = _seed()
-    if isinstance(scene, RigidScene):
+    if not scene.compliant:
         pace = jnp.sqrt(scene.ground.g / scene.walker.l * own.walker.l / own.ground.g)
         rates = dict(omega_1=seed.omega_1 * pace, omega_2=seed.omega_2 * pace)
         return jax.tree.map(as_float, rigid_state(seed)._replace(**rates))

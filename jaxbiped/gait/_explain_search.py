@@ -6,7 +6,6 @@ from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._parameters import parameter_values
-from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._ending import Ending
 
 _MOST_NAMED = 4
@@ -48,7 +47,7 @@ def _search_sentence(gait: Gait) -> str:
 def _branch(scene: Any, gait: Gait) -> str:
     """Where the branch of the seed's gait ended, after a semicolon; nothing where it came here."""
     end = BranchEnd(int(gait.origin.branch_end))
-    modelled = scene.scene if isinstance(scene, RedundantScene) else scene
+    modelled = scene.minimal
     if end is BranchEnd.NOT_FOLLOWED or (end is BranchEnd.REACHED and gait.outcome is Search.FOUND):
         return ""
     if end is BranchEnd.REACHED:

@@ -116,24 +116,23 @@ def find_gait(
     check_choice("method", method, ("newton", "optax"))
     check_count("period", period)
     check_unbatched("scene", scene)
-    rigid = isinstance(scene, RigidScene)
     start = _check_start(scene, default_guess(scene) if guess is None else guess)
     check_unbatched("guess", start, "one state")
     most = (40 if method == "newton" else 400) if max_evaluations is None else max_evaluations
     check_count("max_evaluations", most)
     scene = jtu.tree_map(as_float, scene)
     # A redundant scene's leaves begin with those of what it models.
-    modelled = scene.scene if isinstance(scene, RedundantScene) else scene
+    modelled = scene.minimal
     names, active = select_parameters(modelled, parameters)
     precision = precision_of(accuracy, scene)
-    method_of_steps = orbit_solver(solver, rigid=rigid)
+    method_of_steps = orbit_solver(solver, rigid=not scene.compliant)
     section = section_of(scene, section)
     chosen = orbit_engine(
         engine,
         solver=method_of_steps,
         section=section,
         leaves=(scene, start),
-        redundant=isinstance(scene, RedundantScene),
+        redundant=scene.redundant,
     )
     spec = _return_map_spec(
         scene, section, method_of_steps, chosen, steps=int(period), most=MOST_SOLVER_STEPS[accuracy]
@@ -166,7 +165,7 @@ def _return_map_spec(
     scene: Any, section: AbstractSection, solver: Any, engine: str, *, steps: int, most: int
 ) -> ReturnMapSpec:
     within = None
-    if isinstance(scene, RedundantScene):
+    if scene.redundant:
         solver, within = with_projection(scene, solver), RedundantWalking()
     return ReturnMapSpec(
         system=system_of(scene),
@@ -190,9 +189,9 @@ def _search_on(
 ) -> tuple[Found, Origin]:
     """The stages of a search beyond the first."""
     spec, scene, active, start, precision, how = searching
-    solver = orbit_solver(None, rigid=isinstance(modelled, RigidScene))
+    solver = orbit_solver(None, rigid=not modelled.compliant)
     section = section_of(modelled, None)
-    if isinstance(scene, RedundantScene):
+    if scene.redundant:
         engine = "auto"
     scout_engine = orbit_engine(engine, solver=solver, section=section, leaves=(modelled, start))
     scout = _return_map_spec(
@@ -214,9 +213,9 @@ def _search_on(
 
 
 def _check_start(scene: Any, start: Any) -> Any:
-    if isinstance(scene, RigidScene):
+    if not scene.compliant:
         return check_state(start, RigidState, "guess")
-    if isinstance(scene, RedundantScene):
+    if scene.redundant:
         return minimal_state(scene, consistent_state(scene, start).state)
     return state_for(scene, start, "guess")
 

@@ -9,6 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Recording
 from jaxbiped.gait._fixed_point_search import Found, Search
@@ -17,6 +18,7 @@ from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._stability import Bifurcation
+from jaxbiped.scene._parameters import parameter_quantities
 from jaxbiped.solve._ending import Ending
 
 _NOTHING = 1e-9
@@ -80,6 +82,7 @@ class Gait(eqx.Module):
         orbit: times [s] and states at the ends of the last cycle's solver steps, NaN beyond.
         parameters: names of the p parameters.
         engine: what computed it, "xla" or "lanes".
+        quantities: what the parameters are, with their units; () where that is not known.
     """
 
     ending: Scalar
@@ -104,6 +107,7 @@ class Gait(eqx.Module):
     orbit: tuple[Scalar, Any]
     parameters: tuple[str, ...] = eqx.field(static=True)
     engine: str = eqx.field(static=True)
+    quantities: tuple[Quantity, ...] = eqx.field(static=True, default=())
 
     @property
     def outcome(self) -> Search:
@@ -199,6 +203,7 @@ def summarise_gait(
         orbit=_path(last, start),
         parameters=names,
         engine=spec.engine,
+        quantities=tuple(map(parameter_quantities(scene).__getitem__, names)),
     )
 
 

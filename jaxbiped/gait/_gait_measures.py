@@ -91,7 +91,7 @@ def gait_measures(
 
 
 def _by_theorem(scene: Scene | RigidScene | RedundantScene, gait: Gait) -> Measures:
-    modelled = scene.scene if isinstance(scene, RedundantScene) else scene
+    modelled = scene.minimal
     _, active = select_parameters(modelled, gait.parameters)
     leaves = jtu.tree_leaves(modelled)
     parameters = jnp.stack([leaves[i] for i in active])

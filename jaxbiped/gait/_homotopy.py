@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
@@ -53,14 +53,12 @@ def _interpolate(a: Any, b: Any, s: Any) -> tuple[Any, Any]:
     return value, jnp.where(geometric, power * jnp.log(ratio), b - a)
 
 
-def homotopy_to(scene: Scene | RigidScene | RedundantScene) -> Homotopy:
+def homotopy_to(scene: AbstractScene) -> Homotopy:
     """The line to `scene` from the seed's scene, its laws made to resemble the seed's.
 
     Numbers of laws that are not in the catalogue stay those of `scene`.
     """
-    if isinstance(scene, RedundantScene):
-        return Homotopy(dataclasses.replace(scene, scene=_seed_like(scene.scene)), scene)
-    return Homotopy(_seed_like(scene), scene)
+    return Homotopy(scene.with_minimal(_seed_like(scene.minimal)), scene)
 
 
 def _seed_like(scene: Scene | RigidScene) -> Any:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._abstract_scene import is_rigid
 from jaxbiped.variational._solve_to_section import Precision
 
 _PRECISIONS = {"balanced": Precision(3e-7, 3e-6), "tight": Precision(1e-9, 1e-8)}
@@ -16,4 +16,4 @@ MOST_SOLVER_STEPS = {"balanced": 4096, "tight": 32768}
 
 def precision_of(accuracy: str, scene: Any = None) -> Precision:
     """Tolerances of state and derivatives."""
-    return (_OF_RIGID if isinstance(scene, RigidScene) else _PRECISIONS)[accuracy]
+    return (_OF_RIGID if is_rigid(scene) else _PRECISIONS)[accuracy]

@@ -19,8 +19,8 @@ from jaxbiped.gait._return_by_lanes import forward_by_lanes, reverse_by_lanes
 from jaxbiped.gait._return_by_xla import forward_by_xla, reverse_by_xla, select
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
+from jaxbiped.scene._abstract_scene import is_rigid
 from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.variational._hybrid_system import (
     AbstractSystem,
@@ -96,7 +96,7 @@ def return_map(
     if enters:
         state = redundant_state(args, state)
     section = section_of(args, section)
-    method = orbit_solver(solver, rigid=isinstance(args, RigidScene))
+    method = orbit_solver(solver, rigid=is_rigid(args))
     by = orbit_engine(
         engine,
         solver=method,

@@ -19,7 +19,6 @@ from jaxbiped.gait._origin import FoundBy, Origin
 from jaxbiped.gait._poincare_map import recurring_components, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.linalg._small_matrices import eigenpairs
-from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.variational._solve_to_section import Precision
 
 _FIRST, _LARGEST, _SMALLEST = 0.05, 0.3, 1e-3
@@ -72,7 +71,7 @@ def search_along(
     """Searches from `start`, and along the line from the seed's scene where need be."""
     line = homotopy_to(scene)
     fitted = recurring_components(spec.system, start)
-    of_seed = line.first.scene if isinstance(line.first, RedundantScene) else line.first
+    of_seed = line.first.minimal
     first = recurring_components(spec.system, default_guess(of_seed))
 
     def run(way: _Way) -> Found:
@@ -167,7 +166,7 @@ def _is_ahead(way: _Way, point: Scalar) -> Scalar:
 
 def _nearest(kept: Any, line: Homotopy, s: Scalar, wanted: Scalar) -> Any:
     scene = line.at(s)
-    return select(wanted, scene.scene if isinstance(scene, RedundantScene) else scene, kept)
+    return select(wanted, scene.minimal, kept)
 
 
 def _radius(found: Found) -> Scalar:

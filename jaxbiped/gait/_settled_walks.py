@@ -34,8 +34,7 @@ def settle_walks(scene: Scene | RigidScene, starts: Any, *, most: int = 4) -> li
     Returns:
         States on the section without hip_x, each of shape (m,), apart from each other.
     """
-    rigid = isinstance(scene, RigidScene)
-    walked: Any = _rigid_arrivals if rigid else _arrivals
+    walked: Any = _arrivals if scene.compliant else _rigid_arrivals
     counts, last = walked(scene, starts)
     points = np.stack([np.asarray(leaf) for leaf in last[1:]], axis=-1)
     walking = np.flatnonzero(np.asarray(counts) >= _FOOTSTEPS)

@@ -11,9 +11,7 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._abstract_scene import AbstractScene
 
 _SHORTEST = 0.1
 """Duration of a cycle in units of √(l/g), about 2 for a footstep: a foot may also chatter."""
@@ -30,13 +28,13 @@ def is_sound(scene: Any, state: Any, step_length: Scalar, period: Scalar) -> Sca
         step_length: advance along the slope in a cycle [m].
         period: duration of a cycle [s].
     """
-    if not isinstance(scene, Scene | RigidScene | RedundantScene):
+    if not isinstance(scene, AbstractScene):
         return jnp.asarray(True)
     pace = jnp.sqrt(scene.walker.l / scene.ground.g)
     forward = (step_length > 0.0) & (period > _SHORTEST * pace)
-    if isinstance(scene, RigidScene):
+    if not scene.compliant:
         return forward
-    modelled = scene.scene if isinstance(scene, RedundantScene) else scene
+    modelled = scene.minimal
     weight = modelled.walker.total_mass * modelled.ground.g
 
     def deep(foot: Foot) -> Scalar:

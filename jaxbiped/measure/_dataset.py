@@ -1,14 +1,17 @@
 """Dataset of a trajectory: labelled, for files and for other programs."""
 
+import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jaxbiped._parameter import parameter_infos
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import feet, touches
 from jaxbiped.dynamics._forces import foot_forces
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
@@ -16,25 +19,13 @@ from jaxbiped.solve._trajectory import Trajectory
 if TYPE_CHECKING:
     import xarray
 
-_STATE_UNITS = {
-    "hip_x": "m",
-    "hip_z": "m",
-    "theta_1": "rad",
-    "theta_2": "rad",
-    "hip_vx": "m/s",
-    "hip_vz": "m/s",
-    "omega_1": "rad/s",
-    "omega_2": "rad/s",
-    "bristle_1": "1",
-    "bristle_2": "1",
-}
-
 
 def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset":
     """States, foot forces, penetrations and energies along a trajectory, labelled, in SI units.
 
     Variables have the dimension `time` [s]; forces and penetrations also `leg` (1, 2). Attributes
-    hold how the motion ended and every parameter of the scene. Write it with `to_netcdf` (or
+    hold how the motion ended and every parameter of the scene, with their units in
+    `parameter_units` (JSON). Write it with `to_netcdf` (or
     `to_zarr`, with zarr installed).
 
     Args:
@@ -54,7 +45,7 @@ def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset"
     state = trajectory.state
     both, forces, held = feet(scene, state), foot_forces(scene, state), energies(scene, state)
     variables = {
-        name: ("time", np.asarray(value), {"units": _STATE_UNITS[name]})
+        name: ("time", np.asarray(value), {"units": STATE_QUANTITIES[name].unit or "1"})
         for name, value in minimal_state(scene, state)._asdict().items()
     }
     if isinstance(scene, RedundantScene):
@@ -87,6 +78,7 @@ def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset"
 def _parameters(scene: Any) -> dict[str, float | str]:
     """Every parameter of a scene, and the names of its laws, by dotted path."""
     found: dict[str, float | str] = {}
+    units: dict[str, str] = {}
     parts = vars(scene)
     if isinstance(scene, RedundantScene):
         parts = vars(scene.scene) | {"method": scene.method}
@@ -96,4 +88,6 @@ def _parameters(scene: Any) -> dict[str, float | str]:
         for name, value in vars(part).items():
             if value is not None:  # a parameter that the law does without
                 found[f"{part_name}.{name}"] = float(value)
-    return found
+        for name, info in parameter_infos(part).items():
+            units[f"{part_name}.{name}"] = info.quantity.unit
+    return found | {"parameter_units": json.dumps(units)}

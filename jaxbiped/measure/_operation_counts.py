@@ -1,12 +1,7 @@
 """Operation counts: how many operations a scene's vector field takes."""
 
-from typing import Any
-
 from jaxbiped.compiler import count_operations
-from jaxbiped.dynamics._bristle_state import state_type
-from jaxbiped.dynamics._minimal_motion import vector_field
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._rolling import rolling_field
+from jaxbiped.dynamics._formulation import field_of, state_type
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
@@ -24,8 +19,6 @@ def operation_counts(scene: Scene | RigidScene) -> dict[str, int]:
     Returns:
         How many times each operation is done, by its name.
     """
-    rigid = isinstance(scene, RigidScene)
-    kind: Any = RigidState if rigid else state_type(scene)  # type: ignore[arg-type]
-    field: Any = rolling_field if rigid else vector_field
+    kind, field = state_type(scene), field_of(scene)
     state = kind(*[0.0] * len(kind._fields))
     return count_operations(lambda y, args: field(0.0, y, args), state, scene)

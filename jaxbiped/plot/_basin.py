@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from jaxbiped._checks import ArgumentError, check_finite
+from jaxbiped._quantity import Quantity
 from jaxbiped.basins._arguments import check_known
 from jaxbiped.basins._fractions import fractions as fractions_of
 from jaxbiped.basins._label import Label, label_names
@@ -28,7 +29,7 @@ def basin(
     x: npt.ArrayLike,
     y: npt.ArrayLike,
     *,
-    names: tuple[str, str],
+    names: tuple[str | Quantity, str | Quantity],
     units: tuple[str, str] = ("", ""),
     period: npt.ArrayLike | None = None,
     gait: npt.ArrayLike | None = None,
@@ -43,7 +44,8 @@ def basin(
         x, y: coordinates along the two axes, increasing: centres, shape (nx,) and (ny,), or edges
             of the cells, one more.
         names, units: what the axes are, as ("angle of the stance leg", …) and ("rad", …). A
-            coordinate's or a parameter's own name, as "theta_swing", says it all by itself.
+            coordinate's or a parameter's own name, as "theta_swing", says it all by itself; so
+            does a `jaxbiped.laws.Quantity`, as those of `jaxbiped.starts.coordinate_quantities`.
         period: footsteps in the cycle of the gait that each start walks to, a shape that
             broadcasts to (ny, nx); only for codes. Unless given, it is not said.
         gait: which gait that is, from 0, to tell apart those of one period; only for codes.
@@ -157,7 +159,7 @@ def _hatch(ax: Axes, pending: np.ndarray, x_edges: np.ndarray, y_edges: np.ndarr
 def finish(
     ax: Axes,
     words: np.ndarray,
-    names: tuple[str, str],
+    names: tuple[str | Quantity, str | Quantity],
     units: tuple[str, str],
     mark: tuple[float, float] | None,
     title: str,

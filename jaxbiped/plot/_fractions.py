@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
+from jaxbiped._quantity import Quantity
 from jaxbiped.basins._fractions import Fraction, wilson_interval
 from jaxbiped.plot._label_colours import in_order, label_colour, label_marker
 from jaxbiped.plot._style import axes_or_new, dress, figure_of
@@ -19,7 +20,7 @@ def basin_fractions(
     values: npt.ArrayLike,
     fractions: Sequence[Mapping[str, Fraction]],
     *,
-    name: str,
+    name: str | Quantity,
     unit: str = "",
     kind: str = "lines",
     confidence: float = 0.95,
@@ -34,7 +35,8 @@ def basin_fractions(
     Args:
         values: the parameter, increasing, shape (n,).
         fractions: what `jaxbiped.basins.fractions` found at each value.
-        name, unit: of the parameter; its own name, as "K", says all by itself.
+        name, unit: of the parameter; its own name, as "K", says all by itself, as does a
+            `jaxbiped.laws.Quantity`.
         kind: "lines", or "stacked": areas that add up to one, without bands.
         confidence: of the bands.
         log: whether the parameter's axis is logarithmic.
@@ -103,7 +105,7 @@ def _check(
 
 
 def _frame(
-    ax: Axes, along: np.ndarray, name: str, unit: str, log: bool, bands: str, kind: str
+    ax: Axes, along: np.ndarray, name: str | Quantity, unit: str, log: bool, bands: str, kind: str
 ) -> None:
     title = "Fractions of the starts" + (f" ({bands})" if kind == "lines" else "")
     dress(ax, title, axis_label(name, unit), "fraction of the starts")

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._quantity import Quantity
 from jaxbiped.basins._refined_boundary import RefinedBoundary
 from jaxbiped.plot._basin import draw_labels, finish, names_of
 from jaxbiped.plot._style import axes_or_new, figure_of
@@ -20,7 +21,7 @@ _CORNERS = np.asarray([(0, 0), (1, 0), (1, 1), (0, 1)])
 def refined_basin(
     boundary: RefinedBoundary,
     *,
-    names: tuple[str, str],
+    names: tuple[str | Quantity, str | Quantity],
     units: tuple[str, str] = ("", ""),
     codes: Mapping[int, str] | None = None,
     cells: bool = True,

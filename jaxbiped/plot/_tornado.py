@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._quantity import Quantity
 from jaxbiped.gait._gait import Gait
 from jaxbiped.plot._multipliers import check_drawable
 from jaxbiped.plot._style import GROUND_COLOUR, LEG_COLOURS, new_figure
@@ -67,7 +68,7 @@ def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -
     values = {name: np.asarray(getattr(gait.elasticities, name)) for name in names}
     largest = max(float(np.max(np.abs(_finite(each)))) for each in values.values())
     for ax, name in zip(panels, names, strict=False):
-        _panel(ax, MEASURES[name], gait.parameters, values[name])
+        _panel(ax, MEASURES[name], gait.quantities or gait.parameters, values[name])
         _scale(ax, largest)
     spare = panels[len(names) :]
     for ax in spare:
@@ -81,7 +82,9 @@ def _finite(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values), values, 0.0)
 
 
-def _panel(ax: Axes, title: str, parameters: tuple[str, ...], values: np.ndarray) -> None:
+def _panel(
+    ax: Axes, title: str, parameters: tuple[str | Quantity, ...], values: np.ndarray
+) -> None:
     """One measure: bars from the largest down, unknown ones last."""
     order = np.argsort(-np.where(np.isfinite(values), np.abs(values), -1.0), kind="stable")
     values = values[order]

@@ -4,8 +4,8 @@ import math
 
 import equinox as eqx
 
-from jaxbiped._checks import check_below, check_not_negative
-from jaxbiped._types import Parameter, as_float
+from jaxbiped._parameter import check_parameters, parameter
+from jaxbiped._types import Parameter
 
 
 class Ground(eqx.Module):
@@ -19,9 +19,8 @@ class Ground(eqx.Module):
         ArgumentError: a slope of a right angle or more, or g below 0.
     """
 
-    slope: Parameter = eqx.field(converter=as_float)
-    g: Parameter = eqx.field(converter=as_float, default=9.8)
+    slope: Parameter = parameter("slope", r"$\alpha$", "rad", size_below=math.pi / 2)
+    g: Parameter = parameter("gravity", "$g$", "m/s^2", minimum=0.0, default=9.8)
 
     def __check_init__(self) -> None:
-        check_below("slope", self.slope, math.pi / 2, "radians")
-        check_not_negative("g", self.g, "m/s^2")
+        check_parameters(self)

@@ -2,8 +2,9 @@
 
 import equinox as eqx
 
-from jaxbiped._checks import check_finite, check_type
-from jaxbiped._types import Parameter, as_float
+from jaxbiped._checks import check_type
+from jaxbiped._parameter import check_parameters, parameter
+from jaxbiped._types import Parameter
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
 from jaxbiped.constraints._linkage import Linkage
 
@@ -22,12 +23,11 @@ class LinkageScene(eqx.Module):
 
     linkage: Linkage
     method: AbstractConstraintMethod
-    gravity: tuple[Parameter, Parameter] = eqx.field(
-        converter=lambda g: tuple(map(as_float, g)), default=(0.0, -9.8)
+    gravity: tuple[Parameter, Parameter] = parameter(
+        "gravity", "$g$", "m/s^2", pair=True, default=(0.0, -9.8)
     )
 
     def __check_init__(self) -> None:
         check_type("linkage", self.linkage, Linkage)
         check_type("method", self.method, AbstractConstraintMethod)
-        for value in self.gravity:
-            check_finite("gravity", value)
+        check_parameters(self)

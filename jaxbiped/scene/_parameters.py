@@ -7,17 +7,17 @@ from typing import Any, TypeVar
 import jax.tree_util as jtu
 
 from jaxbiped._checks import check_choice
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped._parameter import parameter_infos
+from jaxbiped._quantity import Quantity
+from jaxbiped.scene._abstract_scene import AbstractScene
 
-SomeScene = TypeVar("SomeScene", bound=Scene | RigidScene | RedundantScene)
+SomeScene = TypeVar("SomeScene", bound=AbstractScene)
 
 _FIRST = ("K", "c", "xi")
 """The parameters that sensitivities are first asked for."""
 
 
-def parameter_names(scene: Scene | RigidScene | RedundantScene) -> tuple[str, ...]:
+def parameter_names(scene: AbstractScene) -> tuple[str, ...]:
     """Names of a scene's parameters: K, c and xi first, the others in the scene's order.
 
     A name is the parameter's own, `K`; where two parts have one of that name, `normal.K`. Those of
@@ -31,18 +31,15 @@ def parameter_names(scene: Scene | RigidScene | RedundantScene) -> tuple[str, ..
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> jb.parameter_names(jb.seed_scene())[:5]
         ('K', 'c', 'xi', 'm', 'J')
     """
-    if isinstance(scene, RedundantScene):
-        return parameter_names(scene.scene)
     names = _names_by_leaf(scene)
     first = [name for name in _FIRST if name in names]
     return (*first, *(name for name in names if name not in first))
 
 
-def parameter_values(scene: Scene | RigidScene) -> dict[str, Any]:
+def parameter_values(scene: AbstractScene) -> dict[str, Any]:
     """A scene's parameters by name (see `parameter_names`), their own leaves.
 
     Args:
@@ -53,16 +50,42 @@ def parameter_values(scene: Scene | RigidScene) -> dict[str, Any]:
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> float(jb.parameter_values(jb.seed_scene())["K"])
         1000000.0
     """
-    by_leaf = dict(zip(_names_by_leaf(scene), jtu.tree_leaves(scene), strict=True))
+    by_leaf = dict(zip(_names_by_leaf(scene), jtu.tree_leaves(scene.minimal), strict=True))
     return {name: by_leaf[name] for name in parameter_names(scene)}
 
 
+def parameter_quantities(scene: AbstractScene) -> dict[str, Quantity]:
+    """What each of a scene's parameters is, with its unit, by name (see `parameter_names`).
+
+    Of a law's field that is no `jaxbiped.laws.parameter` no more is known than its name.
+
+    Args:
+        scene: of any kind.
+
+    Returns:
+        A `Quantity` (words, symbol and SI unit) by each name.
+    """
+    paths = [path for path, _ in jtu.tree_flatten_with_path(scene.minimal)[0]]
+    by_leaf = dict(zip(_names_by_leaf(scene), paths, strict=True))
+    return {name: _quantity(scene.minimal, name, by_leaf[name]) for name in parameter_names(scene)}
+
+
+def _quantity(part: Any, name: str, path: tuple[Any, ...]) -> Quantity:
+    for key in path:
+        if not dataclasses.is_dataclass(part):
+            break  # an entry of a user's own list, or of a dictionary
+        infos = parameter_infos(part)
+        if key.name in infos:
+            return infos[key.name].quantity
+        part = getattr(part, key.name)
+    return Quantity(name)
+
+
 def select_parameters(
-    scene: Scene | RigidScene, parameters: tuple[str, ...] | None
+    scene: AbstractScene, parameters: tuple[str, ...] | None
 ) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """Names of the parameters asked for, all for None, and the positions of their leaves.
 
@@ -92,26 +115,26 @@ def with_parameters(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> scene = jb.with_parameters(jb.seed_scene(), {"slope": 0.01, "K": 2e6})
         >>> float(scene.ground.slope), float(scene.normal.K)
         (0.01, 2000000.0)
     """
-    if isinstance(scene, RedundantScene):
-        modelled = with_parameters(scene.scene, values)
-        return dataclasses.replace(scene, scene=modelled)
-    names = _names_by_leaf(scene)
-    paths = [path for path, _ in jtu.tree_flatten_with_path(scene)[0]]
+    names, changed = _names_by_leaf(scene), scene.minimal
+    paths = [path for path, _ in jtu.tree_flatten_with_path(changed)[0]]
     for name, value in values.items():
         check_choice("parameter", name, names)
-        part, field = (key.name for key in paths[names.index(name)])
-        changed = dataclasses.replace(getattr(scene, part), **{field: value})
-        scene = dataclasses.replace(scene, **{part: changed})
-    return scene
+        changed = _replace(changed, paths[names.index(name)], value)
+    return scene.with_minimal(changed)
 
 
-def _names_by_leaf(scene: Scene | RigidScene) -> list[str]:
-    paths = [path for path, _ in jtu.tree_flatten_with_path(scene)[0]]
+def _replace(part: Any, path: tuple[Any, ...], value: Any) -> Any:
+    name, rest = path[0].name, path[1:]
+    new = _replace(getattr(part, name), rest, value) if rest else value
+    return dataclasses.replace(part, **{name: new})
+
+
+def _names_by_leaf(scene: AbstractScene) -> list[str]:
+    paths = [path for path, _ in jtu.tree_flatten_with_path(scene.minimal)[0]]
     own = [_format(path[-1:]) for path in paths]
     return [
         name if own.count(name) == 1 else _format(path)

@@ -1,6 +1,7 @@
 """A scene whose legs have coordinates of their own."""
 
-from typing import Any
+import dataclasses
+from typing import Any, ClassVar
 
 import equinox as eqx
 
@@ -9,6 +10,7 @@ from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
 from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.constraints._index1 import Index1
 from jaxbiped.constraints._linkage import ORIENTATIONS, Linkage
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._clearance import AbstractClearance
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._scene import Scene
@@ -17,7 +19,7 @@ from jaxbiped.scene._walker_linkage import walker_linkage
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 
-class RedundantScene(eqx.Module):
+class RedundantScene(AbstractScene):
     """A walker whose legs are bodies of their own, held together at the hip by a method.
 
     What is modelled is the `Scene`; how it is written down differs. Goes wherever a `Scene` does;
@@ -34,6 +36,8 @@ class RedundantScene(eqx.Module):
         ArgumentError: a part of the wrong type, or an unknown name.
     """
 
+    compliant: ClassVar[bool] = True
+    redundant: ClassVar[bool] = True
     scene: Scene
     method: AbstractConstraintMethod = eqx.field(converter=method_named, default_factory=Index1)
     orientation: str = eqx.field(static=True, default="angle")
@@ -41,6 +45,17 @@ class RedundantScene(eqx.Module):
     def __check_init__(self) -> None:
         check_type("scene", self.scene, Scene)
         check_choice("orientation", self.orientation, ORIENTATIONS)
+
+    @property
+    def minimal(self) -> Scene:
+        return self.scene
+
+    def with_minimal(self, minimal: Scene) -> "RedundantScene":
+        return dataclasses.replace(self, scene=minimal)
+
+    @property
+    def has_bristles(self) -> bool:
+        return self.scene.has_bristles
 
     @property
     def walker(self) -> Walker:

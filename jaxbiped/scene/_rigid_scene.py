@@ -1,13 +1,14 @@
 """A scene without contact laws: the rigid limit."""
 
-import equinox as eqx
+from typing import ClassVar
 
 from jaxbiped._checks import check_type
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._walker import Walker
 
 
-class RigidScene(eqx.Module):
+class RigidScene(AbstractScene):
     """A walker whose feet are rigid: they roll without slip and strike without rebound.
 
     Single support is a smooth motion of two legs; a footstep ends by a plastic impact at which the
@@ -23,9 +24,22 @@ class RigidScene(eqx.Module):
         ArgumentError: a part of the wrong type.
     """
 
+    compliant: ClassVar[bool] = False
+    redundant: ClassVar[bool] = False
     walker: Walker
     ground: Ground
 
     def __check_init__(self) -> None:
         check_type("walker", self.walker, Walker)
         check_type("ground", self.ground, Ground)
+
+    @property
+    def minimal(self) -> "RigidScene":
+        return self
+
+    def with_minimal(self, minimal: "RigidScene") -> "RigidScene":
+        return minimal
+
+    @property
+    def has_bristles(self) -> bool:
+        return False

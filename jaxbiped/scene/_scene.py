@@ -1,8 +1,9 @@
 """A scene: everything that is modelled."""
 
-import equinox as eqx
+from typing import ClassVar
 
 from jaxbiped._checks import check_type
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._clearance import AbstractClearance, StanceRotation
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._walker import Walker
@@ -10,7 +11,7 @@ from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, AbstractNorm
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 
-class Scene(eqx.Module):
+class Scene(AbstractScene):
     """A walker on a slope, with its laws of contact.
 
     A frozen pytree whose numeric leaves are the parameters: differentiate or `vmap` with respect
@@ -28,6 +29,8 @@ class Scene(eqx.Module):
         ArgumentError: a part of the wrong type.
     """
 
+    compliant: ClassVar[bool] = True
+    redundant: ClassVar[bool] = False
     walker: Walker
     ground: Ground
     normal: AbstractNormalLaw
@@ -40,3 +43,14 @@ class Scene(eqx.Module):
         check_type("normal", self.normal, AbstractNormalLaw)
         check_type("friction", self.friction, AbstractFrictionLaw, AbstractBristleLaw)
         check_type("clearance", self.clearance, AbstractClearance)
+
+    @property
+    def minimal(self) -> "Scene":
+        return self
+
+    def with_minimal(self, minimal: "Scene") -> "Scene":
+        return minimal
+
+    @property
+    def has_bristles(self) -> bool:
+        return isinstance(self.friction, AbstractBristleLaw)

@@ -56,7 +56,6 @@ def seed_scene(
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> float(jb.seed_scene(slope=0.03).ground.slope)
         0.03
     """

@@ -5,11 +5,10 @@ import equinox as eqx
 from jaxbiped._checks import (
     ArgumentError,
     check_at_least,
-    check_not_negative,
-    check_positive,
     holds_somewhere,
 )
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import check_parameters, parameter
+from jaxbiped._types import Parameter, Scalar
 
 
 class Walker(eqx.Module):
@@ -30,20 +29,15 @@ class Walker(eqx.Module):
             that are mass points) without d and hip_mass above 0.
     """
 
-    m: Parameter = eqx.field(converter=as_float)
-    J: Parameter = eqx.field(converter=as_float)
-    l: Parameter = eqx.field(converter=as_float)
-    d: Parameter = eqx.field(converter=as_float)
-    r: Parameter = eqx.field(converter=as_float)
-    hip_mass: Parameter = eqx.field(converter=as_float, default=0.0)
+    m: Parameter = parameter("leg mass", "$m$", "kg", positive=True)
+    J: Parameter = parameter("leg inertia", "$J$", "kg m^2", minimum=0.0)
+    l: Parameter = parameter("leg length", "$l$", "m", positive=True)
+    d: Parameter = parameter("hip to mass centre", "$d$", "m", minimum=0.0)
+    r: Parameter = parameter("foot radius", "$r$", "m", minimum=0.0)
+    hip_mass: Parameter = parameter("hip mass", "$m_S$", "kg", minimum=0.0, default=0.0)
 
     def __check_init__(self) -> None:
-        check_positive("m", self.m, "kg")
-        check_not_negative("J", self.J, "kg m^2")
-        check_positive("l", self.l, "m")
-        check_not_negative("d", self.d, "m")
-        check_not_negative("r", self.r, "m")
-        check_not_negative("hip_mass", self.hip_mass, "kg")
+        check_parameters(self)
         check_at_least("l", self.l, "r", self.r)
         if holds_somewhere(self.J == 0.0):
             for name in ("d", "hip_mass"):

@@ -9,8 +9,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import Array
 
-from jaxbiped.dynamics._minimal_motion import vector_field
-from jaxbiped.dynamics._redundant_motion import redundant_field
+from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import Ending, ending_code, ending_events
@@ -36,13 +35,11 @@ def by_xla(run: "Simulation") -> Trajectory:
         controller = Extremes.around(controller, run.extremes)
     events = ending_events(run.watch)
     zero = jnp.zeros_like(run.duration)
-    field: Any = vector_field
     solver: Any = run.solver
     if isinstance(run.scene, RedundantScene):
-        field = redundant_field
         solver = with_projection(run.scene, solver, run.adjoint)
     solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(field),
+        diffrax.ODETerm(field_of(run.scene)),
         solver,
         t0=zero,
         t1=run.duration,

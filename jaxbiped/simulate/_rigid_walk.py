@@ -104,7 +104,6 @@ def rigid_walk(
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> scene = jb.ladder()["rigid"]
         >>> start = jb.dynamics.rigid_state(jb.seed_state())
         >>> walk = jb.rigid_walk(scene, start, steps=2, engine="lanes")

@@ -241,7 +241,7 @@ class Simulation(eqx.Module):
             adjoint=adjoint,
             leaves=(scene, state, time),
             dt=dt,
-            redundant=isinstance(scene, RedundantScene),
+            redundant=scene.redundant,
             times=save,
             section=section,
             extremes=extremes,

@@ -63,10 +63,8 @@ def check_single_scene(scene: Scene | RigidScene | RedundantScene) -> None:
 
     Laws of the user's own may hold arrays.
     """
-    if isinstance(scene, RedundantScene):
-        scene = scene.scene
     own = (*NORMAL_LAWS.values(), *FRICTION_LAWS.values(), Walker, Ground)
-    for name, part in vars(scene).items():
+    for name, part in vars(scene.minimal).items():
         if type(part) in own:
             check_unbatched(f"scene.{name}", part, "one scene")
 

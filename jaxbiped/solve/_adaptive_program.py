@@ -14,7 +14,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Program
-from jaxbiped.dynamics._bristle_state import state_type
+from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene

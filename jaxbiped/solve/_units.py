@@ -13,9 +13,8 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._bristle_state import state_type
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.dynamics._formulation import state_type
+from jaxbiped.scene._abstract_scene import AbstractScene, is_compliant
 
 _LENGTH = 0.40
 """Leg length of the seed paper's walker [m]."""
@@ -44,7 +43,7 @@ def units_of(args: Any, state: PyTree) -> Units:
 
     Ones where `args` is no scene of a compliant walker. They have no derivatives.
     """
-    if not isinstance(args, Scene | RedundantScene):
+    if not is_compliant(args):
         return Units(jtu.tree_map(jnp.ones_like, state), np.ones(()))
     length, time = _length_and_time(args)
     one = length / length
@@ -64,14 +63,14 @@ def si_units(units: Units) -> Units:
 
 def recurring_inverse_units(args: Any, count: int) -> Scalar:
     """`Units.inverse` of a minimal state without hip_x, shape (count,)."""
-    if not isinstance(args, Scene | RedundantScene):
+    if not is_compliant(args):
         return jnp.ones(count)
-    kind: Any = state_type(args.scene if isinstance(args, RedundantScene) else args)
+    kind = state_type(args.minimal)
     inverse = units_of(args, kind(*[0.0] * len(kind._fields))).inverse[1:]
     return jnp.stack(inverse) if len(inverse) == count else jnp.ones(count)
 
 
-def _length_and_time(args: Scene | RedundantScene) -> tuple[Scalar, Scalar]:
+def _length_and_time(args: AbstractScene) -> tuple[Scalar, Scalar]:
     walker, ground = args.walker, args.ground
     known = not any(isinstance(leaf, jax.core.Tracer) for leaf in (walker.l, ground.g))
     xp: Any = np if known else jnp  # where numbers are known nothing is compiled for them

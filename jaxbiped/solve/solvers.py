@@ -54,7 +54,6 @@ def solver_named(solver: str | diffrax.AbstractSolver) -> diffrax.AbstractSolver
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> jb.solvers.solver_named("rodas4")
         Rodas4()
     """

@@ -1,13 +1,13 @@
 """Array layout of a sweep's results, and how it is cut into chunks."""
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from jaxbiped.basins._label import Label
 from jaxbiped.sweep._labelling import Labelled
-from jaxbiped.sweep.starts._coordinates import UNITS
 from jaxbiped.sweep.starts._starts import AbstractStarts, Batch
 
 if TYPE_CHECKING:
@@ -34,21 +34,23 @@ class Layout(NamedTuple):
         starts: the starts.
         axis: along which it is cut: a chunk has one place of the axes before, all of those after.
         rows: places of that axis in a chunk.
+        units: SI units of the starts' coordinates, as far as they are known.
     """
 
     starts: AbstractStarts
     axis: int
     rows: int
+    units: Mapping[str, str]
 
     @staticmethod
-    def of(starts: AbstractStarts, chunk: int) -> "Layout":
+    def of(starts: AbstractStarts, chunk: int, units: Mapping[str, str] | None = None) -> "Layout":
         """With at most `chunk` starts in a chunk."""
         shape = starts.shape
         axis, inner = len(shape) - 1, 1
         while axis > 0 and inner * shape[axis] <= chunk:
             inner *= shape[axis]
             axis -= 1
-        return Layout(starts, axis, max(1, min(chunk // inner, shape[axis])))
+        return Layout(starts, axis, max(1, min(chunk // inner, shape[axis])), units or {})
 
     @property
     def chunks(self) -> int:
@@ -113,7 +115,7 @@ def empty_dataset(layout: Layout) -> "xarray.Dataset":
     dims = tuple(starts.axes)
     kinds = dict(FIELDS)
     for name in starts.own_columns:
-        kinds[f"start_{name}"] = ("f8", np.nan, UNITS.get(name, ""), f"the start's {name}")
+        kinds[f"start_{name}"] = ("f8", np.nan, layout.units.get(name, ""), f"the start's {name}")
     variables = {}
     for name, (dtype, nothing, unit, what) in kinds.items():
         attributes: dict[str, Any] = {"long_name": what}
@@ -125,7 +127,7 @@ def empty_dataset(layout: Layout) -> "xarray.Dataset":
         values = np.broadcast_to(np.asarray(nothing, dtype=dtype), starts.shape)
         variables[name] = (dims, values, attributes)
     coordinates = {
-        name: (name, values, {"units": UNITS.get(name, "")})
+        name: (name, values, {"units": layout.units.get(name, "")})
         for name, values in starts.axes.items()
         if values is not None
     }

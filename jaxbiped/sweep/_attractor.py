@@ -107,6 +107,6 @@ def component_scales(scene: Scene | RigidScene, state: Any) -> np.ndarray:
     speed, rate = np.sqrt(gravity * length), np.sqrt(gravity / length)
     sizes = {"hip_vx": speed, "hip_vz": speed, "omega_1": rate, "omega_2": rate}
     sizes |= {"theta_1": 1.0, "theta_2": 1.0, "bristle_1": 1.0, "bristle_2": 1.0}
-    if isinstance(scene, Scene):
+    if scene.compliant:
         sizes["hip_z"] = abs(float(feet(scene, state).foot_2.penetration))
     return np.array([sizes[name] for name in state._fields[1:]])

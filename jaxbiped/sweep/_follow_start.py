@@ -72,7 +72,7 @@ def follow_starts(
         most_attempts=same(effort.most_attempts),
     )
     solve: Any = None
-    if isinstance(scene, RigidScene):
+    if not scene.compliant:
         solve = RigidWalk(**common)
     else:
         last = same(just_before_end(jnp.asarray(_LONGEST)))
@@ -82,9 +82,7 @@ def follow_starts(
     waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
     with _MAKING:
-        course = _labelling_loop(
-            isinstance(scene, RigidScene), effort.solver, periods, effort.engine
-        )
+        course = _labelling_loop(scene.compliant, effort.solver, periods, effort.engine)
     if not count:
         return _empty_outcome(len(states) - 1)
     run = label_by_lanes if effort.engine == "lanes" else label_by_xla
@@ -93,11 +91,11 @@ def follow_starts(
 
 @functools.cache  # the same object each time, so that nothing is compiled again
 def _labelling_loop(
-    rigid: bool, solver: AbstractRosenbrock, periods: tuple[int, ...], engine: str
+    compliant: bool, solver: AbstractRosenbrock, periods: tuple[int, ...], engine: str
 ) -> AbstractLabellingLoop:
-    if rigid:
-        return RigidLabelling(periods)
-    return CompliantLabelling(solver, periods, fenced=engine == "xla")
+    if compliant:
+        return CompliantLabelling(solver, periods, fenced=engine == "xla")
+    return RigidLabelling(periods)
 
 
 def _empty_outcome(size: int) -> Outcome:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -33,7 +34,6 @@ _MEASURES = {
     "peak_normal": "N",
     "spectral_radius": "",
 }
-_UNITS = {"hip_z": "m", "theta": "rad", "hip_v": "m/s", "omega": "rad/s"}
 _PAUSE = 2.0
 """Seconds between two writes of a store."""
 
@@ -90,6 +90,7 @@ class GaitGrid:
 def open_gait_grid(
     first: Gait,
     values: Mapping[str, np.ndarray],
+    units: Mapping[str, str],
     settings: dict[str, Any],
     writer: Mapping[str, str],
     path: Path | None,
@@ -101,13 +102,14 @@ def open_gait_grid(
     Args:
         first: any gait of the sweep, for the shapes.
         values: of the swept parameters.
+        units: SI units of these.
         settings: all that the results depend on; those of a store that is there must be equal.
         writer: what writes.
         path: of the store; None for one in memory.
         any_version: whether a store may have been written by another version.
     """
     state = type(first.measures.state)
-    dataset = _empty(first, values).assign_attrs({**writer, SETTINGS: json.dumps(settings)})
+    dataset = _empty(first, values, units).assign_attrs({**writer, SETTINGS: json.dumps(settings)})
     if path is None:
         return GaitGrid(dataset, state, None)
     path = path.absolute()
@@ -139,7 +141,9 @@ def _note(path: Path, attributes: dict[str, Any]) -> None:
     consolidate(path)
 
 
-def _empty(gait: Gait, values: Mapping[str, np.ndarray]) -> "xarray.Dataset":
+def _empty(
+    gait: Gait, values: Mapping[str, np.ndarray], units: Mapping[str, str]
+) -> "xarray.Dataset":
     import xarray
 
     dims, shape = tuple(values), tuple(map(len, values.values()))
@@ -148,7 +152,10 @@ def _empty(gait: Gait, values: Mapping[str, np.ndarray]) -> "xarray.Dataset":
         whole = value.dtype.kind in "ib"
         empty = np.full((*shape, *value.shape), -1 if whole else np.nan, value.dtype)
         variables[name] = ((*dims, *own), empty, attributes)
-    coordinates: dict[str, Any] = {**values, "parameter": np.array(gait.parameters, object)}
+    coordinates: dict[str, Any] = {
+        name: (name, column, {"units": units[name]}) for name, column in values.items()
+    }
+    coordinates["parameter"] = np.array(gait.parameters, object)
     return xarray.Dataset(variables, coordinates)
 
 
@@ -178,7 +185,7 @@ def _variables(gait: Gait) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[
         add(f"sensitivity_error_{name}", error, per, "parameter")
         add(f"elasticity_{name}", getattr(gait.elasticities, name), "", "parameter")
     for name in gait.measures.state._fields[1:]:
-        add(f"state_{name}", getattr(gait.measures.state, name), _UNITS.get(name[:5], ""))
+        add(f"state_{name}", getattr(gait.measures.state, name), STATE_QUANTITIES[name].unit)
     add("multiplier_real", np.real(gait.multipliers), "", "multiplier")
     add("multiplier_imag", np.imag(gait.multipliers), "", "multiplier")
     add("unit_multiplier_error", gait.unit_multiplier_error, "")

@@ -14,7 +14,12 @@ from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._parameters import parameter_names, parameter_values, with_parameters
+from jaxbiped.scene._parameters import (
+    parameter_names,
+    parameter_quantities,
+    parameter_values,
+    with_parameters,
+)
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -75,16 +80,15 @@ def gait_sweep(
         accuracy=accuracy,
         radius_sensitivities=radius_sensitivities,
     )
-    modelled = scene.scene if isinstance(scene, RedundantScene) else scene
     settings = {
-        "scene": {k: float(v) for k, v in parameter_values(modelled).items()},
+        "scene": {k: float(v) for k, v in parameter_values(scene).items()},
         "models": identity(scene),
         "over": {name: column.tolist() for name, column in values.items()},
         "options": {**options, "parameters": None if parameters is None else list(parameters)},
     }
     shape = tuple(map(len, values.values()))
     known: dict[tuple[int, ...], Any] = {}
-    order = list(_outwards(shape, _nearest(modelled, values)))
+    order = list(_outwards(shape, _nearest(scene, values)))
 
     def search(place: tuple[int, ...], *, again: bool) -> Gait | None:
         """The gait there; none again where no neighbour has one."""
@@ -98,7 +102,10 @@ def gait_sweep(
     first = search(order[0], again=False)
     assert first is not None
     path = None if store is None else Path(store)
-    grid = open_gait_grid(first, values, settings, provenance(scene), path, any_version=any_version)
+    units = {name: parameter_quantities(scene)[name].unit for name in values}
+    grid = open_gait_grid(
+        first, values, units, settings, provenance(scene), path, any_version=any_version
+    )
     with tqdm(total=math.prod(shape), unit="gaits", disable=not progress) as bar:
         for again in (False, True):
             for place in order:

@@ -17,8 +17,8 @@ from jaxbiped._checks import (
 from jaxbiped._types import as_float
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label import Label, label_names
-from jaxbiped.dynamics._bristle_state import BristleState, state_type
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._bristle_state import BristleState
+from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._parameters import parameter_values, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -151,7 +151,7 @@ class Labelling(eqx.Module):
         # Both engines give the same labels; the gap follows from the tolerance.
         del effort["engine"], effort["gap"]
         return {
-            "model": "rigid" if isinstance(self.scene, RigidScene) else "compliant",
+            "model": "compliant" if self.scene.compliant else "rigid",
             "scene": scene,
             "effort": effort,
             "models": {"scene": identity(self.scene), "solver": identity(self.effort.solver)},
@@ -182,7 +182,7 @@ def effort_of(
             "scene has parameters that are arrays: give one scene, and name what differs from "
             "start to start among the parameters."
         )
-    names = RIGID_ACCURACIES if isinstance(scene, RigidScene) else ACCURACIES
+    names = ACCURACIES if scene.compliant else RIGID_ACCURACIES
     check_choice("accuracy", accuracy, names)
     tolerance = resolve_slip_speed(names[accuracy], scene) if rtol is None else rtol
     check_positive("rtol", tolerance)
@@ -202,7 +202,7 @@ def effort_of(
 
 
 def _check_states(scene: Scene | RigidScene, states: Any) -> Any:
-    kind: Any = RigidState if isinstance(scene, RigidScene) else state_type(scene)
+    kind = state_type(scene)
     if kind is BristleState and isinstance(states, State):
         straight: Any = np.zeros_like(np.asarray(states.hip_x))
         states = BristleState(*states, *[straight] * 2)

@@ -38,7 +38,7 @@ def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort)
     offsets = (_SHELLS[:, None, None] * directions).reshape(-1, size - 1) @ back.T
     states = _displace(attractor.state, offsets)
     count = len(offsets)
-    strikes = attractor.period + (0 if isinstance(scene, RigidScene) else 1)
+    strikes = attractor.period + (1 if scene.compliant else 0)
     outcome = follow_starts(
         broadcast_leaves(scene, count),
         states,

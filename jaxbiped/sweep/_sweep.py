@@ -20,6 +20,7 @@ from jaxbiped.sweep._provenance import provenance
 from jaxbiped.sweep._same_store import GAITS
 from jaxbiped.sweep._workers import compute_chunks
 from jaxbiped.sweep._zarr_store import Store, check_store
+from jaxbiped.sweep.starts._coordinates import coordinate_quantities
 from jaxbiped.sweep.starts._starts import AbstractStarts
 
 if TYPE_CHECKING:
@@ -82,7 +83,9 @@ def sweep(
     if store is not None:
         check_store(Path(store))
     began = time.perf_counter()
-    layout = Layout.of(starts, int(chunk))
+    quantities = coordinate_quantities(labelling.scene)
+    units = {name: quantity.unit for name, quantity in quantities.items()}
+    layout = Layout.of(starts, int(chunk), units)
     own = {"starts": starts.described(), "chunk_shape": list(layout.chunk_shape)}
     writer = provenance(labelling.scene, labelling.effort.solver, starts)
     if store is not None:

@@ -18,6 +18,7 @@ from jaxbiped.dynamics._rolling import rolling, rolling_field
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.dynamics._switches import Switch, switches
+from jaxbiped.scene._abstract_scene import is_rigid
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -63,7 +64,7 @@ class AbstractSystem(eqx.Module):
 
 def system_of(scene: Scene | RigidScene | RedundantScene) -> AbstractSystem:
     """The system that a scene describes, in minimal coordinates."""
-    return Rolling() if isinstance(scene, RigidScene) else Walking()
+    return Walking() if scene.compliant else Rolling()
 
 
 class Walking(AbstractSystem):
@@ -132,7 +133,7 @@ def section_of(scene: Any, section: AbstractSection | None) -> AbstractSection:
     Raises:
         ArgumentError: a section other than heel strike for a rigid walker.
     """
-    if not isinstance(scene, RigidScene):
+    if not is_rigid(scene):
         return MidStance() if section is None else section
     if section is not None and not isinstance(section, HeelStrike):
         raise ArgumentError(

@@ -37,7 +37,7 @@ def test_an_upright_line_has_dimension_one_exactly():
 )
 def test_smooth_boundaries_have_one_dimension_less(label_of, shape, levels, dimension):
     d = len(shape)
-    refined = jb.basins.refined_boundary(label_of, (-1.0,) * d, (1.0,) * d, shape, levels=levels)
+    refined = jb.basins.refine_boundary(label_of, (-1.0,) * d, (1.0,) * d, shape, levels=levels)
     found = jb.basins.boundary_dimension(refined, skip=1)
     assert found.estimate == pytest.approx(dimension, abs=0.05)
     assert found.counts[0] == len(refined.cells[-1])
@@ -56,7 +56,7 @@ def test_sierpinskis_triangle():
 
 
 def test_newtons_basins_have_the_published_dimension():
-    refined = jb.basins.refined_boundary(newton, *NEWTON_BOX, (8, 8), levels=7)
+    refined = jb.basins.refine_boundary(newton, *NEWTON_BOX, (8, 8), levels=7)
     assert jb.basins.boundary_dimension(refined, skip=1).estimate == pytest.approx(1.42, abs=0.03)
     grid = on_lattice(newton, *NEWTON_BOX, (513, 513))
     assert jb.basins.boundary_dimension(grid, skip=1).estimate == pytest.approx(1.42, abs=0.04)
@@ -99,6 +99,6 @@ def test_bad_arguments_are_named(labels, options, words):
 
 
 def test_levels_set_the_sizes_of_a_refined_boundary():
-    refined = jb.basins.refined_boundary(ball((0.0, 0.1), 0.5), *SQUARE, (4, 4), levels=3)
+    refined = jb.basins.refine_boundary(ball((0.0, 0.1), 0.5), *SQUARE, (4, 4), levels=3)
     with pytest.raises(jb.ArgumentError, match="sides"):
         jb.basins.boundary_dimension(refined, sides=(1, 2, 4))

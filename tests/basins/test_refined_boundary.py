@@ -42,7 +42,7 @@ def _mixed(labels):
     ],
 )
 def test_filled_labels_and_cells_equal_the_full_grid(label_of, box, shape, levels):
-    refined = jb.basins.refined_boundary(label_of, *box, shape, levels=levels)
+    refined = jb.basins.refine_boundary(label_of, *box, shape, levels=levels)
     full = _full(label_of, refined)
     assert refined.full == full.size
     assert refined.asked == len(refined.positions) < full.size
@@ -59,7 +59,7 @@ def test_filled_labels_and_cells_equal_the_full_grid(label_of, box, shape, level
 @given(st.floats(0.0, 6.28, allow_subnormal=False), st.floats(-0.3, 0.3, allow_subnormal=False))
 def test_any_line_through_the_middle_equals_the_full_grid(angle, offset):
     label_of = half_space((np.cos(angle), np.sin(angle)), offset)
-    refined = jb.basins.refined_boundary(label_of, *SQUARE, (3, 3), levels=4)
+    refined = jb.basins.refine_boundary(label_of, *SQUARE, (3, 3), levels=4)
     full = _full(label_of, refined)
     np.testing.assert_array_equal(refined.on_grid(), full)
     np.testing.assert_array_equal(refined.cells[-1], _mixed(full))
@@ -68,7 +68,7 @@ def test_any_line_through_the_middle_equals_the_full_grid(angle, offset):
 def test_asks_as_many_labels_as_a_line_is_long():
     label_of = half_space((1.0, 0.37), 0.123)
     asked = [
-        jb.basins.refined_boundary(label_of, *SQUARE, (4, 4), levels=k).asked for k in range(4, 9)
+        jb.basins.refine_boundary(label_of, *SQUARE, (4, 4), levels=k).asked for k in range(4, 9)
     ]
     growth = np.diff(np.diff(asked))
     np.testing.assert_allclose(growth[1:] / growth[:-1], 2.0, rtol=0.1)
@@ -80,8 +80,8 @@ def test_asks_as_many_labels_as_a_line_is_long():
 def test_no_point_is_asked_twice_and_batches_change_nothing(follow):
     options = {"levels": 5, "follow": follow}
     whole, split = Recorded(newton), Recorded(newton)
-    one = jb.basins.refined_boundary(whole, *NEWTON_BOX, (8, 8), **options)
-    two = jb.basins.refined_boundary(split, *NEWTON_BOX, (8, 8), batch=7, **options)
+    one = jb.basins.refine_boundary(whole, *NEWTON_BOX, (8, 8), **options)
+    two = jb.basins.refine_boundary(split, *NEWTON_BOX, (8, 8), batch=7, **options)
     assert len(np.unique(whole.points, axis=0)) == len(whole.points) == one.asked
     assert max(map(len, split.calls)) == 7
     assert one.calls == len(whole.calls) < two.calls == len(split.calls)
@@ -94,7 +94,7 @@ def test_no_point_is_asked_twice_and_batches_change_nothing(follow):
 
 def test_following_finds_a_bay_between_coarse_points():
     with_it, without = (
-        jb.basins.refined_boundary(_hook, *SQUARE, (6, 6), levels=5, follow=follow)
+        jb.basins.refine_boundary(_hook, *SQUARE, (6, 6), levels=5, follow=follow)
         for follow in (True, False)
     )
     full = _full(_hook, with_it)
@@ -105,16 +105,16 @@ def test_following_finds_a_bay_between_coarse_points():
 
 def test_what_hides_in_a_coarse_cell_is_missed():
     label_of = ball((0.25, 0.25), 0.2)
-    refined = jb.basins.refined_boundary(label_of, *SQUARE, (4, 4), levels=6)
+    refined = jb.basins.refine_boundary(label_of, *SQUARE, (4, 4), levels=6)
     assert refined.asked == 25
     assert not refined.on_grid().any()
     assert all(len(cells) == 0 for cells in refined.cells)
-    finer = jb.basins.refined_boundary(label_of, *SQUARE, (8, 8), levels=5)
+    finer = jb.basins.refine_boundary(label_of, *SQUARE, (8, 8), levels=5)
     assert (finer.on_grid() == _full(label_of, finer)).all()
 
 
 def test_a_fractal_boundary_is_found_nearly_whole():
-    refined = jb.basins.refined_boundary(newton, *NEWTON_BOX, (8, 8), levels=5)
+    refined = jb.basins.refine_boundary(newton, *NEWTON_BOX, (8, 8), levels=5)
     everywhere = {tuple(cell) for cell in _mixed(_full(newton, refined))}
     found = {tuple(cell) for cell in refined.cells[-1]}
     assert found <= everywhere
@@ -122,7 +122,7 @@ def test_a_fractal_boundary_is_found_nearly_whole():
 
 
 def test_cells_have_places_and_sizes():
-    refined = jb.basins.refined_boundary(half_space((1.0, 0.0), 0.1), *UNEVEN, (2, 2), levels=1)
+    refined = jb.basins.refine_boundary(half_space((1.0, 0.0), 0.1), *UNEVEN, (2, 2), levels=1)
     np.testing.assert_array_equal(refined.cells[0], [[0, 0], [0, 1]])
     np.testing.assert_array_equal(refined.cell_size(0), [2.0, 0.25])
     np.testing.assert_array_equal(refined.cell_size(1), [1.0, 0.125])
@@ -131,12 +131,12 @@ def test_cells_have_places_and_sizes():
         np.testing.assert_array_equal(
             refined.points[:, k], refined.axis(k)[refined.positions[:, k]]
         )
-    coarse = jb.basins.refined_boundary(half_space((1.0, 0.0), 0.1), *UNEVEN, (2, 2), levels=0)
+    coarse = jb.basins.refine_boundary(half_space((1.0, 0.0), 0.1), *UNEVEN, (2, 2), levels=0)
     assert (coarse.asked, coarse.full, coarse.calls) == (9, 9, 1)
 
 
 def test_a_grid_too_large_to_fill_is_refused():
-    refined = jb.basins.refined_boundary(half_space((1.0, 0.3), 0.1), *SQUARE, (2, 2), levels=8)
+    refined = jb.basins.refine_boundary(half_space((1.0, 0.3), 0.1), *SQUARE, (2, 2), levels=8)
     with pytest.raises(jb.ArgumentError, match=r"263169 points.*largest = 1000"):
         refined.on_grid(largest=1000)
 
@@ -161,5 +161,5 @@ def test_a_grid_too_large_to_fill_is_refused():
 def test_bad_arguments_are_named(change, words):
     right = {"lower": (0.0, 0.0), "upper": (1.0, 1.0), "shape": (4, 4), "levels": 2}
     with pytest.raises(jb.ArgumentError) as caught:
-        jb.basins.refined_boundary(**({"label_of": ball((0, 0), 1.0)} | right | change))
+        jb.basins.refine_boundary(**({"label_of": ball((0, 0), 1.0)} | right | change))
     assert all(word in str(caught.value) for word in words)

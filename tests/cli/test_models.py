@@ -1,6 +1,8 @@
 """`jaxbiped models`, and the flags that choose a model."""
 
+import inspect
 import json
+import re
 import subprocess
 import sys
 
@@ -31,6 +33,15 @@ def test_lists_every_law_with_units_and_cost(capsys):
     assert by_name["rigid"]["states"] == 5
     assert by_name["bristles"]["states"] == 10
     assert by_name["rigid"]["operations"] < 0.5 * by_name["stribeck"]["operations"]
+
+
+def test_help_tells_the_units_of_the_seeds_parameters():
+    """The help is the docstring behind each option, and a unit stands at its end."""
+    source = inspect.getsource(SceneOptions)
+    for name, quantity in jb.parameter_quantities(jb.seed_scene()).items():
+        said = re.search(rf'^    {name}: float = .*\n    """([^"]*)"""', source, re.MULTILINE)[1]
+        assert said.endswith(f" [{quantity.unit}]." if quantity.unit else ".")
+        assert ("[" in said) == bool(quantity.unit)
 
 
 def test_prints_a_table(capsys):

@@ -1,6 +1,7 @@
 """A trajectory as a labelled dataset."""
 
 import dataclasses
+import json
 
 import numpy as np
 import pytest
@@ -17,6 +18,8 @@ def test_round_trip_through_a_file(seed_walk, tmp_path):
         np.testing.assert_array_equal(read.theta_1, walk.state.theta_1)
         assert read.attrs["ending"] == "walking"
         assert read.attrs["normal.K"] == 1e6
+        assert json.loads(read.attrs["parameter_units"])["normal.K"] == "N/m^n"
+        assert read.theta_1.units == "rad"
         assert read.normal_force.dims == ("leg", "time")
         assert read.normal_force.units == "N"
         expected = jb.dynamics.foot_forces(scene, walk.state).foot_2.normal

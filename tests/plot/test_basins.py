@@ -129,7 +129,7 @@ def _disc(points):
 
 
 def test_refined_cells_are_drawn_where_they_are(tmp_path):
-    refined = jb.basins.refined_boundary(_disc, (-1.0, -1.0), (1.0, 2.0), (4, 6), levels=3)
+    refined = jb.basins.refine_boundary(_disc, (-1.0, -1.0), (1.0, 2.0), (4, 6), levels=3)
     figure = refined_basin(refined, mark=(0.0, 0.0), **AXES)
     (ax,) = figure.axes
     outlines = [one for one in ax.collections if isinstance(one, PolyCollection)]
@@ -149,7 +149,7 @@ def test_refined_cells_are_drawn_where_they_are(tmp_path):
 
 
 def test_refined_labels_may_have_names_of_their_own():
-    refined = jb.basins.refined_boundary(_disc, (-1.0, -1.0), (1.0, 1.0), (4, 4), levels=2)
+    refined = jb.basins.refine_boundary(_disc, (-1.0, -1.0), (1.0, 1.0), (4, 4), levels=2)
     names = {0: "walking period-3", 1: "stopped"}
     (ax,) = refined_basin(refined, codes=names, cells=False, **AXES).axes
     assert set(_colours(ax).flat) == {label_colour(name) for name in names.values()}
@@ -227,7 +227,7 @@ def test_bad_arguments_are_named(call, words):
 
 
 def test_a_boundary_of_three_dimensions_is_refused():
-    refined = jb.basins.refined_boundary(
+    refined = jb.basins.refine_boundary(
         lambda points: (points[:, 0] > 0.1).astype(int), (-1,) * 3, (1,) * 3, (2,) * 3, levels=1
     )
     with pytest.raises(jb.ArgumentError, match="3 dimensions"):

@@ -1,4 +1,5 @@
 import dataclasses
+import re
 
 import pytest
 from matplotlib.figure import Figure
@@ -16,12 +17,13 @@ def test_every_coordinate_and_parameter_has_words_a_symbol_and_a_unit():
     assert names <= set(QUANTITIES)
     figure = Figure()
     for name in names:
-        words, symbol, unit = QUANTITIES[name]
+        words, symbol, _ = QUANTITIES[name]
         assert "_" not in words
         assert symbol.startswith("$")
         assert symbol.endswith("$")
-        assert unit
-        figure.text(0.0, 0.0, axis_label(name))
+        label = axis_label(name)
+        assert "^" not in re.sub(r"\$.*?\$", "", label)
+        figure.text(0.0, 0.0, label)
     # Draws every symbol: one that is no mathematics is an error here.
     figure.canvas.draw()
 
@@ -43,6 +45,9 @@ def test_symbols_of_one_scene_differ():
         (("K", "N/m"), "K (N/m)"),
         (("my own words",), "my own words"),
         (("push", "N s"), "push (N s)"),
+        (("mu",), r"friction coefficient, $\mu$ (–)"),
+        (("D",), "contact damping, $D$ (N s/m)"),
+        (("gamma",), r"contact damping, $\gamma$ (SI)"),
     ],
 )
 def test_axes_say_words_symbol_and_unit(said, label):

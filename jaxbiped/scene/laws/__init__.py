@@ -1,5 +1,10 @@
-"""Laws of contact and rules of clearance: normal forces, friction, bristles."""
+"""Laws of contact and rules of clearance: normal forces, friction, bristles.
 
+`parameter` declares what laws have for parameters, a `Quantity` is what is known of one.
+"""
+
+from jaxbiped._parameter import parameter as parameter
+from jaxbiped._quantity import Quantity as Quantity
 from jaxbiped.scene._clearance import AbstractClearance as AbstractClearance
 from jaxbiped.scene._clearance import AlwaysTouching as AlwaysTouching
 from jaxbiped.scene._clearance import OneFoot as OneFoot

@@ -6,6 +6,7 @@ from typing import ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
+from jaxbiped._parameter import check_parameters
 from jaxbiped._types import Scalar
 
 
@@ -18,6 +19,9 @@ class AbstractNormalLaw(eqx.Module):
     """
 
     jumps_at_touchdown: ClassVar[bool] = False
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
 
     @abc.abstractmethod
     def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
@@ -53,6 +57,9 @@ class AbstractFrictionLaw(eqx.Module):
     """
 
     builds_up_over: ClassVar[str | None] = None
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
 
     @abc.abstractmethod
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:

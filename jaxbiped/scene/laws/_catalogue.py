@@ -181,7 +181,6 @@ def friction_law_like(
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> law = jb.laws.friction_law_like(
         ...     "coulomb", mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0
         ... )

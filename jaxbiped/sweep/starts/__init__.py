@@ -1,6 +1,7 @@
 """Starts of a sweep: grids, samples, given states, and the coordinates in which they differ."""
 
 from jaxbiped.sweep.starts._coordinates import coordinate_names as coordinate_names
+from jaxbiped.sweep.starts._coordinates import coordinate_quantities as coordinate_quantities
 from jaxbiped.sweep.starts._given_starts import GivenStarts as GivenStarts
 from jaxbiped.sweep.starts._sequences import SAMPLINGS as SAMPLINGS
 from jaxbiped.sweep.starts._starts import AbstractStarts as AbstractStarts

@@ -6,8 +6,11 @@ from typing import Any
 import numpy as np
 
 from jaxbiped._checks import check_choice
+from jaxbiped._quantity import Quantity
+from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.scene._parameters import parameter_names
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.scene._parameters import parameter_names, parameter_quantities
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
@@ -21,27 +24,14 @@ COORDINATES = {
     "hip_vz": "hip_vz",
 }
 """Names of the state's coordinates, leg 2 standing, and the leaves that they stand for."""
-UNITS = {
-    "theta_stance": "rad",
-    "theta_swing": "rad",
-    "omega_stance": "rad/s",
-    "omega_swing": "rad/s",
-    "hip_z": "m",
-    "hip_vx": "m/s",
-    "hip_vz": "m/s",
-    "slope": "rad",
-    "K": "N/m^n",
-    "c": "N s/m^2",
-    "xi": "s/m",
-    "v0": "m/s",
-    "m": "kg",
-    "J": "kg m^2",
-    "l": "m",
-    "d": "m",
-    "r": "m",
-    "g": "m/s^2",
-    "hip_mass": "kg",
+_QUANTITIES = {
+    "theta_swing": Quantity("swing leg angle", r"$\theta_1$", "rad"),
+    "theta_stance": Quantity("stance leg angle", r"$\theta_2$", "rad"),
+    "omega_swing": Quantity("swing leg rate", r"$\omega_1$", "rad/s"),
+    "omega_stance": Quantity("stance leg rate", r"$\omega_2$", "rad/s"),
 }
+START_QUANTITIES = {name: _QUANTITIES.get(name) or STATE_QUANTITIES[name] for name in COORDINATES}
+"""What the state's coordinates are."""
 
 
 def coordinate_names(scene: Scene | RigidScene) -> tuple[str, ...]:
@@ -55,13 +45,25 @@ def coordinate_names(scene: Scene | RigidScene) -> tuple[str, ...]:
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> jb.starts.coordinate_names(jb.seed_scene())[:2]
         ('theta_stance', 'theta_swing')
     """
-    leaves = RigidState._fields if isinstance(scene, RigidScene) else None
-    own = [name for name, leaf in COORDINATES.items() if leaves is None or leaf in leaves]
+    leaves = state_type(scene)._fields
+    own = [name for name, leaf in COORDINATES.items() if leaf in leaves]
     return (*own, *parameter_names(scene))
+
+
+def coordinate_quantities(scene: Scene | RigidScene) -> dict[str, Quantity]:
+    """What each coordinate that starts of a scene can differ in is, with its unit, by name.
+
+    Args:
+        scene: the walker, compliant or rigid.
+
+    Returns:
+        A `Quantity` (words, symbol and SI unit) by each name.
+    """
+    known = START_QUANTITIES | parameter_quantities(scene)
+    return {name: known[name] for name in coordinate_names(scene)}
 
 
 def check_coordinates(scene: Scene | RigidScene, names: Any) -> None:

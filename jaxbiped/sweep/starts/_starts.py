@@ -186,7 +186,6 @@ def grid(
 
     Examples:
         >>> import jaxbiped as jb
-
         >>> axes = {"theta_stance": [0.10, 0.15, 0.20], "omega_stance": [-1.4, -1.2]}
         >>> jb.starts.grid(jb.seed_scene(), axes).size
         6

@@ -4,6 +4,7 @@ import abc
 
 import equinox as eqx
 
+from jaxbiped._parameter import check_parameters
 from jaxbiped._types import Scalar
 
 
@@ -18,6 +19,9 @@ class AbstractBristleLaw(eqx.Module):
 
     so that a foot lands with straight bristles and nothing jumps as it does.
     """
+
+    def __check_init__(self) -> None:
+        check_parameters(self)
 
     @abc.abstractmethod
     def engagement(self) -> tuple[Scalar, Scalar]:

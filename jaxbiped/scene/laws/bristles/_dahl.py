@@ -1,10 +1,9 @@
 """Dahl's law of friction."""
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 
@@ -26,16 +25,12 @@ class Dahl(AbstractBristleLaw):
         ArgumentError: a parameter not above 0, or relaxation below 0.
     """
 
-    mu: Parameter = eqx.field(converter=as_float)
-    sigma_0: Parameter = eqx.field(converter=as_float)
-    engaging_load: Parameter = eqx.field(converter=as_float, default=1.0)
-    relaxation: Parameter = eqx.field(converter=as_float, default=50.0)
-
-    def __check_init__(self) -> None:
-        check_positive("mu", self.mu)
-        check_positive("sigma_0", self.sigma_0, "1/m")
-        check_positive("engaging_load", self.engaging_load, "N")
-        check_not_negative("relaxation", self.relaxation, "1/s")
+    mu: Parameter = parameter("friction coefficient", r"$\mu$", positive=True)
+    sigma_0: Parameter = parameter("bristle stiffness", r"$\sigma_0$", "1/m", positive=True)
+    engaging_load: Parameter = parameter("engaging load", "$F_e$", "N", positive=True, default=1.0)
+    relaxation: Parameter = parameter(
+        "bristle relaxation", r"$\kappa$", "1/s", minimum=0.0, default=50.0
+    )
 
     def engagement(self) -> tuple[Scalar, Scalar]:
         return self.engaging_load, self.relaxation

@@ -1,10 +1,9 @@
 """The LuGre law of friction."""
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 
@@ -35,24 +34,18 @@ class LuGre(AbstractBristleLaw):
             or relaxation below 0.
     """
 
-    mu_static: Parameter = eqx.field(converter=as_float)
-    mu_kinetic: Parameter = eqx.field(converter=as_float)
-    v_s: Parameter = eqx.field(converter=as_float)
-    sigma_0: Parameter = eqx.field(converter=as_float)
-    sigma_1: Parameter = eqx.field(converter=as_float)
-    sigma_2: Parameter = eqx.field(converter=as_float, default=0.0)
-    engaging_load: Parameter = eqx.field(converter=as_float, default=1.0)
-    relaxation: Parameter = eqx.field(converter=as_float, default=50.0)
-
-    def __check_init__(self) -> None:
-        check_positive("mu_static", self.mu_static)
-        check_positive("mu_kinetic", self.mu_kinetic)
-        check_positive("v_s", self.v_s, "m/s")
-        check_positive("sigma_0", self.sigma_0, "1/m")
-        check_not_negative("sigma_1", self.sigma_1, "s/m")
-        check_not_negative("sigma_2", self.sigma_2, "s/m")
-        check_positive("engaging_load", self.engaging_load, "N")
-        check_not_negative("relaxation", self.relaxation, "1/s")
+    mu_static: Parameter = parameter("static friction", r"$\mu_0$", positive=True)
+    mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", positive=True)
+    v_s: Parameter = parameter("Stribeck speed", "$v_s$", "m/s", positive=True)
+    sigma_0: Parameter = parameter("bristle stiffness", r"$\sigma_0$", "1/m", positive=True)
+    sigma_1: Parameter = parameter("bristle damping", r"$\sigma_1$", "s/m", minimum=0.0)
+    sigma_2: Parameter = parameter(
+        "viscous friction", r"$\sigma_2$", "s/m", minimum=0.0, default=0.0
+    )
+    engaging_load: Parameter = parameter("engaging load", "$F_e$", "N", positive=True, default=1.0)
+    relaxation: Parameter = parameter(
+        "bristle relaxation", r"$\kappa$", "1/s", minimum=0.0, default=50.0
+    )
 
     def engagement(self) -> tuple[Scalar, Scalar]:
         return self.engaging_load, self.relaxation

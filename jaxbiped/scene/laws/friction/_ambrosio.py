@@ -2,11 +2,11 @@
 
 from typing import ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._checks import check_positive
+from jaxbiped._parameter import check_parameters, parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 
 
@@ -33,14 +33,12 @@ class Ambrosio(AbstractFrictionLaw):
     """
 
     builds_up_over: ClassVar[str | None] = "v1"
-    mu: Parameter = eqx.field(converter=as_float)
-    v0: Parameter = eqx.field(converter=as_float)
-    v1: Parameter = eqx.field(converter=as_float)
+    mu: Parameter = parameter("friction coefficient", r"$\mu$", minimum=0.0)
+    v0: Parameter = parameter("slip at onset", "$v_0$", "m/s", positive=True)
+    v1: Parameter = parameter("slip of full friction", "$v_1$", "m/s", positive=True)
 
     def __check_init__(self) -> None:
-        check_not_negative("mu", self.mu)
-        check_positive("v0", self.v0, "m/s")
-        check_positive("v1", self.v1, "m/s")
+        check_parameters(self)
         check_positive("v1 − v0", self.v1 - self.v0, "m/s")
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:

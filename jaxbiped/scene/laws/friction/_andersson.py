@@ -1,10 +1,9 @@
 """Andersson's friction law."""
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 from jaxbiped.scene.laws.friction._stribeck_curve import stribeck_coefficient, stribeck_switches
 
@@ -28,18 +27,11 @@ class Andersson(AbstractFrictionLaw):
         ArgumentError: a coefficient below 0, or v_s, p or k not above 0.
     """
 
-    mu_static: Parameter = eqx.field(converter=as_float)
-    mu_kinetic: Parameter = eqx.field(converter=as_float)
-    v_s: Parameter = eqx.field(converter=as_float)
-    p: Parameter = eqx.field(converter=as_float)
-    k: Parameter = eqx.field(converter=as_float)
-
-    def __check_init__(self) -> None:
-        check_not_negative("mu_static", self.mu_static)
-        check_not_negative("mu_kinetic", self.mu_kinetic)
-        check_positive("v_s", self.v_s, "m/s")
-        check_positive("p", self.p)
-        check_positive("k", self.k, "s/m")
+    mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
+    mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
+    v_s: Parameter = parameter("Stribeck speed", "$v_s$", "m/s", positive=True)
+    p: Parameter = parameter("exponent of the fall", "$p$", positive=True)
+    k: Parameter = parameter("friction per slip", "$k$", "s/m", positive=True)
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         coefficient = stribeck_coefficient(

@@ -2,11 +2,10 @@
 
 from typing import ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 
 
@@ -32,16 +31,10 @@ class BengisuAkay(AbstractFrictionLaw):
     """
 
     builds_up_over: ClassVar[str | None] = "v0"
-    mu_static: Parameter = eqx.field(converter=as_float)
-    mu_kinetic: Parameter = eqx.field(converter=as_float)
-    v0: Parameter = eqx.field(converter=as_float)
-    xi: Parameter = eqx.field(converter=as_float)
-
-    def __check_init__(self) -> None:
-        check_not_negative("mu_static", self.mu_static)
-        check_not_negative("mu_kinetic", self.mu_kinetic)
-        check_positive("v0", self.v0, "m/s")
-        check_not_negative("xi", self.xi, "s/m")
+    mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
+    mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
+    v0: Parameter = parameter("slip at the peak", "$v_0$", "m/s", positive=True)
+    xi: Parameter = parameter("decay of friction", r"$\xi$", "s/m", minimum=0.0)
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         u = slip_speed / self.v0

@@ -2,17 +2,15 @@
 
 from typing import ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 
 from jaxbiped._checks import (
     ArgumentError,
     check_at_least,
-    check_not_negative,
-    check_positive,
     holds_somewhere,
 )
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import check_parameters, parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 
 
@@ -43,22 +41,18 @@ class BrownMcPhee(AbstractFrictionLaw):
     """
 
     builds_up_over: ClassVar[str | None] = "v_t"
-    mu_static: Parameter = eqx.field(converter=as_float)
-    mu_dynamic: Parameter = eqx.field(converter=as_float)
-    v_t: Parameter = eqx.field(converter=as_float)
-    mu_v: Parameter = eqx.field(converter=as_float, default=0.0)
-    N_t: Parameter | None = eqx.field(
-        converter=lambda value: None if value is None else as_float(value), default=None
+    mu_static: Parameter = parameter("static friction", r"$\mu_0$")
+    mu_dynamic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
+    v_t: Parameter = parameter("slip at the peak", "$v_t$", "m/s", positive=True)
+    mu_v: Parameter = parameter("viscous friction", r"$\mu_v$", "N s/m", minimum=0.0, default=0.0)
+    N_t: Parameter | None = parameter(
+        "load of full viscosity", "$N_t$", "N", positive=True, default=None
     )
 
     def __check_init__(self) -> None:
-        check_not_negative("mu_dynamic", self.mu_dynamic)
+        check_parameters(self)
         check_at_least("mu_static", self.mu_static, "mu_dynamic", self.mu_dynamic)
-        check_positive("v_t", self.v_t, "m/s")
-        check_not_negative("mu_v", self.mu_v, "N s/m")
-        if self.N_t is not None:
-            check_positive("N_t", self.N_t, "N")
-        elif holds_somewhere(self.mu_v > 0.0):
+        if self.N_t is None and holds_somewhere(self.mu_v > 0.0):
             raise ArgumentError("N_t = None is not allowed where mu_v is above 0: give a load [N].")
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:

@@ -2,11 +2,10 @@
 
 from typing import ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 
 
@@ -22,12 +21,8 @@ class RegularisedCoulomb(AbstractFrictionLaw):
     """
 
     builds_up_over: ClassVar[str | None] = "v_d"
-    mu: Parameter = eqx.field(converter=as_float)
-    v_d: Parameter = eqx.field(converter=as_float)
-
-    def __check_init__(self) -> None:
-        check_not_negative("mu", self.mu)
-        check_positive("v_d", self.v_d, "m/s")
+    mu: Parameter = parameter("friction coefficient", r"$\mu$", minimum=0.0)
+    v_d: Parameter = parameter("build-up speed", "$v_d$", "m/s", positive=True)
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         return -self.mu * normal_force * jnp.tanh(slip_speed / self.v_d)

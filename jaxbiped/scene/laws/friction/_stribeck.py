@@ -2,11 +2,10 @@
 
 from typing import ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 from jaxbiped.scene.laws.friction._stribeck_curve import stribeck_coefficient, stribeck_switches
 
@@ -38,20 +37,12 @@ class Stribeck(AbstractFrictionLaw):
     """
 
     builds_up_over: ClassVar[str | None] = "v_d"
-    mu_static: Parameter = eqx.field(converter=as_float)
-    mu_kinetic: Parameter = eqx.field(converter=as_float)
-    v_s: Parameter = eqx.field(converter=as_float)
-    p: Parameter = eqx.field(converter=as_float)
-    k_v: Parameter = eqx.field(converter=as_float)
-    v_d: Parameter = eqx.field(converter=as_float)
-
-    def __check_init__(self) -> None:
-        check_not_negative("mu_static", self.mu_static)
-        check_not_negative("mu_kinetic", self.mu_kinetic)
-        check_positive("v_s", self.v_s, "m/s")
-        check_positive("p", self.p)
-        check_not_negative("k_v", self.k_v, "s/m")
-        check_positive("v_d", self.v_d, "m/s")
+    mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
+    mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
+    v_s: Parameter = parameter("Stribeck speed", "$v_s$", "m/s", positive=True)
+    p: Parameter = parameter("exponent of the fall", "$p$", positive=True)
+    k_v: Parameter = parameter("viscous friction", "$k_v$", "s/m", minimum=0.0)
+    v_d: Parameter = parameter("build-up speed", "$v_d$", "m/s", positive=True)
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         coefficient = stribeck_coefficient(

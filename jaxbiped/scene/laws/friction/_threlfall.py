@@ -2,11 +2,10 @@
 
 from typing import ClassVar
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 
 
@@ -30,12 +29,8 @@ class Threlfall(AbstractFrictionLaw):
     """
 
     builds_up_over: ClassVar[str | None] = "v0"
-    mu: Parameter = eqx.field(converter=as_float)
-    v0: Parameter = eqx.field(converter=as_float)
-
-    def __check_init__(self) -> None:
-        check_not_negative("mu", self.mu)
-        check_positive("v0", self.v0, "m/s")
+    mu: Parameter = parameter("friction coefficient", r"$\mu$", minimum=0.0)
+    v0: Parameter = parameter("slip of full friction", "$v_0$", "m/s", positive=True)
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         backwards = slip_speed < 0.0

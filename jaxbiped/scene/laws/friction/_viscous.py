@@ -1,9 +1,7 @@
 """Viscous friction."""
 
-import equinox as eqx
-
-from jaxbiped._checks import check_not_negative
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 
 
@@ -20,10 +18,7 @@ class Viscous(AbstractFrictionLaw):
         ArgumentError: k below 0.
     """
 
-    k: Parameter = eqx.field(converter=as_float)
-
-    def __check_init__(self) -> None:
-        check_not_negative("k", self.k, "s/m")
+    k: Parameter = parameter("friction per slip", "$k$", "s/m", minimum=0.0)
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         return -self.k * normal_force * slip_speed

@@ -2,10 +2,10 @@
 
 from typing import Self
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_at_least, check_positive, check_within
+from jaxbiped._checks import check_positive, check_within
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, hertz_energy, hertz_force
 from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
@@ -22,12 +22,8 @@ class Hertz(AbstractNormalLaw):
         ArgumentError: K not above 0 or n below 1.
     """
 
-    K: Parameter = eqx.field(converter=as_float)
-    n: Parameter = eqx.field(converter=as_float, default=1.5)
-
-    def __check_init__(self) -> None:
-        check_positive("K", self.K, "N/m^n")
-        check_at_least("n", self.n, "1", 1.0)
+    K: Parameter = parameter("contact stiffness", "$K$", "N/m^n", positive=True)
+    n: Parameter = parameter("contact exponent", "$n$", minimum=1.0, default=1.5)
 
     @classmethod
     def from_weight(

@@ -2,9 +2,8 @@
 
 from typing import Self
 
-import equinox as eqx
-
-from jaxbiped._checks import check_at_least, check_choice, check_not_negative, check_positive
+from jaxbiped._checks import check_choice, check_positive
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractNormalLaw,
@@ -37,14 +36,9 @@ class HuntCrossley(AbstractNormalLaw):
         ArgumentError: K not above 0, hysteresis below 0 or n below 1.
     """
 
-    K: Parameter = eqx.field(converter=as_float)
-    hysteresis: Parameter = eqx.field(converter=as_float)
-    n: Parameter = eqx.field(converter=as_float, default=1.5)
-
-    def __check_init__(self) -> None:
-        check_positive("K", self.K, "N/m^n")
-        check_not_negative("hysteresis", self.hysteresis, "s/m")
-        check_at_least("n", self.n, "1", 1.0)
+    K: Parameter = parameter("contact stiffness", "$K$", "N/m^n", positive=True)
+    hysteresis: Parameter = parameter("hysteresis", r"$\chi/v^-$", "s/m", minimum=0.0)
+    n: Parameter = parameter("contact exponent", "$n$", minimum=1.0, default=1.5)
 
     @classmethod
     def from_restitution(

@@ -2,11 +2,10 @@
 
 from typing import ClassVar, Self
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, pushing
 from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
 
@@ -27,14 +26,10 @@ class KelvinVoigt(AbstractNormalLaw):
         ArgumentError: K not above 0 or D below 0.
     """
 
-    K: Parameter = eqx.field(converter=as_float)
-    D: Parameter = eqx.field(converter=as_float)
+    K: Parameter = parameter("contact stiffness", "$K$", "N/m", positive=True)
+    D: Parameter = parameter("contact damping", "$D$", "N s/m", minimum=0.0)
 
     jumps_at_touchdown: ClassVar[bool] = True
-
-    def __check_init__(self) -> None:
-        check_positive("K", self.K, "N/m")
-        check_not_negative("D", self.D, "N s/m")
 
     @classmethod
     def from_weight(

@@ -2,10 +2,9 @@
 
 from typing import Self
 
-import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._checks import check_not_negative, check_positive
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractNormalLaw,
@@ -34,12 +33,8 @@ class KuwabaraKono(AbstractNormalLaw):
         ArgumentError: K not above 0 or gamma below 0.
     """
 
-    K: Parameter = eqx.field(converter=as_float)
-    gamma: Parameter = eqx.field(converter=as_float)
-
-    def __check_init__(self) -> None:
-        check_positive("K", self.K, "N/m^1.5")
-        check_not_negative("gamma", self.gamma, "N s/m^1.5")
+    K: Parameter = parameter("contact stiffness", "$K$", "N/m^1.5", positive=True)
+    gamma: Parameter = parameter("contact damping", r"$\gamma$", "N s/m^1.5", minimum=0.0)
 
     @classmethod
     def from_weight(

@@ -2,9 +2,7 @@
 
 from typing import Self
 
-import equinox as eqx
-
-from jaxbiped._checks import check_at_least, check_not_negative, check_positive
+from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractNormalLaw,
@@ -32,14 +30,9 @@ class RistowSchafer(AbstractNormalLaw):
         ArgumentError: K not above 0, c below 0 or n below 1.
     """
 
-    K: Parameter = eqx.field(converter=as_float)
-    c: Parameter = eqx.field(converter=as_float)
-    n: Parameter = eqx.field(converter=as_float, default=1.5)
-
-    def __check_init__(self) -> None:
-        check_positive("K", self.K, "N/m^n")
-        check_not_negative("c", self.c, "N s/m^2")
-        check_at_least("n", self.n, "1", 1.0)
+    K: Parameter = parameter("contact stiffness", "$K$", "N/m^n", positive=True)
+    c: Parameter = parameter("contact damping", "$c$", "N s/m^2", minimum=0.0)
+    n: Parameter = parameter("contact exponent", "$n$", minimum=1.0, default=1.5)
 
     @classmethod
     def from_weight(

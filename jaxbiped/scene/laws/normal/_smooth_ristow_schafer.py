@@ -1,11 +1,10 @@
 """The seed's normal law with its two corners rounded."""
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped._checks import check_at_least, check_not_negative, check_positive
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractNormalLaw,
     hertz_energy,
@@ -35,18 +34,15 @@ class SmoothRistowSchafer(AbstractNormalLaw):
         ArgumentError: K or a width not above 0, c below 0 or n below 1.
     """
 
-    K: Parameter = eqx.field(converter=as_float)
-    c: Parameter = eqx.field(converter=as_float)
-    n: Parameter = eqx.field(converter=as_float, default=1.5)
-    depth_width: Parameter = eqx.field(converter=as_float, default=1e-5)
-    force_width: Parameter = eqx.field(converter=as_float, default=1.0)
-
-    def __check_init__(self) -> None:
-        check_positive("K", self.K, "N/m^n")
-        check_not_negative("c", self.c, "N s/m^2")
-        check_at_least("n", self.n, "1", 1.0)
-        check_positive("depth_width", self.depth_width, "m")
-        check_positive("force_width", self.force_width, "N")
+    K: Parameter = parameter("contact stiffness", "$K$", "N/m^n", positive=True)
+    c: Parameter = parameter("contact damping", "$c$", "N s/m^2", minimum=0.0)
+    n: Parameter = parameter("contact exponent", "$n$", minimum=1.0, default=1.5)
+    depth_width: Parameter = parameter(
+        "rounding of depth", r"$w_\delta$", "m", positive=True, default=1e-5
+    )
+    force_width: Parameter = parameter(
+        "rounding of force", "$w_F$", "N", positive=True, default=1.0
+    )
 
     def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
         depth = smooth_ramp(penetration, self.depth_width)

@@ -1,0 +1,116 @@
+"""Parameters: numeric fields that carry their words, symbol, unit and allowed range.
+
+Checks, the command line, figures and datasets read these, so that a law of the user's own says
+what its parameters are in the one place where it declares them.
+"""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import equinox as eqx
+
+from jaxbiped._checks import (
+    check_at_least,
+    check_below,
+    check_finite,
+    check_not_negative,
+    check_positive,
+)
+from jaxbiped._quantity import Quantity
+from jaxbiped._types import as_float
+
+_KEY = "parameter"
+
+
+class ParameterInfo(NamedTuple):
+    """What the field of a parameter carries.
+
+    Attributes:
+        quantity: words, symbol and unit.
+        positive: whether it must be above 0.
+        minimum: the smallest value allowed, None for none.
+        size_below: what its absolute value must be below, None for any.
+    """
+
+    quantity: Quantity
+    positive: bool
+    minimum: float | None
+    size_below: float | None
+
+    def check(self, name: str, value: Any) -> None:
+        """Raises `ArgumentError` unless every entry is a finite number that is allowed."""
+        unit = self.quantity.unit
+        if self.size_below is not None:
+            check_below(name, value, self.size_below, "radians" if unit == "rad" else unit)
+        elif self.positive:
+            check_positive(name, value, unit)
+        elif self.minimum is None:
+            check_finite(name, value)
+        elif self.minimum == 0.0:
+            check_not_negative(name, value, unit)
+        else:
+            check_at_least(name, value, f"{self.minimum:g}", self.minimum)
+
+
+def parameter(
+    words: str,
+    symbol: str = "",
+    unit: str = "",
+    *,
+    positive: bool = False,
+    minimum: float | None = None,
+    size_below: float | None = None,
+    pair: bool = False,
+    default: Any = dataclasses.MISSING,
+) -> Any:
+    """A field for a parameter of a law of contact or of any other part of a scene.
+
+    Values become floating-point arrays. Laws of contact, and whatever else calls
+    `check_parameters`, refuse a value that is not finite or not in the range.
+
+    Args:
+        words: what it is, as "contact stiffness": for tables and figures.
+        symbol: as mathematics that matplotlib sets, as "$K$".
+        unit: SI unit, as "N s/m^2"; the exponent may be a parameter's name, "N/m^n"; empty
+            for a pure number.
+        positive: whether it must be above 0.
+        minimum: the smallest value allowed, any unless given.
+        size_below: what its absolute value must be below.
+        pair: whether it is a pair of numbers, as a point.
+        default: the value unless given; with None, None stays and the law does without it.
+
+    Example:
+        class Sticky(jaxbiped.laws.AbstractFrictionLaw):
+            grip: float = jaxbiped.laws.parameter("grip", "$G$", "s/m", minimum=0.0)
+
+    Returns:
+        The field, for the body of an `equinox.Module`; it makes floating-point arrays of what it is
+        given.
+    """
+    one = _optional_float if default is None else as_float
+    info = ParameterInfo(Quantity(words, symbol, unit), positive, minimum, size_below)
+    given = {} if default is dataclasses.MISSING else {"default": default}
+    return eqx.field(converter=_pair if pair else one, metadata={_KEY: info}, **given)
+
+
+def parameter_infos(part: Any) -> dict[str, ParameterInfo]:
+    """What the fields of a part of a scene (or of its class) carry, plain fields left out."""
+    fields = dataclasses.fields(part)
+    return {field.name: field.metadata[_KEY] for field in fields if _KEY in field.metadata}
+
+
+def check_parameters(part: Any) -> None:
+    """Raises `ArgumentError` for the first parameter of a part that is not allowed."""
+    for name, info in parameter_infos(part).items():
+        value = getattr(part, name)
+        if value is not None:
+            for entry in value if isinstance(value, tuple) else (value,):
+                info.check(name, entry)
+
+
+def _optional_float(value: Any) -> Any:
+    return None if value is None else as_float(value)
+
+
+def _pair(values: Any) -> tuple[Any, ...]:
+    return tuple(map(as_float, values))

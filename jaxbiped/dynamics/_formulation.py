@@ -1,0 +1,20 @@
+"""Formulations: the state and the equations of motion that belong to a kind of scene.
+
+A formulation registers its kind of scene here, so that a new one is a file of its own.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+
+@functools.singledispatch
+def state_type(scene: Any) -> Any:
+    """The type of a scene's states, a NamedTuple of scalar leaves."""
+    raise TypeError(f"{type(scene).__name__} has no formulation.")
+
+
+@functools.singledispatch
+def field_of(scene: Any) -> Callable[[Any, Any, Any], Any]:
+    """A scene's vector field f(t, state, scene), in the form that `diffrax.ODETerm` takes."""
+    raise TypeError(f"{type(scene).__name__} has no formulation.")
