@@ -17,7 +17,7 @@ class Dimension(NamedTuple):
 
     Attributes:
         estimate: the dimension.
-        error: standard error of the fit's slope; it knows nothing of a bend in the counts.
+        error: standard error of the fit's slope; it says nothing of a curvature of the counts.
         sizes: sides of the boxes, shape (k,), in cells of the finest grid.
         counts: how many boxes of each size hold a boundary, shape (k,).
     """

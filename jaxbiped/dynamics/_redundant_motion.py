@@ -212,8 +212,8 @@ def _minimal_accelerations(
     hips, turning = [], []
     for k in range(2):
         hip = point_of(linkage, q, headings, k, joint.point_1)
-        ax = sum((entry * second[c] for c, entry in hip.row_x.items()), hip.bend_x)
-        az = sum((entry * second[c] for c, entry in hip.row_z.items()), hip.bend_z)
+        ax = sum((entry * second[c] for c, entry in hip.row_x.items()), hip.convective_x)
+        az = sum((entry * second[c] for c, entry in hip.row_z.items()), hip.convective_z)
         hips.append((ax, az))
         own = slice(linkage.coordinates * k + 2, linkage.coordinates * (k + 1))
         if linkage.orientation == "angle":

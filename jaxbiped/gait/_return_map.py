@@ -34,7 +34,8 @@ class Return(NamedTuple):
     """Where the return map leads.
 
     Attributes:
-        state: on the section, renewed (legs exchanged); drifting components go on from the start's.
+        state: on the section, after the reset (legs exchanged); cyclic coordinates go on from the
+            start's.
         time: duration [s].
         code: 0 for a return, else that of the `Ending` that came instead; state and time are then
             where it ended.

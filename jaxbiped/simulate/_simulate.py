@@ -92,7 +92,7 @@ def simulate(
         most_arrivals: how many arrivals at a section there is room for.
         extremes: a function of (scene, state) whose least and largest values, number by number,
             over the ends of all steps are wanted (by lanes, or of a redundant scene).
-        watch: which misfortunes end the solve: any of "fall", "stop", "stumble".
+        watch: which failures end the solve: any of "fall", "stop", "stumble".
         max_solver_steps: cap on the solver's attempted steps.
         adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
             needs `diffrax.ForwardMode()`. Where a method projects after each step, only adjoints

@@ -82,11 +82,11 @@ def follow_starts(
     waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
     with _MAKING:
-        course = _labelling_loop(scene.compliant, effort.solver, periods, effort.engine)
+        loop = _labelling_loop(scene.compliant, effort.solver, periods, effort.engine)
     if not count:
         return _empty_outcome(len(states) - 1)
     run = label_by_lanes if effort.engine == "lanes" else label_by_xla
-    return run(course, jtu.tree_map(np.asarray, starts))
+    return run(loop, jtu.tree_map(np.asarray, starts))
 
 
 @functools.cache  # the same object each time, so that nothing is compiled again

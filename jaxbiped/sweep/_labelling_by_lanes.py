@@ -16,18 +16,18 @@ _MAKING = threading.Lock()
 """Held while a program is made: of many threads one makes it, the others wait for it."""
 
 
-def label_by_lanes(course: AbstractLabellingLoop, starts: Start) -> Outcome:
+def label_by_lanes(loop: AbstractLabellingLoop, starts: Start) -> Outcome:
     """Follows n starts until each is certain; NumPy's arrays (n, …) in and out."""
     leaves, structure = jtu.tree_flatten(starts)
     shapes = tuple(np.shape(leaf)[1:] for leaf in leaves)
     with _MAKING:
-        program = _compiled(course, structure, shapes)
+        program = _compiled(loop, structure, shapes)
     outcome: Outcome = program.run(starts).outputs
     return outcome
 
 
 @functools.lru_cache(maxsize=64)
-def _compiled(course: AbstractLabellingLoop, structure: Any, shapes: Any) -> CompiledProgram:
+def _compiled(loop: AbstractLabellingLoop, structure: Any, shapes: Any) -> CompiledProgram:
     leaves = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in shapes]
-    program = Program(course.begin, course.attempt, course.finish)
+    program = Program(loop.begin, loop.attempt, loop.finish)
     return CompiledProgram(program, jtu.tree_unflatten(structure, leaves))

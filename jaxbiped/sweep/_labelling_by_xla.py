@@ -17,7 +17,9 @@ _ROUND = 128
 """Attempted steps after which slots that are over take the next starts."""
 
 
-def label_by_xla(course: AbstractLabellingLoop, starts: Start, *, slots: int = SLOTS) -> Outcome:
+def label_by_xla(
+    labelling_loop: AbstractLabellingLoop, starts: Start, *, slots: int = SLOTS
+) -> Outcome:
     """Follows n starts until each is certain; arrays (n, …) in, NumPy's out.
 
     A start that is over waits for the end of its round, not for the longest start of the batch:
@@ -28,14 +30,14 @@ def label_by_xla(course: AbstractLabellingLoop, starts: Start, *, slots: int = S
     given = _rows(starts, np.minimum(owner, count - 1))
     owner[count:] = -1
     over = jnp.asarray(owner < 0)
-    now = _begin(course, given)
+    now = _begin(labelling_loop, given)
     waiting = min(slots, count)
     found: list[tuple[np.ndarray, Any]] = []
     while True:
-        now, over = _round(course, given, now, over)
+        now, over = _round(labelling_loop, given, now, over)
         done = np.flatnonzero(np.asarray(over) & (owner >= 0))
         if len(done):
-            outcome = jtu.tree_map(np.asarray, _finish(course, given, now))
+            outcome = jtu.tree_map(np.asarray, _finish(labelling_loop, given, now))
             found.append((owner[done], _rows(outcome, done)))
             owner[done] = -1
             fresh = np.arange(waiting, min(waiting + len(done), count))
@@ -46,7 +48,7 @@ def label_by_xla(course: AbstractLabellingLoop, starts: Start, *, slots: int = S
                 rows, beyond = np.resize(fresh, slots), np.full(slots, slots)
                 beyond[: len(places)] = places
                 given, now, over = _refill(
-                    course, given, now, over, jnp.asarray(beyond), _rows(starts, rows)
+                    labelling_loop, given, now, over, jnp.asarray(beyond), _rows(starts, rows)
                 )
         if not (owner >= 0).any():
             break
@@ -57,21 +59,21 @@ def label_by_xla(course: AbstractLabellingLoop, starts: Start, *, slots: int = S
 
 
 @eqx.filter_jit
-def _begin(course: AbstractLabellingLoop, starts: Start) -> Progress:
-    return jax.vmap(course.begin)(starts)
+def _begin(labelling_loop: AbstractLabellingLoop, starts: Start) -> Progress:
+    return jax.vmap(labelling_loop.begin)(starts)
 
 
 @eqx.filter_jit
-def _finish(course: AbstractLabellingLoop, starts: Start, now: Progress) -> Outcome:
-    return jax.vmap(course.finish)(starts, now)
+def _finish(labelling_loop: AbstractLabellingLoop, starts: Start, now: Progress) -> Outcome:
+    return jax.vmap(labelling_loop.finish)(starts, now)
 
 
 @eqx.filter_jit
 def _round(
-    course: AbstractLabellingLoop, starts: Start, now: Progress, over: Scalar
+    labelling_loop: AbstractLabellingLoop, starts: Start, now: Progress, over: Scalar
 ) -> tuple[Progress, Scalar]:
     """At most so many attempts further; what is over stays as it is."""
-    attempt = jax.vmap(course.attempt)
+    attempt = jax.vmap(labelling_loop.attempt)
 
     def going(loop: tuple[Progress, Scalar, Scalar]) -> Scalar:
         _, over, attempts = loop
@@ -89,7 +91,7 @@ def _round(
 
 @eqx.filter_jit
 def _refill(
-    course: AbstractLabellingLoop,
+    labelling_loop: AbstractLabellingLoop,
     given: Start,
     now: Progress,
     over: Scalar,
@@ -97,7 +99,7 @@ def _refill(
     fresh: Start,
 ) -> tuple[Start, Progress, Scalar]:
     """The starts at these places replaced; a place beyond the slots takes none."""
-    begun = jax.vmap(course.begin)(fresh)
+    begun = jax.vmap(labelling_loop.begin)(fresh)
 
     def put(old: Any, new: Any) -> Any:
         return old.at[places].set(new, mode="drop")

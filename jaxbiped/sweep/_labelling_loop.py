@@ -252,7 +252,7 @@ def _outcome(
     distance: Scalar,
     attempts: Scalar,
 ) -> Outcome:
-    """A misfortune is certain; all footsteps walked without a verdict are not."""
+    """A failure is certain; all footsteps walked without a verdict are not."""
     kind = trace.verdict.dtype
     spent = (code == int(Label.WALKING)) | (code == int(Label.OUT_OF_STEPS))
     plain = jnp.where(code == int(Label.WALKING), int(Label.UNRESOLVED), code).astype(kind)

@@ -37,7 +37,7 @@ def nearest_failure(
 
     Args:
         labelling: one that knows a gait.
-        gradients: whether rays are turned to the boundary's normal by the simulator's derivatives,
+        gradients: whether rays are rotated to the boundary's normal by the simulator's derivatives,
             or by differences of the distances along nearby rays.
         farthest: distance up to which to look.
         tolerance: of the distance.

@@ -37,13 +37,13 @@ class _Given(NamedTuple):
     Attributes:
         args: parameters.
         arrival: time and state where the motion arrives.
-        turned: what `carry_tangents` gave.
+        leading: what `carry_tangents` gave.
         after: adjoints behind the arrival, of components in their own order.
     """
 
     args: PyTree
     arrival: Any
-    turned: FirstVariation
+    leading: FirstVariation
     after: Adjoints
 
 
@@ -55,18 +55,18 @@ class _Now(NamedTuple):
     count: Any
 
 
-def carry_tangents(flow: Flow, nodes: Nodes, turned: Scalar) -> tuple[FirstVariation, Recording]:
+def carry_tangents(flow: Flow, nodes: Nodes, leading: Scalar) -> tuple[FirstVariation, Recording]:
     """Turned tangents (v, c) carried along a motion to its arrival; and the steps of that."""
-    given = FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, turned, nodes.steps)
+    given = FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, leading, nodes.steps)
     compiled = _compiled(_kind(flow), None)
     room = nodes.ends.recorder.room
-    return call_recording(compiled, given, room=room, quick=True, tape=nodes.ends, once=True)
+    return call_recording(compiled, given, room=room, quick=True, stream=nodes.ends, once=True)
 
 
 def pull_back(
     flow: Flow,
     nodes: Nodes,
-    turned: FirstVariation,
+    leading: FirstVariation,
     steps: Recording,
     after: Adjoints,
     *,
@@ -77,12 +77,12 @@ def pull_back(
     Args:
         flow: what moves.
         nodes: of the motion.
-        turned, steps: from `carry_tangents` along it.
+        leading, steps: from `carry_tangents` along it.
         after: adjoints behind the arrival.
         final: whether the cycle ends there: of that arrival tangents on the section are told.
     """
-    given = _Given(flow.args.args, nodes.arrival, turned, after)
-    return call(_compiled(_kind(flow), final), given, tape=steps, quick=True)[0]
+    given = _Given(flow.args.args, nodes.arrival, leading, after)
+    return call(_compiled(_kind(flow), final), given, stream=steps, quick=True)[0]
 
 
 class _Kind(NamedTuple):
@@ -102,7 +102,7 @@ def _kind(flow: Flow) -> _Kind:
 
 @functools.lru_cache(maxsize=256)
 def _compiled(kind: _Kind, final: bool | None) -> CompiledProgram:
-    """The program that carries turned tangents, or where `final` is given, that of adjoints."""
+    """The program that carries leading tangents, or where `final` is given, that of adjoints."""
 
     def numbers(*shape: int) -> Any:
         return jax.ShapeDtypeStruct(shape, jnp.float64)
@@ -111,25 +111,25 @@ def _compiled(kind: _Kind, final: bool | None) -> CompiledProgram:
     field = jax.jit(kind.system.vector_field)
 
     def flow(given: Any) -> Flow:
-        nothing = jnp.zeros((0, 0))
-        seeded = Seeded(given.args, nothing, nothing, kind.active)
+        no_columns = jnp.zeros((0, 0))
+        seeded = Seeded(given.args, no_columns, no_columns, kind.active)
         return Flow(kind.system, kind.arrival, field, seeded, kind.state)
 
     c, p = kind.state.num_leaves, len(kind.active)
     args = jtu.tree_unflatten(kind.args, [numbers()] * kind.args.num_leaves)
-    row, turned = numbers(1 + c), numbers(COUNT, c)
+    row, leading = numbers(1 + c), numbers(COUNT, c)
     if final is None:
-        given = FirstVariationInputs(args, row, row, turned, numbers())
+        given = FirstVariationInputs(args, row, row, leading, numbers())
         return CompiledProgram(FirstVariationSolve(flow, 1 + c).program(), given)
-    after = Adjoints(turned, numbers(c), numbers(p))
+    after = Adjoints(leading, numbers(c), numbers(p))
     program = _AdjointSolve(flow, Step.shape(c, COUNT), final).program()
     return CompiledProgram(
-        program, _Given(args, row, FirstVariation(turned, numbers(c), numbers()), after)
+        program, _Given(args, row, FirstVariation(leading, numbers(c), numbers()), after)
     )
 
 
 class _AdjointSolve:
-    """The functions of the program: its tape's rows are steps, read backwards."""
+    """The functions of the program: its input stream's rows are steps, read backwards."""
 
     def __init__(self, flow: Callable[[Any], Flow], step: Step, final: bool) -> None:
         self.flow, self.step, self.final = flow, step, final
@@ -137,7 +137,7 @@ class _AdjointSolve:
     def program(self) -> Program:
         """The program."""
         size = sum(leaf.size for leaf in jtu.tree_leaves(self.step))
-        return Program(self.start, self.attempt, self.finish, tape=size, backwards=True)
+        return Program(self.start, self.attempt, self.finish, stream=size, backwards=True)
 
     def start(self, given: _Given) -> _Now:
         """Adjoints before the arrival: all of it is linear in what is there."""
@@ -148,7 +148,7 @@ class _AdjointSolve:
         after = given.after
 
         def behind(before: Adjoints) -> tuple[Scalar, Scalar]:
-            first = jnp.concatenate([given.turned.turned, before.family[None]]).T
+            first = jnp.concatenate([given.leading.leading, before.family[None]]).T
             idle = jnp.zeros((COUNT, len(parameters)))
             seeds = jnp.concatenate([idle, before.parameters[None]]).T
             jet = Jet(first, before.second.T[:, None, :])
@@ -162,7 +162,7 @@ class _AdjointSolve:
             order.sorted(before.family),
             before.parameters + after.parameters,
         )
-        return _Now(adjoints, given.turned.state, jnp.zeros(()))
+        return _Now(adjoints, given.leading.state, jnp.zeros(()))
 
     def attempt(self, given: _Given, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
         flow = self.flow(given)
@@ -177,7 +177,7 @@ class _AdjointSolve:
             lambda: jnp.zeros(len(now.state) + len(parameters)),
         )
         before, count = adjoint_step(rows, linear, step, early, now.adjoints), now.count + 1.0
-        return _Now(before, step.before, count), count >= given.turned.steps
+        return _Now(before, step.before, count), count >= given.leading.steps
 
     def finish(self, given: _Given, now: _Now) -> Adjoints:
         order, _ = field_order(self.flow(given))

@@ -52,7 +52,7 @@ class Flow(eqx.Module):
         return self.system.switches(scene, state)
 
     def reset(self, z: Scalar) -> Scalar:
-        """The components after an arrival's renewal, shape (c,)."""
+        """The components after an arrival's reset, shape (c,)."""
         state, scene = self._parts(z)
         return jnp.stack(jtu.tree_leaves(self.system.reset_map(scene, state)))
 

@@ -23,7 +23,7 @@ _PASSED_ON = ("copy", "copy_p", "convert_element_type", "optimization_barrier", 
 
 
 def jacobian(function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]) -> Scalar:
-    """Derivatives of every output by every input, shape (outputs, inputs)."""
+    """Derivatives of every output with respect to every input, shape (outputs, inputs)."""
     inputs = list(inputs)
     outputs, pushed = jax.linearize(function, inputs)
     try:

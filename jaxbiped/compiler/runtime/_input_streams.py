@@ -23,10 +23,12 @@ class InputStreams(NamedTuple):
 
 
 def input_streams_of(
-    tape: Sequence[np.ndarray] | None, count: int, numbers: int, *, backwards: bool
+    stream: Sequence[np.ndarray] | None, count: int, numbers: int, *, backwards: bool
 ) -> InputStreams:
     """Of `count` simulations that read rows of so many numbers, of none where these are 0."""
-    rows = [np.ascontiguousarray(each, dtype=np.float64) for each in ([] if tape is None else tape)]
+    rows = [
+        np.ascontiguousarray(each, dtype=np.float64) for each in ([] if stream is None else stream)
+    ]
     assert len(rows) == (count if numbers else 0)
     assert all(len(each) > 0 and each.shape[1] == numbers for each in rows)
     lengths = np.array([len(each) for each in rows], dtype=np.int64)

@@ -242,7 +242,7 @@ def stages_of(
     def picked(components: Components) -> Components:
         return [components[i] for i in kept]
 
-    slope, drift, jacobian = fusion_barrier(
+    slope, f_t, jacobian = fusion_barrier(
         moves,
         lambda: (picked(lin.evaluate(t, start)), picked(lin.time_derivative()), lin.jacobian()),
     )
@@ -269,7 +269,7 @@ def stages_of(
             right = _plus(right, extra)
         weight = step * (tableau.gammas[i] * span)
         if tableau.gammas[i]:
-            right = [r if d is None else r + weight * d for r, d in zip(right, drift, strict=True)]
+            right = [r if d is None else r + weight * d for r, d in zip(right, f_t, strict=True)]
         kept_rate = rate if _repeats(tableau, i + 1) else None
         return lin.solve_kept(factors, jacobian, step, right, stages.direct_right(i)), kept_rate
 
