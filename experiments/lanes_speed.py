@@ -168,7 +168,7 @@ def gaits(rounds: int, engines: tuple[str, ...]) -> dict[str, float]:
 
 
 def derivatives(rounds: int) -> list[dict[str, Any]]:
-    """The final state and its derivatives by log K, log c and log ξ."""
+    """The final state and its derivatives in log K, log c and log ξ."""
     exact = _lane_work.final_slopes(DURATION, 1e-9)()[1]
     work = {("lanes", rtol): _lane_work.final_slopes(DURATION, rtol) for rtol in (1e-6, 1e-7, 1e-8)}
     if _casadi.is_installed():

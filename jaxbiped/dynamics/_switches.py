@@ -1,4 +1,7 @@
-"""Switches: surfaces where the vector field or a derivative of it jumps."""
+"""Switches: surfaces where the vector field or a derivative of it jumps.
+
+No step may straddle one: derivatives taken through it would be wrong.
+"""
 
 from typing import Any, NamedTuple
 

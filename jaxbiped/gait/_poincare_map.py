@@ -1,4 +1,7 @@
-"""Poincaré map: one return to the section, with its Jacobian."""
+"""Poincaré map: one return to the section, with its Jacobian.
+
+Newton's method, multipliers and sensitivities all read this one evaluation.
+"""
 
 from typing import Any, NamedTuple
 

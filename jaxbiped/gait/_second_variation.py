@@ -1,4 +1,8 @@
-"""Second variation of the return map at a periodic orbit."""
+"""Second variation of the return map at a periodic orbit.
+
+The spectral radius is a function of the return map's Jacobian, so its sensitivities are second
+derivatives of the map.
+"""
 
 import jax
 import jax.numpy as jnp

@@ -179,8 +179,8 @@ def _after_strike(walk: RigidWalk, trial: RigidProgress, strike: _Strike) -> Rig
     """After the strike beside a trial. Where footsteps last alike, the next one is known."""
     t = trial.t + strike.rest
     period = t - trial.strike
-    drift = jnp.abs(period - trial.period) * jnp.abs(_opening(trial.state)[1])
-    steady = drift <= 2.0 * _NEAR * jnp.sqrt(walk.rtol)
+    change_of_rest = jnp.abs(period - trial.period) * jnp.abs(_opening(trial.state)[1])
+    steady = change_of_rest <= 2.0 * _NEAR * jnp.sqrt(walk.rtol)
     due = jnp.where(steady, t + period, jnp.inf)
     return trial._replace(
         t=t,

@@ -1,4 +1,7 @@
-"""Labelling loop: a start is followed until its label is certain, by either engine."""
+"""Labelling loop: a start is followed until its label is certain, by either engine.
+
+Both engines run these same functions, so that labels do not depend on the engine.
+"""
 
 import abc
 from collections.abc import Callable

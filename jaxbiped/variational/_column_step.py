@@ -1,4 +1,8 @@
-"""Column step: the derivative of a Rosenbrock step, one direction at a time."""
+"""Column step: the derivative of a Rosenbrock step, one direction at a time.
+
+For lanes, which carry one direction after the other; `_rosenbrock_tangents` takes all at once for
+XLA.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple

@@ -1,4 +1,7 @@
-"""Differentiable solve: scenes solved by lanes, with derivatives of their own."""
+"""Differentiable solve: scenes solved by lanes, with derivatives of their own.
+
+JAX cannot differentiate machine code, so the rules of both modes are given here.
+"""
 
 import functools
 from collections.abc import Callable, Sequence

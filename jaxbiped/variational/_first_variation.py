@@ -1,4 +1,7 @@
-"""First variation along a known motion in two directions, and the steps it takes, by lanes."""
+"""First variation along a known motion in two directions, and the steps it takes, by lanes.
+
+The adjoint solve reads these steps backwards, with all that it needs of the motion in them.
+"""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple

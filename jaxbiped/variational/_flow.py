@@ -1,4 +1,7 @@
-"""Flow of a system: rates, switches, section and reset map of components and parameters."""
+"""Flow of a system: rates, switches, section and reset map of components and parameters.
+
+The second variation differentiates with respect to both, which here are one vector.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any

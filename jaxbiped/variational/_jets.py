@@ -1,4 +1,7 @@
-"""Jets: first and second tangents together, through a function and onto a surface."""
+"""Jets: first and second tangents together, through a function and onto a surface.
+
+The second variation carries both through resets and onto sections.
+"""
 
 from collections.abc import Callable
 from typing import NamedTuple

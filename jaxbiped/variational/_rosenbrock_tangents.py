@@ -1,4 +1,7 @@
-"""Tangents of a Rosenbrock step: its exact derivative along many directions at once."""
+"""Tangents of a Rosenbrock step: its exact derivative along many directions at once.
+
+For XLA, which multiplies matrices of directions; `_column_step` takes them one by one for lanes.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -1,4 +1,7 @@
-"""Switch locator: a step-size controller whose steps end just past every switch."""
+"""Switch locator: a step-size controller whose steps end just past every switch.
+
+A step across a switch would ruin derivatives long before the state shows it.
+"""
 
 import functools
 from collections.abc import Callable

@@ -1,4 +1,7 @@
-"""Tangent solver: state and derivatives stepped together, their errors controlled together."""
+"""Tangent solver: state and derivatives stepped together, their errors controlled together.
+
+A state within its tolerance does not make its derivatives accurate: they have a norm of their own.
+"""
 
 import functools
 from collections.abc import Callable

@@ -1,4 +1,7 @@
-"""Variational solve as a program for lanes: a state with its derivatives, to a section."""
+"""Variational solve as a program for lanes: a state with its derivatives, to a section.
+
+The twin for lanes of what `_solve_to_section` does through diffrax.
+"""
 
 import dataclasses
 from collections.abc import Callable

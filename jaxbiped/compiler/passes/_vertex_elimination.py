@@ -97,8 +97,8 @@ class _Graph:
         heapq.heapify(queue)
         left = set(inner)
         while queue:
-            cost, turned = heapq.heappop(queue)
-            v = -turned
+            cost, negative = heapq.heappop(queue)
+            v = -negative
             if v not in left:
                 continue
             if cost != self._cost(v):  # it was lower or higher when that was pushed
