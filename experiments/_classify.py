@@ -20,8 +20,8 @@ UNIT = math.sqrt(9.8 / _independent.LENGTH)
 PIECE, SAMPLES = 0.44, 23
 """A footstep's time [s], and how many states are looked at in it."""
 FOOTSTEPS, PATIENCE = 30, 50.0 / UNIT
-WALKING, FELL_FORWARD, FELL_BACK, STOPPED, STUMBLED, OUT_OF_STEPS, FAILED = range(7)
-UNRESOLVED, GOING_ON = 8, -1
+WALKING, FELL_FORWARD, FELL_BACK, STOPPED, STUMBLED, FAILED = 0, 1, 2, 3, 4, 6
+UNRESOLVED, TIMED_OUT, GOING_ON = 8, 9, -1
 MOST_STEPS = 500
 """Between two states that are looked at: more are taken only where the motion cannot go on."""
 
@@ -118,7 +118,7 @@ def judged(states, span, memory, point, metric, radius):
         if memory[1] >= FOOTSTEPS:
             return UNRESOLVED
         if memory[2] > PATIENCE:
-            return OUT_OF_STEPS
+            return TIMED_OUT
     return GOING_ON
 
 

@@ -1,5 +1,8 @@
 """What the experiments on the hip's constraints share."""
 
+import json
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -19,6 +22,14 @@ ASTRAY = 0.05
 """Error of the state (SI units) from which a run has failed."""
 FLOOR = 1e-18
 """Where a violation of exactly nothing is drawn [m]."""
+
+
+class Integrator(NamedTuple):
+    """A solver's name, and its relative tolerance or its step [s]."""
+
+    solver: str
+    rtol: float | None = None
+    dt: float | None = None
 
 
 class Curve(NamedTuple):
@@ -47,7 +58,7 @@ class Curve(NamedTuple):
 def curve_of(
     scene: jb.Scene,
     method: str,
-    integrator: jb.Integrator,
+    integrator: Integrator,
     duration: float,
     truth: np.ndarray,
     points: int = 1001,
@@ -83,6 +94,21 @@ def curve_of(
     return Curve(np.asarray(times)[alive], off[alive], ending, seconds, error, at_steps)
 
 
+def compared(
+    methods: tuple[str, ...], integrators: list[Integrator], duration: float
+) -> list[dict[str, Any]]:
+    """The runs of `jaxbiped constraints`; an error that is no number is None."""
+    ways = [
+        f"{how.solver}:dt={how.dt!r}" if how.rtol is None else f"{how.solver}:{how.rtol!r}"
+        for how in integrators
+    ]
+    command = [sys.executable, "-m", "jaxbiped", "constraints", "--json", "-", "--repeats", "1"]
+    command += ["--duration", repr(duration), "--methods", *methods, "--integrators", *ways]
+    found = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True)
+    runs: list[dict[str, Any]] = json.loads(found.stdout)["runs"]
+    return runs
+
+
 def truth_of(scene: jb.Scene, duration: float) -> np.ndarray:
     """The minimal formulation's state at the end, at a tolerance of 1e-10."""
     walk = jb.simulate(
@@ -106,7 +132,7 @@ def starts(count: int) -> Any:
 def relative_costs(
     scene: jb.Scene,
     methods: tuple[str, ...],
-    integrator: jb.Integrator,
+    integrator: Integrator,
     *,
     single: float,
     batch: float,
@@ -145,7 +171,7 @@ def relative_costs(
     }
 
 
-def _ends(scene: Any, integrator: jb.Integrator, duration: float) -> Callable[[Any], Any]:
+def _ends(scene: Any, integrator: Integrator, duration: float) -> Callable[[Any], Any]:
     def end(start: Any) -> Any:
         return jb.simulate(
             scene,

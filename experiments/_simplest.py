@@ -71,7 +71,7 @@ def strike_map(point: np.ndarray, slope: float) -> tuple[np.ndarray, str]:
             return y[[0, 2]], "fell forward" if y[0] < 0.0 else "fell back"
         if found.t_events[0].size and y[1] < 0.0:
             return np.array([-y[0], np.cos(2.0 * y[0]) * y[2]]), "strike"
-    return y[[0, 2]], "out of steps"
+    return y[[0, 2]], "timed out"
 
 
 def walks(point: np.ndarray, gait: np.ndarray, slope: float, *, footsteps: int) -> bool:

@@ -11,7 +11,16 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from _held import COLOURS, FLOOR, MARKERS, cost_lines, relative_costs, truth_of
+from _held import (
+    COLOURS,
+    FLOOR,
+    MARKERS,
+    Integrator,
+    compared,
+    cost_lines,
+    relative_costs,
+    truth_of,
+)
 from _options import Options, parse
 
 import jaxbiped as jb
@@ -19,7 +28,7 @@ from jaxbiped.plot._style import dress, new_figure
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 STEPS = (1e-4, 1e-5, 1e-6)
-COSTED = jb.Integrator("rodas4", rtol=1e-6)
+COSTED = Integrator("rodas4", rtol=1e-6)
 DURATION, QUICK_DURATION = 1.0, 0.1
 
 
@@ -29,19 +38,11 @@ def main() -> None:
     duration = QUICK_DURATION if quick else DURATION
     methods = ("standard", "index1") if quick else tuple(jb.constraints.CONSTRAINT_METHODS)
     integrators = [
-        *([] if quick else [jb.Integrator("rodas4", rtol=rtol) for rtol in TOLERANCES]),
-        *[jb.Integrator("euler", dt=dt) for dt in STEPS[: 2 if quick else 3]],
-        *([] if quick else [jb.Integrator("runge2", dt=dt) for dt in STEPS]),
+        *([] if quick else [Integrator("rodas4", rtol=rtol) for rtol in TOLERANCES]),
+        *[Integrator("euler", dt=dt) for dt in STEPS[: 2 if quick else 3]],
+        *([] if quick else [Integrator("runge2", dt=dt) for dt in STEPS]),
     ]
-    runs = jb.compare_constraints(
-        scene,
-        jb.seed_state(),
-        duration=duration,
-        integrators=integrators,
-        methods={name: name for name in methods},
-        repeats=1,
-        progress=True,
-    )
+    runs = compared(methods, integrators, duration)
     count = 3 if quick else 9
     maps = {"baumgarte": baumgarte_map(scene, duration, count, quick)}
     if not quick:
@@ -53,7 +54,7 @@ def main() -> None:
     options.finish(
         {
             "duration_s": duration,
-            "runs": [run._asdict() | {"state_error": finite(run.state_error)} for run in runs],
+            "runs": runs,
             "maps": maps,
             "costs": costs,
             "pictures": pictures,
@@ -63,7 +64,7 @@ def main() -> None:
 
 def costs_of(scene: jb.Scene, methods: tuple[str, ...], quick: bool) -> dict[str, Any]:
     if quick:
-        how, size = jb.Integrator("euler", dt=1e-5), dict(single=2e-3, batch=2e-4, count=8, turns=3)
+        how, size = Integrator("euler", dt=1e-5), dict(single=2e-3, batch=2e-4, count=8, turns=3)
     else:
         how, size = COSTED, dict(single=2.0, batch=0.4408, count=1024, turns=7)
     return relative_costs(scene, methods, how, **size)  # type: ignore[arg-type]
@@ -146,14 +147,14 @@ def damping_map(scene: jb.Scene, duration: float, count: int, quick: bool) -> di
 
 
 def say(
-    options: Options, runs: list[jb.ConstraintRun], maps: dict[str, Any], costs: dict[str, Any]
+    options: Options, runs: list[dict[str, Any]], maps: dict[str, Any], costs: dict[str, Any]
 ) -> None:
     options.say("method      integrator      by  ending    violation    error   steps     time s")
     for run in runs:
         options.say(
-            f"{run.method:<11} {run.integrator:<8} {run.rtol_or_dt:>9.0e}  {run.ending:<8} "
-            f"{run.max_violation_m:>9.1e}  {run.state_error:>9.1e}  {run.steps:>7d}  "
-            f"{run.wall_s_run:>8.3f}"
+            f"{run['method']:<11} {run['integrator']:<8} {run['rtol_or_dt']:>9.0e}  "
+            f"{run['ending']:<8} {shown(run['max_violation_m'])}  {shown(run['state_error'])}  "
+            f"{run['steps']:>7d}  {run['wall_s_run']:>8.3f}"
         )
     for name, found in maps.items():
         error = np.array(found["state_error"], dtype=float)
@@ -168,19 +169,23 @@ def say(
         options.say(line)
 
 
-def draw_trade(options: Options, runs: list[jb.ConstraintRun]) -> str:
-    integrators = list(dict.fromkeys(run.integrator for run in runs))
+def shown(value: float | None) -> str:
+    return f"{'':>9}" if value is None else f"{value:>9.1e}"
+
+
+def draw_trade(options: Options, runs: list[dict[str, Any]]) -> str:
+    integrators = list(dict.fromkeys(run["integrator"] for run in runs))
     figure = new_figure(3.6 * max(len(integrators), 2), 3.8)
     axes = figure.subplots(1, len(integrators), sharey=True, squeeze=False)[0]
     names = list(jb.constraints.CONSTRAINT_METHODS)
     for ax, integrator in zip(axes, integrators, strict=True):
-        for method in dict.fromkeys(run.method for run in runs):
-            mine = [r for r in runs if r.method == method and r.integrator == integrator]
-            mine = [r for r in mine if np.isfinite(r.state_error)]
+        for method in dict.fromkeys(run["method"] for run in runs):
+            mine = [r for r in runs if (r["method"], r["integrator"]) == (method, integrator)]
+            mine = [r for r in mine if r["state_error"] is not None]
             k = names.index(method)
             ax.plot(
-                [r.wall_s_run for r in mine],
-                [r.state_error for r in mine],
+                [r["wall_s_run"] for r in mine],
+                [r["state_error"] for r in mine],
                 marker=MARKERS[k],
                 color=COLOURS[k],
                 label=method,

@@ -10,6 +10,7 @@ from _held import (
     FLOOR,
     PROJECTING,
     Curve,
+    Integrator,
     cost_lines,
     curve_of,
     relative_costs,
@@ -26,9 +27,9 @@ from _options import Options, parse
 
 import jaxbiped as jb
 
-ODE = jb.Integrator("dopri5", rtol=1e-3)
+ODE = Integrator("dopri5", rtol=1e-3)
 """What the paper's "ode" is taken for: Dormand and Prince's pair at MATLAB's usual tolerance."""
-STIFF = jb.Integrator("rodas4", rtol=1e-6)
+STIFF = Integrator("rodas4", rtol=1e-6)
 FOOTSTEP = 0.4408
 
 
@@ -43,7 +44,7 @@ def main() -> None:
         if quick
         else tuple(jb.constraints.CONSTRAINT_METHODS)
     )
-    euler, runge = jb.Integrator("euler", dt=step), jb.Integrator("runge2", dt=step)
+    euler, runge = Integrator("euler", dt=step), Integrator("runge2", dt=step)
     truth = truth_of(scene, duration)
     by_method = {name: curve_of(scene, name, euler, duration, truth) for name in methods}
     tried = {"euler": euler, "runge2": runge} | ({} if quick else {"ode": ODE, "rodas4": STIFF})
@@ -102,7 +103,7 @@ def hundred_footsteps(scene: jb.Scene) -> dict[str, Curve]:
 
 
 def costs_of(
-    scene: jb.Scene, methods: tuple[str, ...], euler: jb.Integrator, quick: bool
+    scene: jb.Scene, methods: tuple[str, ...], euler: Integrator, quick: bool
 ) -> dict[str, dict[str, float]]:
     """Times beside the standard method's by Euler steps, of one walk and in a batch."""
     count, single, batch = (64, 0.02, 1e-3) if quick else (1024, 0.05, 2e-3)

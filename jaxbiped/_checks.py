@@ -3,6 +3,7 @@
 Values that are being traced (inside `jit`, `vmap`, `grad`) have no number to check and pass.
 """
 
+import errno
 import os
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,6 +15,23 @@ import numpy as np
 
 class ArgumentError(ValueError):
     """An argument is not allowed. The message names it, its value and what is allowed."""
+
+
+class ResourceError(RuntimeError):
+    """What computes or stores has failed, such as a full disk or lost workers; no argument has.
+
+    The same call works once that is mended.
+    """
+
+
+_WRONG_PATH = ("EACCES", "EPERM", "EROFS", "ENOENT", "EEXIST", "ENOTDIR", "EISDIR", "ENAMETOOLONG")
+"""Errors of a file system where another path would do; any other is the disk's own."""
+
+
+def failure_kind(error: OSError) -> type[ArgumentError] | type[ResourceError]:
+    """Whether a path that cannot be written is to blame itself, or what it lies on."""
+    wrong = errno.errorcode.get(error.errno or 0) in _WRONG_PATH
+    return ArgumentError if wrong else ResourceError
 
 
 def is_number(value: Any) -> bool:
@@ -141,13 +159,18 @@ def check_type(name: str, value: Any, *kinds: type) -> None:
 
 
 def check_writable_directory(name: str, path: Path) -> None:
-    """Creates the directory if need be; raises `ArgumentError` where files cannot be written."""
+    """Creates the directory if need be; raises where files cannot be written.
+
+    Raises:
+        ArgumentError: the path is not allowed.
+        ResourceError: its disk is full or fails.
+    """
     allowed = "it must be a directory in which files can be written"
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = (error.strerror or "cannot be made").lower()
-        raise ArgumentError(
+        raise failure_kind(error)(
             f"{name} = {str(path)!r} is not allowed ({reason}): {allowed}."
         ) from None
     if not os.access(path, os.W_OK | os.X_OK):

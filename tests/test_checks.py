@@ -1,11 +1,16 @@
 """Bad arguments: one clear sentence that names the argument, its value and what is allowed."""
 
+import errno
+import os
+from pathlib import Path
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped._checks import check_writable_directory
 
 
 @pytest.mark.parametrize(
@@ -127,3 +132,15 @@ def test_batches_are_told_of_vmap(run, name):
 def test_traced_values_pass():
     scenes = jax.vmap(lambda K: jb.seed_scene(K=K))(jnp.array([1e5, 1e6]))
     assert scenes.normal.K.shape == (2,)
+
+
+@pytest.mark.parametrize(
+    ("code", "kind"), [(errno.EACCES, jb.ArgumentError), (errno.ENOSPC, jb.ResourceError)]
+)
+def test_a_path_is_to_blame_for_itself_and_not_for_its_disk(tmp_path, monkeypatch, code, kind):
+    def refuse(*_, **__):
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    with pytest.raises(kind, match=rf"out = .* is not allowed \({os.strerror(code).lower()}\)"):
+        check_writable_directory("out", tmp_path / "out")

@@ -5,32 +5,33 @@ import enum
 import numpy as np
 import numpy.typing as npt
 
+from jaxbiped.solve._ending import Ending
+
 WALKING_NAME = "walking period-{period}"
 """What a start that walks is called, by the footsteps in a cycle of its gait."""
 
 
 class Label(enum.IntEnum):
-    """What became of a start. `str(label)` is its name in words; codes 0 to 6 are an `Ending`'s.
+    """What became of a start. `str(label)` is its name in words; every `Ending` is a label.
 
     - walking: it converges to a periodic gait; see the gait for its period.
-    - fell forward, fell back, stopped, stumbled: as in `Ending`.
-    - out of steps: the cap on the solver's steps was reached, or no footstep came in all the time
-      allowed for one.
-    - solver failed: the state is no longer a number.
+    - fell forward, fell back, stopped, stumbled, out of steps, solver failed, timed out: as in
+      `Ending`.
     - slid: a foot slid along the ground by more than a leg's length between two footsteps.
     - unresolved: all the footsteps asked for were walked, and nothing was certain yet.
     - pending: not labelled yet.
     """
 
-    WALKING = 0
-    FELL_FORWARD = 1
-    FELL_BACK = 2
-    STOPPED = 3
-    STUMBLED = 4
-    OUT_OF_STEPS = 5
-    SOLVER_FAILED = 6
+    WALKING = Ending.WALKING.value
+    FELL_FORWARD = Ending.FELL_FORWARD.value
+    FELL_BACK = Ending.FELL_BACK.value
+    STOPPED = Ending.STOPPED.value
+    STUMBLED = Ending.STUMBLED.value
+    OUT_OF_STEPS = Ending.OUT_OF_STEPS.value
+    SOLVER_FAILED = Ending.SOLVER_FAILED.value
     SLID = 7
     UNRESOLVED = 8
+    TIMED_OUT = Ending.TIMED_OUT.value
     PENDING = -1
 
     def __str__(self) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import tyro
 from tyro.conf import subcommand
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, ResourceError
 from jaxbiped._progress import tell_stages
 from jaxbiped.cli._basin import Basin
 from jaxbiped.cli._constraints import Constraints
@@ -28,7 +28,10 @@ _Command = (
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Runs a command and exits; with 2 and one sentence for an argument that is not allowed."""
+    """Runs a command and exits.
+
+    With one sentence and 2 for an argument that is not allowed, 1 for a full disk or lost workers.
+    """
     given = sys.argv[1:] if arguments is None else list(arguments)
     command = None if given == ["--version"] else _parse(given)
     if command is None:
@@ -39,9 +42,9 @@ def main(arguments: list[str] | None = None) -> None:
     tell_stages()
     try:
         sys.exit(command.run())
-    except ArgumentError as error:
+    except (ArgumentError, ResourceError, OSError) as error:
         print(f"jaxbiped: {error}", file=sys.stderr)
-        sys.exit(2)
+        sys.exit(2 if isinstance(error, ArgumentError) else 1)
 
 
 def _parse(arguments: list[str]) -> Any:

@@ -7,16 +7,12 @@ from typing import Annotated, Any
 
 from tyro.conf import OmitArgPrefixes
 
-from jaxbiped._checks import ArgumentError, check_choice, check_positive
+from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive
+from jaxbiped.cli._constraint_comparison import ConstraintRun, Integrator, compare_constraints
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.constraints._constraint_methods import CONSTRAINT_METHODS
 from jaxbiped.scene._scene import Scene
-from jaxbiped.simulate._compare_constraints import (
-    ConstraintRun,
-    Integrator,
-    compare_constraints,
-)
 
 _MOST_ROWS = 200
 
@@ -38,6 +34,8 @@ class Constraints:
     """Each SOLVER:TOLERANCE, or SOLVER:dt=STEP for steps of one size [s]."""
     duration: float = 0.5
     """Simulated time [s]."""
+    repeats: int = 3
+    """Runs of which the fastest counts."""
     out: Path | None = None
     """Folder for the picture."""
     json: Path | None = None
@@ -53,6 +51,7 @@ class Constraints:
         for name in self.methods:
             check_choice("methods", name, CONSTRAINT_METHODS)
         check_positive("duration", self.duration, "s")
+        check_count("repeats", self.repeats)
         integrators = [Integrator.read(text) for text in self.integrators]
         OutputOptions(out=self.out, json=self.json).check()
         runs = compare_constraints(
@@ -60,7 +59,8 @@ class Constraints:
             self.start.state(scene),
             duration=self.duration,
             integrators=integrators,
-            methods={name: name for name in self.methods},
+            methods=self.methods,
+            repeats=self.repeats,
             progress=True,
         )
         report = Report(self.json)
@@ -68,13 +68,14 @@ class Constraints:
         report.say(
             f"{self.duration:g} s from the start; errors against the minimal formulation at 1e-10"
         )
+        numbers = run_numbers(runs)
         if self.out is not None:
-            report.say(f"wrote {write_picture(runs, self.out)}")
-        report.finish({"duration_s": self.duration, "runs": run_numbers(runs)})
+            report.say(f"wrote {write_picture(numbers, self.out)}")
+        report.finish({"duration_s": self.duration, "runs": numbers})
         return 0
 
 
-def write_picture(runs: list[ConstraintRun], out: Path) -> Path:
+def write_picture(runs: list[dict[str, Any]], out: Path) -> Path:
     """Writes the comparison as a picture; returns its path."""
     from jaxbiped import plot
 

@@ -1,10 +1,11 @@
 """Constraint methods: the interface of what holds constraints in redundant coordinates."""
 
 import abc
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 
 import equinox as eqx
 
+from jaxbiped._checks import check_at_least
 from jaxbiped._parameter import check_parameters
 from jaxbiped._types import Scalar
 from jaxbiped.linalg._symmetric import factorise, solve
@@ -105,6 +106,23 @@ def stabilised(system: Constrained, damping: Scalar, stiffness: Scalar) -> list[
 def inverse_masses(masses: list[Scalar]) -> list[Scalar]:
     """The diagonal of M⁻¹."""
     return [1.0 / mass for mass in masses]
+
+
+class AbstractExactProjection(AbstractProjectingMethod):
+    """The exact multipliers within a step, and after it a projection in a metric of its own.
+
+    Raises:
+        ArgumentError: fewer than one iteration.
+    """
+
+    iterations: int = eqx.field(static=True, default=2)
+    needs_independent: ClassVar[bool] = True
+
+    def __check_init__(self) -> None:
+        check_at_least("iterations", self.iterations, "1", 1)
+
+    def multipliers(self, system: Constrained) -> list[Scalar]:
+        return exact_multipliers(system)
 
 
 def exact_multipliers(system: Constrained, right: list[Scalar] | None = None) -> list[Scalar]:

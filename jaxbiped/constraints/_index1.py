@@ -1,22 +1,15 @@
 """Projection after each step: the paper's "index1"."""
 
-from typing import ClassVar
-
-import equinox as eqx
-
-from jaxbiped._checks import check_at_least
 from jaxbiped._types import Scalar
 from jaxbiped.constraints._constraint_method import (
-    AbstractProjectingMethod,
-    Constrained,
+    AbstractExactProjection,
     Row,
-    exact_multipliers,
     inverse_masses,
     projection,
 )
 
 
-class Index1(AbstractProjectingMethod):
+class Index1(AbstractExactProjection):
     """`Standard` within the step; after it q and q̇ are projected in the mass metric.
 
     Δq = −M⁻¹Jᵀ(J M⁻¹ Jᵀ)⁻¹ Φ, repeated, then likewise q̇ with Φ̇.
@@ -30,15 +23,6 @@ class Index1(AbstractProjectingMethod):
     Raises:
         ArgumentError: fewer than one iteration.
     """
-
-    iterations: int = eqx.field(static=True, default=2)
-    needs_independent: ClassVar[bool] = True
-
-    def __check_init__(self) -> None:
-        check_at_least("iterations", self.iterations, "1", 1)
-
-    def multipliers(self, system: Constrained) -> list[Scalar]:
-        return exact_multipliers(system)
 
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
         return projection(rows, inverse_masses(masses), residual)

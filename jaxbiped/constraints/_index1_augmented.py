@@ -1,28 +1,18 @@
 """Augmented Lagrangian with projections: the paper's "index1aug"."""
 
-from typing import ClassVar
-
-import equinox as eqx
-
-from jaxbiped._checks import check_at_least
-from jaxbiped._parameter import parameter
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Scalar
 from jaxbiped.constraints._constraint_method import (
     AbstractProjectingMethod,
-    Constrained,
     Row,
     applied_impulse,
     gram,
     inverse_masses,
 )
-from jaxbiped.constraints._penalised import (
-    augmented_multipliers,
-    iterate_multipliers,
-)
+from jaxbiped.constraints._penalised import AbstractAugmented, iterate_multipliers
 from jaxbiped.linalg._symmetric import factorise
 
 
-class Index1Augmented(AbstractProjectingMethod):
+class Index1Augmented(AbstractAugmented, AbstractProjectingMethod):
     """`Augmented` within the step; after it q and q̇ are projected in the mass metric.
 
     The projections are augmented Lagrangian iterations themselves, (M + A JᵀJ) Δq = −A Jᵀ Φ and
@@ -39,20 +29,6 @@ class Index1Augmented(AbstractProjectingMethod):
     Raises:
         ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
     """
-
-    A: Parameter = parameter("penalty", "$A$", "kg", positive=True, default=1e7)
-    omega: Parameter = parameter(
-        "constraint frequency", r"$\omega$", "1/s", minimum=0.0, default=10.0
-    )
-    zeta: Parameter = parameter("constraint damping ratio", r"$\zeta$", minimum=0.0, default=1.0)
-    iterations: int = eqx.field(static=True, default=3)
-    needs_independent: ClassVar[bool] = False
-
-    def __check_init__(self) -> None:
-        check_at_least("iterations", self.iterations, "1", 1)
-
-    def multipliers(self, system: Constrained) -> list[Scalar]:
-        return augmented_multipliers(system, self.A, self.omega, self.zeta, self.iterations)
 
     def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
         weights = inverse_masses(masses)

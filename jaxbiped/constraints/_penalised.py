@@ -1,7 +1,19 @@
 """Penalty and augmented Lagrangian systems, shared by the methods that use them."""
 
-from jaxbiped._types import Scalar
-from jaxbiped.constraints._constraint_method import Constrained, gram, inverse_masses, stabilised
+from typing import ClassVar
+
+import equinox as eqx
+
+from jaxbiped._checks import check_at_least
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
+from jaxbiped.constraints._constraint_method import (
+    AbstractConstraintMethod,
+    Constrained,
+    gram,
+    inverse_masses,
+    stabilised,
+)
 from jaxbiped.linalg._symmetric import Factors, factorise, solve
 
 
@@ -17,14 +29,28 @@ def penalty_system(
     return factorise(gram(system.rows, inverse_masses(system.masses), 1.0 / A)), right
 
 
-def augmented_multipliers(
-    system: Constrained, A: Scalar, omega: Scalar, zeta: Scalar, iterations: int
-) -> list[Scalar]:
-    """λ of the augmented Lagrangian: the penalty's, and again for what that leaves."""
-    factors, right = penalty_system(system, A, omega, zeta)
-    return iterate_multipliers(
-        factors, gram(system.rows, inverse_masses(system.masses)), right, iterations
+class AbstractAugmented(AbstractConstraintMethod):
+    """Accelerations by the augmented Lagrangian: the penalty's, and again for what that leaves.
+
+    Raises:
+        ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
+    """
+
+    A: Parameter = parameter("penalty", "$A$", "kg", positive=True, default=1e7)
+    omega: Parameter = parameter(
+        "constraint frequency", r"$\omega$", "1/s", minimum=0.0, default=10.0
     )
+    zeta: Parameter = parameter("constraint damping ratio", r"$\zeta$", minimum=0.0, default=1.0)
+    iterations: int = eqx.field(static=True, default=3)
+    needs_independent: ClassVar[bool] = False
+
+    def __check_init__(self) -> None:
+        check_at_least("iterations", self.iterations, "1", 1)
+
+    def multipliers(self, system: Constrained) -> list[Scalar]:
+        factors, right = penalty_system(system, self.A, self.omega, self.zeta)
+        matrix = gram(system.rows, inverse_masses(system.masses))
+        return iterate_multipliers(factors, matrix, right, self.iterations)
 
 
 def iterate_multipliers(

@@ -2,11 +2,16 @@
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 
+from jaxbiped._checks import ArgumentError
+from jaxbiped.gait._gradient_modes import AbstractGradient, Reverse
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._hybrid_system import AbstractSystem
 
 
 def orbit_engine(
@@ -15,7 +20,7 @@ def orbit_engine(
     solver: Any,
     section: Any,
     leaves: Any,
-    own_system: bool = False,
+    system: AbstractSystem | None = None,
     redundant: bool = False,
 ) -> str:
     """The engine that "auto" stands for, or the one that is asked for.
@@ -25,7 +30,7 @@ def orbit_engine(
         solver, section: the orbit's.
         leaves: all numbers that are given.
         redundant: whether the motion is solved in redundant coordinates.
-        own_system: whether the system is the user's own; nobody knows if lanes can express it.
+        system: the user's own, where it is: nobody knows if lanes can express it.
 
     Raises:
         ArgumentError: an unknown name, or lanes for what they cannot do.
@@ -33,7 +38,24 @@ def orbit_engine(
     obstacle = _hindrance(solver, section, leaves)
     if redundant:
         obstacle = "redundant coordinates are diffrax's"
-    return engine_for(engine, obstacle=obstacle, prefers_xla=own_system)
+    elif holds_arrays(system):
+        obstacle = f"the system {type(system).__name__} holds arrays, which belong in args"
+    return engine_for(engine, obstacle=obstacle, prefers_xla=system is not None)
+
+
+def check_holds_none(gradient: AbstractGradient, system: Any, section: Any) -> None:
+    """Raises `ArgumentError` for reverse mode where a system or section holds arrays."""
+    holder = next((each for each in (system, section) if holds_arrays(each)), None)
+    if isinstance(gradient, Reverse) and holder is not None:
+        raise ArgumentError(
+            f"gradient = Reverse() is not allowed here: {type(holder).__name__} holds arrays, "
+            "which belong in args."
+        )
+
+
+def holds_arrays(tree: Any) -> bool:
+    """Whether there are arrays, known or traced, among the leaves."""
+    return any(isinstance(leaf, jax.Array | np.ndarray) for leaf in jtu.tree_leaves(tree))
 
 
 def _hindrance(solver: Any, section: Any, leaves: Any) -> str | None:

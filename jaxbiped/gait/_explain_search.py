@@ -75,7 +75,7 @@ def _branch(scene: Any, gait: Gait) -> str:
 
 
 _HOW = {
-    Ending.OUT_OF_STEPS: "makes no more footsteps",
+    Ending.TIMED_OUT: "makes no more footsteps",
     Ending.FELL_FORWARD: "falls forward",
     Ending.FELL_BACK: "falls back",
     Ending.STOPPED: "stops",

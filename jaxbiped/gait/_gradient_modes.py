@@ -1,4 +1,4 @@
-"""Gradient modes: how a derivative is taken, and what each can do."""
+"""Gradient modes: how a derivative is taken, and where."""
 
 from typing import TYPE_CHECKING
 
@@ -16,16 +16,12 @@ else:
 
 
 class AbstractGradient(eqx.Module):
-    """A way to take derivatives. Each declares what it supports.
+    """A way to take derivatives.
 
     Attributes:
-        forward: whether `jax.jvp` and `jax.jacfwd` work.
-        reverse: whether `jax.vjp`, `jax.grad` and `jax.jacrev` work.
         anywhere: whether it works off a periodic orbit.
     """
 
-    forward: AbstractClassVar[bool]
-    reverse: AbstractClassVar[bool]
     anywhere: AbstractClassVar[bool]
 
 
@@ -36,8 +32,6 @@ class Forward(AbstractGradient):
     all share one.
     """
 
-    forward: ClassVar[bool] = True
-    reverse: ClassVar[bool] = False
     anywhere: ClassVar[bool] = True
 
 
@@ -50,8 +44,6 @@ class Reverse(AbstractGradient):
     carried along the motion, as `Forward` does, and transposed.
     """
 
-    forward: ClassVar[bool] = False
-    reverse: ClassVar[bool] = True
     anywhere: ClassVar[bool] = True
 
 
@@ -61,8 +53,6 @@ class Implicit(AbstractGradient):
     First derivatives only: a second one is refused.
     """
 
-    forward: ClassVar[bool] = True
-    reverse: ClassVar[bool] = True
     anywhere: ClassVar[bool] = False
 
 

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
@@ -42,7 +43,12 @@ def forward_by_xla(
 @forward_by_xla.def_jvp
 def _by_xla_forward_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
     spec, precision, args, state = primals
-    _, _, args_dot, state_dot = tangents
+    spec_dot, _, args_dot, state_dot = tangents
+    if jtu.tree_leaves((spec_dot.system, spec_dot.section)):
+        raise ArgumentError(
+            f"{type(spec.system).__name__} or {type(spec.section).__name__} holds what is "
+            "differentiated: it must be among args, whose derivatives are carried."
+        )
     args_leaves = jtu.tree_leaves(args)
     column = jnp.stack(_dense(state_dot, state))[:, None]
     seeds = _dense(args_dot, args)

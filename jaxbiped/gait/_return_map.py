@@ -12,7 +12,7 @@ from jaxbiped._checks import check_choice, check_positive
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.gait._engine import orbit_engine
+from jaxbiped.gait._engine import check_holds_none, orbit_engine
 from jaxbiped.gait._gradient_modes import AbstractGradient, Forward, Reverse, check_anywhere
 from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._return_by_lanes import forward_by_lanes, reverse_by_lanes
@@ -97,13 +97,14 @@ def return_map(
     if enters:
         state = redundant_state(args, state)
     section = section_of(args, section)
+    check_holds_none(gradient, system, section)
     method = orbit_solver(solver, rigid=is_rigid(args))
     by = orbit_engine(
         engine,
         solver=method,
         section=section,
         leaves=(args, state),
-        own_system=system is not None,
+        system=system,
         redundant=redundant,
     )
     if redundant:

@@ -13,6 +13,7 @@ _COLOURS = {
     str(Label.OUT_OF_STEPS): "#8C8C8C",
     str(Label.SOLVER_FAILED): "#000000",
     str(Label.UNRESOLVED): "#4D4D4D",
+    str(Label.TIMED_OUT): "#B4B4B4",
     str(Label.PENDING): "#E8E8E8",
 }
 """Okabe and Ito's colours, told apart by colour-blind readers; greys where nothing is known."""

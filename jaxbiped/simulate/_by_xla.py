@@ -30,9 +30,9 @@ def by_xla(run: "Simulation") -> Trajectory:
     if run.dt is not None:
         controller = diffrax.ConstantStepSize()
     if run.steps is not None:
-        controller = FootstepLimit.around(controller, run.steps)
+        controller = FootstepLimit(controller, run.steps)
     if run.extremes is not None:
-        controller = Extremes.around(controller, run.extremes)
+        controller = Extremes(controller, run.extremes)
     events = ending_events(run.watch)
     zero = jnp.zeros_like(run.duration)
     solver: Any = run.solver
@@ -85,15 +85,15 @@ def _ending(
     results = diffrax.RESULTS
     out_of_steps: Any = solution.result == results.max_steps_reached
     done: Any = solution.result == results.successful
+    timed_out = jnp.zeros_like(done)
     if run.steps is not None:
         _, _, count = control
         # Time ran out before the footsteps came, where only footsteps were asked for.
-        patience_ended = done & (count < run.steps) & (run.duration >= PATIENCE * run.steps)
-        out_of_steps = out_of_steps | patience_ended
-        done = (done & ~patience_ended) | (solution.result == results.event_occurred)
+        timed_out = done & (count < run.steps) & (run.duration >= PATIENCE * run.steps)
+        done = (done & ~timed_out) | (solution.result == results.event_occurred)
     masks: Any = solution.event_mask
     events = dict(zip(names, masks or [], strict=True))
-    return ending_code(events, done=done, out_of_steps=out_of_steps)
+    return ending_code(events, done=done, out_of_steps=out_of_steps, timed_out=timed_out)
 
 
 def trim(trajectory: Trajectory) -> Trajectory:

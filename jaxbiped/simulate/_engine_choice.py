@@ -21,7 +21,6 @@ def choose_engine(
     leaves: Any,
     times: Any,
     section: AbstractSection | None,
-    extremes: Any,
     dt: Any = None,
     redundant: bool = False,
 ) -> str:
@@ -35,22 +34,15 @@ def choose_engine(
     if redundant or dt is not None:
         what = "redundant coordinates are" if redundant else "steps of one size (dt) are"
         obstacle = f"{what} diffrax's"
-    by_diffrax = redundant or dt is not None
-    by_lanes_only = _by_lanes_only(section, None if by_diffrax else extremes)
-    if by_lanes_only is None:
+    if section is None:
         return engine_for(engine, obstacle=obstacle, prefers_xla=traced)
     check_choice("engine", engine, ENGINES)
     if engine == "xla" or obstacle is not None:
         why = f"here {obstacle}" if obstacle is not None else 'engine = "xla" was chosen'
-        raise ArgumentError(f"{by_lanes_only} is not allowed here: only lanes do that, and {why}.")
+        raise ArgumentError(
+            f"save = {type(section).__name__}() is not allowed here: only lanes do that, and {why}."
+        )
     return "lanes"
-
-
-def _by_lanes_only(section: AbstractSection | None, extremes: Any) -> str | None:
-    """What is asked for that only lanes can do."""
-    if section is not None:
-        return f"save = {type(section).__name__}()"
-    return None if extremes is None else "extremes"
 
 
 def _hindrance(

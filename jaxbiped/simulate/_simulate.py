@@ -54,7 +54,7 @@ def simulate(
     dt: float | None = None,
     save: Literal["steps", "end"] | Array | AbstractSection = "steps",
     most_arrivals: int = 64,
-    extremes: Callable[[Scene, State], PyTree] | None = None,
+    extremes: Callable[..., PyTree] | None = None,
     watch: tuple[str, ...] = WATCHES,
     max_solver_steps: int = 65536,
     adjoint: diffrax.AbstractAdjoint | None = None,
@@ -91,7 +91,7 @@ def simulate(
             turns there as in `return_map`, but the states saved keep their own names.
         most_arrivals: how many arrivals at a section there is room for.
         extremes: a function of (scene, state) whose least and largest values, number by number,
-            over the ends of all steps are wanted (by lanes, or of a redundant scene).
+            over the ends of all steps are wanted.
         watch: which failures end the solve: any of "fall", "stop", "stumble".
         max_solver_steps: cap on the solver's attempted steps.
         adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
@@ -168,7 +168,7 @@ class Simulation(eqx.Module):
     replaceable: bool = eqx.field(static=True)
     section: AbstractSection | None = eqx.field(static=True)
     most_arrivals: int = eqx.field(static=True)
-    extremes: Callable[[Scene, State], PyTree] | None = eqx.field(static=True)
+    extremes: Callable[..., PyTree] | None = eqx.field(static=True)
 
     @staticmethod
     def prepare(
@@ -184,7 +184,7 @@ class Simulation(eqx.Module):
         dt: float | None = None,
         save: Any = "steps",
         most_arrivals: int = 64,
-        extremes: Callable[[Scene, State], PyTree] | None = None,
+        extremes: Callable[..., PyTree] | None = None,
         watch: tuple[str, ...] = WATCHES,
         max_solver_steps: int = 65536,
         adjoint: diffrax.AbstractAdjoint | None = None,
@@ -244,7 +244,6 @@ class Simulation(eqx.Module):
             redundant=scene.redundant,
             times=save,
             section=section,
-            extremes=extremes,
         )
         return Simulation(
             scene=jtu.tree_map(cast, scene),
@@ -263,7 +262,7 @@ class Simulation(eqx.Module):
             watch=tuple(watch),
             max_solver_steps=int(max_solver_steps),
             engine=chosen,
-            replaceable=engine == "auto" and section is None and extremes is None,
+            replaceable=engine == "auto" and section is None,
             section=section,
             most_arrivals=int(most_arrivals),
             extremes=extremes,

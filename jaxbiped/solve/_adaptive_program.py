@@ -187,14 +187,17 @@ class AdaptiveSolve:
 
     def finish(self, solve: Solve, now: _Now) -> Solved:
         done = (now.t >= solve.duration) | now.counted
+        timed_out = jnp.asarray(False)
         if self.counting:
             _, _, count = now.control
             few = count.astype(solve.footsteps.dtype) < solve.footsteps
-            done = done & ~(few & (solve.duration >= solve.patience))
+            timed_out = done & few & (solve.duration >= solve.patience)
+            done = done & ~timed_out
         code = ending_code(
             dict(zip(self.events, now.events, strict=True)),
             done=done,
             out_of_steps=jnp.asarray(True),
+            timed_out=timed_out,
         )
         low, high = (None, None) if now.extremes is None else now.extremes
         return Solved(now.t, now.state, code, now.accepted, now.rejected, low, high)
@@ -224,7 +227,7 @@ class AdaptiveSolve:
         if not self.counting:
             return control
         limit: Any = solve.footsteps
-        return FootstepLimit.around(control, limit)
+        return FootstepLimit(control, limit)
 
     def _error_order(self) -> Any:
         return self.solver.error_order(_TERM)

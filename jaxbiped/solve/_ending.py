@@ -42,9 +42,9 @@ class Ending(enum.IntEnum):
       would then lose its ground and sink), or the whole walker stands still on the ground.
     - stumbled: the foot behind came down, moving forward, while the one ahead carried; or the
       swing leg was so barred before it had passed the other.
-    - out of steps: the solver's cap on steps was reached, or no footstep came in all the time
-      allowed for it.
+    - out of steps: the solver's cap on steps was reached.
     - solver failed: the state is no longer a number.
+    - timed out: no footstep, or no arrival at a section, came in all the time allowed for it.
     """
 
     WALKING = 0
@@ -54,6 +54,7 @@ class Ending(enum.IntEnum):
     STUMBLED = 4
     OUT_OF_STEPS = 5
     SOLVER_FAILED = 6
+    TIMED_OUT = 9  # 7 and 8 are labels that no single simulation ends with
 
     def __str__(self) -> str:
         return self.name.lower().replace("_", " ")
@@ -185,16 +186,20 @@ def ending_events(watch: tuple[str, ...]) -> dict[Ending, Callable[..., Any]]:
     return events
 
 
-def ending_code(events: dict[Ending, Any], *, done: Scalar, out_of_steps: Scalar) -> Scalar:
+def ending_code(
+    events: dict[Ending, Any], *, done: Scalar, out_of_steps: Scalar, timed_out: Scalar
+) -> Scalar:
     """The code of how a solve ended.
 
     Args:
-        events: for each misfortune, whether it happened (boolean).
+        events: for each failure, whether it happened (boolean).
         done: whether the solve came to the end that was asked for.
-        out_of_steps: whether it came to its cap on steps, or waited too long for a footstep.
+        out_of_steps: whether it came to its cap on steps.
+        timed_out: whether it waited too long for a footstep.
     """
     code = jnp.asarray(int(Ending.SOLVER_FAILED))
     code = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), code)
+    code = jnp.where(timed_out, int(Ending.TIMED_OUT), code)
     code = jnp.where(done, int(Ending.WALKING), code)
     for name, happened in events.items():
         code = jnp.where(happened, int(name), code)

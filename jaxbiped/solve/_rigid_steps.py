@@ -146,7 +146,7 @@ def ending_of(walk: RigidWalk, now: RigidProgress, waits: Scalar) -> Scalar:
     """Code of the `Ending`; `waits`: whether the duration only bounds the wait for footsteps."""
     few = now.footsteps.astype(now.t.dtype) < walk.footsteps
     late = (now.code == 0) & few & waits
-    return jnp.where(late, int(Ending.OUT_OF_STEPS), now.code)
+    return jnp.where(late, int(Ending.TIMED_OUT), now.code)
 
 
 class _Strike(NamedTuple):

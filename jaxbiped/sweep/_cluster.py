@@ -6,7 +6,7 @@ import os
 from concurrent.futures import Executor, ProcessPoolExecutor
 from typing import Any
 
-from jaxbiped._checks import ArgumentError, check_positive
+from jaxbiped._checks import ArgumentError, ResourceError, check_positive
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.compiler import THREADS_VARIABLE, default_threads
 
@@ -25,14 +25,14 @@ def cluster_executor(address: str, *, timeout: float = 10.0) -> tuple[Executor, 
         The executor and the number of the workers' threads. `shutdown` ends neither of them.
 
     Raises:
-        ArgumentError: the package distributed is missing, no scheduler answers, or it has no
-            workers.
+        ArgumentError: no scheduler answers at this address.
+        ResourceError: the package distributed is missing, or the scheduler has no workers.
     """
     check_positive("timeout", timeout, "s")
     try:
         distributed: Any = importlib.import_module("distributed")
     except ImportError:
-        raise ArgumentError(
+        raise ResourceError(
             f"scheduler = {address!r} needs the package distributed: pip install jaxbiped[sweep]."
         ) from None
     try:
@@ -46,7 +46,7 @@ def cluster_executor(address: str, *, timeout: float = 10.0) -> tuple[Executor, 
     threads = sum(client.nthreads().values())
     if not threads:
         client.close()
-        raise ArgumentError(
+        raise ResourceError(
             f"scheduler = {address!r} has no workers: start at least one dask worker for it."
         )
     return client.get_executor(pure=False, retries=_RETRIES), threads

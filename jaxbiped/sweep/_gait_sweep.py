@@ -68,7 +68,8 @@ def gait_sweep(
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled; a store of
-            other settings, or one that cannot be written.
+            other settings, or one that may not be written.
+        ResourceError: a full disk. What is in the store stays.
     """
     check_type("scene", scene, Scene, RigidScene, RedundantScene)
     values = _check_values(scene, over)

@@ -131,7 +131,7 @@ class CompliantLabelling(AbstractLabellingLoop):
         assert now.landed is not None
         landed, slid = slip_distances(solve.scene, after.state, now.landed)
         late = after.t - strike > start.patience
-        verdict = jnp.where(late, int(Label.OUT_OF_STEPS), trace.verdict)
+        verdict = jnp.where(late, int(Label.TIMED_OUT), trace.verdict)
         verdict = jnp.where(slid > solve.scene.walker.l, int(Label.SLID), verdict)
         trace = trace._replace(verdict=verdict)
         return Progress(after, trace, strike, landed), over | (verdict != UNDECIDED)
@@ -230,7 +230,7 @@ class RigidLabelling(AbstractLabellingLoop):
         trace = _trace_or(after.struck, on_section, now.trace)
         strike = jnp.where(after.struck, after.t, now.strike)
         late = after.t - strike > start.patience
-        verdict = jnp.where(late, int(Label.OUT_OF_STEPS), trace.verdict)
+        verdict = jnp.where(late, int(Label.TIMED_OUT), trace.verdict)
         trace = trace._replace(verdict=verdict)
         return Progress(after, trace, strike, None), over | (verdict != UNDECIDED)
 

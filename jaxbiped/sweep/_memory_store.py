@@ -1,24 +1,26 @@
 """Memory store: results of a sweep without a disk."""
 
 import json
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jaxbiped.sweep._array_layout import Layout, empty_dataset
 from jaxbiped.sweep._same_store import SETTINGS
+from jaxbiped.sweep._store import AbstractStore
 
 if TYPE_CHECKING:
     import xarray
 
 
-class Memory:
-    """Arrays for all results; see `Store`."""
+class MemoryStore(AbstractStore):
+    """Arrays for all results; without a disk none is ever complete beforehand."""
 
-    def __init__(self, layout: Layout, settings: dict[str, Any], attributes: dict[str, Any]):
+    def __init__(self, layout: Layout, settings: dict[str, Any], attributes: Mapping[str, str]):
         self.layout = layout
         self._dataset = empty_dataset(layout)
-        self._dataset.attrs = attributes | {SETTINGS: json.dumps(settings)}
+        self._dataset.attrs = dict(attributes) | {SETTINGS: json.dumps(settings)}
         for name in self._dataset.data_vars:
             self._dataset[name].data = np.array(self._dataset[name].data)
 
@@ -28,7 +30,7 @@ class Memory:
     def unsettled(self) -> np.ndarray:
         return self.missing()
 
-    def write(self, chunk: int, fields: dict[str, np.ndarray], *, settled: bool = False) -> None:
+    def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, settled: bool = False) -> None:
         region, shape = self.layout.region(chunk), self.layout.shape_of(chunk)
         for name, values in fields.items():
             self._dataset[name].data[region] = np.reshape(values, shape)
@@ -37,11 +39,12 @@ class Memory:
         region = self.layout.region(chunk)
         return {name: self._dataset[name].data[region].flatten() for name in names}
 
-    def note(self, attributes: dict[str, Any]) -> None:
+    def note(self, attributes: Mapping[str, str | float]) -> None:
         self._dataset.attrs.update(attributes)
 
-    def noted(self, name: str) -> Any:
-        return self._dataset.attrs.get(name)
+    def noted(self, name: str) -> str | None:
+        text = self._dataset.attrs.get(name)
+        return None if text is None else str(text)
 
     def dataset(self) -> "xarray.Dataset":
         return self._dataset

@@ -4,7 +4,7 @@ import json
 import time
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from tqdm import tqdm
@@ -14,12 +14,13 @@ from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label import Label
 from jaxbiped.sweep._array_layout import FIELDS, Layout, fields_of
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._memory_store import Memory
+from jaxbiped.sweep._memory_store import MemoryStore
 from jaxbiped.sweep._prepare import Guesses, guesses_among, with_gaits_met, with_guesses
 from jaxbiped.sweep._provenance import provenance
 from jaxbiped.sweep._same_store import GAITS
+from jaxbiped.sweep._store import AbstractStore
 from jaxbiped.sweep._workers import compute_chunks
-from jaxbiped.sweep._zarr_store import Store, check_store
+from jaxbiped.sweep._zarr_store import ZarrStore, check_store
 from jaxbiped.sweep.starts._coordinates import coordinate_quantities
 from jaxbiped.sweep.starts._starts import AbstractStarts
 
@@ -71,8 +72,8 @@ def sweep(
 
     Raises:
         ArgumentError: an argument that is not allowed; a store of other settings or another
-            version, or one that cannot be written; workers that were lost. What is in the store
-            stays.
+            version, or one that may not be written.
+        ResourceError: a full disk, or workers that were lost. What is in the store stays.
     """
     check_type("labelling", labelling, Labelling)
     check_type("starts", starts, AbstractStarts)
@@ -89,25 +90,25 @@ def sweep(
     own = {"starts": starts.described(), "chunk_shape": list(layout.chunk_shape)}
     writer = provenance(labelling.scene, labelling.effort.solver, starts)
     if store is not None:
-        Store.check(Path(store), labelling.settings() | own, writer, any_version=any_version)
+        ZarrStore.check(Path(store), labelling.settings() | own, writer, any_version=any_version)
     known = with_gaits_met(labelling, starts) if look_for_gaits else labelling
     settings = known.settings() | own
-    sink: Any = (
-        Memory(layout, settings, writer)
+    results: AbstractStore = (
+        MemoryStore(layout, settings, writer)
         if store is None
-        else Store.open(Path(store), layout, settings, writer, any_version=any_version)
+        else ZarrStore.open(Path(store), layout, settings, writer, any_version=any_version)
     )
-    missing = sink.missing()
+    missing = results.missing()
     sizes = layout.sizes
     fresh = int(sizes[missing].sum())
     with tqdm(total=starts.size, unit="starts", disable=not progress, smoothing=0.05) as bar:
         bar.update(starts.size - fresh)
         for number, fields in compute_chunks(known, layout, missing, executor, int(workers)):
-            sink.write(number, fields)
+            results.write(number, fields)
             bar.update(int(sizes[number]))
     if look_for_gaits:
-        known = _resolve(known, layout, sink)
-    sink.note(
+        known = _resolve(known, layout, results)
+    results.note(
         {
             GAITS: json.dumps(known.family.described()),
             "labelled_in_this_run": fresh,
@@ -115,28 +116,27 @@ def sweep(
             "wall_s": time.perf_counter() - began,
         }
     )
-    dataset: xarray.Dataset = sink.dataset()
-    return dataset
+    return results.dataset()
 
 
-def _resolve(labelling: Labelling, layout: Layout, sink: Any) -> Labelling:
+def _resolve(labelling: Labelling, layout: Layout, results: AbstractStore) -> Labelling:
     """Seeks gaits from starts that are unresolved but repeat a cycle; labels the unresolved anew.
 
     Where they were sought is noted first: a run that is killed here finds the same ones again,
     whatever is labelled anew by then.
     """
-    noted = sink.noted(_GUESSES)
+    noted = results.noted(_GUESSES)
     if noted is None:
-        guesses = _guesses(labelling, layout, sink)
-        sink.note({_GUESSES: json.dumps(guesses)})
+        guesses = _guesses(labelling, layout, results)
+        results.note({_GUESSES: json.dumps(guesses)})
     else:
         guesses = {int(row): each for row, each in json.loads(noted).items()}
     known = with_guesses(labelling, guesses)
     if [len(row) for row in known.family.rows] == [len(row) for row in labelling.family.rows]:
         return labelling
     moved = labelling.family.places_in(known.family)
-    for chunk in map(int, sink.unsettled()):
-        fields = sink.read(chunk, (*FIELDS, *(f"start_{x}" for x in layout.starts.own_columns)))
+    for chunk in map(int, results.unsettled()):
+        fields = results.read(chunk, (*FIELDS, *(f"start_{x}" for x in layout.starts.own_columns)))
         places = np.flatnonzero(fields["label"] == int(Label.UNRESOLVED))
         met = fields["gait"] >= 0
         fields["gait"][met] = moved[fields["gait"][met]]
@@ -146,13 +146,13 @@ def _resolve(labelling: Labelling, layout: Layout, sink: Any) -> Labelling:
             for name, values in fields_of(layout.starts, found, batch).items():
                 fields[name][places] = values
         if len(places) or met.any():
-            sink.write(chunk, fields, settled=True)
+            results.write(chunk, fields, settled=True)
     return known
 
 
-def _guesses(labelling: Labelling, layout: Layout, sink: Any) -> Guesses:
+def _guesses(labelling: Labelling, layout: Layout, results: AbstractStore) -> Guesses:
     """From some of the starts that are open, evenly spread over all of them."""
-    counts = np.array([len(_open(sink, chunk)) for chunk in range(layout.chunks)])
+    counts = np.array([len(_open(results, chunk)) for chunk in range(layout.chunks)])
     before = np.cumsum(counts) - counts
     total = int(counts.sum())
     if not total:
@@ -162,12 +162,12 @@ def _guesses(labelling: Labelling, layout: Layout, sink: Any) -> Guesses:
     for chunk in range(layout.chunks):
         own = chosen[(chosen >= before[chunk]) & (chosen < before[chunk] + counts[chunk])]
         if len(own):
-            numbers.append(layout.numbers(chunk)[0] + _open(sink, chunk)[own - before[chunk]])
+            numbers.append(layout.numbers(chunk)[0] + _open(results, chunk)[own - before[chunk]])
     return guesses_among(labelling, layout.starts, np.concatenate(numbers))
 
 
-def _open(sink: Any, chunk: int) -> np.ndarray:
+def _open(results: AbstractStore, chunk: int) -> np.ndarray:
     """Places of a chunk's starts that are unresolved but repeat a cycle."""
-    fields = sink.read(chunk, ("label", "period"))
+    fields = results.read(chunk, ("label", "period"))
     unresolved = fields["label"] == int(Label.UNRESOLVED)
     return np.asarray(np.flatnonzero(unresolved & (fields["period"] > 0)))

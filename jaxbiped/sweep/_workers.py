@@ -15,7 +15,7 @@ from concurrent.futures import (
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, ResourceError
 from jaxbiped.sweep._array_layout import Layout, fields_of
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._given_starts import GivenStarts
@@ -37,7 +37,8 @@ def compute_chunks(
     """Chunks and their fields as they are ready, a few at a time for each worker.
 
     Raises:
-        ArgumentError: the workers were lost, or cannot be sent the starts.
+        ArgumentError: the workers cannot be sent the starts.
+        ResourceError: the workers were lost.
     """
     if executor is None:
         for chunk in map(int, chunks):
@@ -85,8 +86,6 @@ def _submit(executor: Executor, labelling: Labelling, layout: Layout, chunk: int
 def _result(executor: Executor, future: Future[Fields]) -> Fields:
     try:
         return future.result()
-    except ArgumentError:
-        raise
     except (BrokenExecutor, CancelledError, OSError) as error:
         raise _lost(executor, error) from None
     except Exception as error:
@@ -96,9 +95,9 @@ def _result(executor: Executor, future: Future[Fields]) -> Fields:
         raise
 
 
-def _lost(executor: Executor, error: BaseException) -> ArgumentError:
+def _lost(executor: Executor, error: BaseException) -> ResourceError:
     what = " ".join(str(error).split()) or type(error).__name__
-    return ArgumentError(
+    return ResourceError(
         f"executor = {type(executor).__name__} lost its workers ({what[:200].rstrip('.')}): start "
         "it anew and run again; the chunks that are complete stay in the store."
     )

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, ResourceError, failure_kind
 from jaxbiped.sweep._array_layout import Layout, empty_dataset
 from jaxbiped.sweep._same_store import ALSO, GAITS, SETTINGS, check_same, check_writers
+from jaxbiped.sweep._store import AbstractStore
 
 if TYPE_CHECKING:
     import xarray
@@ -22,8 +23,8 @@ _SETTLED = 2
 """Mark of a chunk that was gone over again after gaits were found late."""
 
 
-class Store:
-    """An open store. `Store.open` makes a new one or continues one with the same settings.
+class ZarrStore(AbstractStore):
+    """An open store on a disk. `open` makes a new one or continues one with the same settings.
 
     It holds what `xarray.open_zarr` opens: an array for each field, a coordinate for each axis,
     and `done`, which says for each chunk whether it is complete.
@@ -45,7 +46,7 @@ class Store:
         writer: Mapping[str, str],
         *,
         any_version: bool = False,
-    ) -> "Store":
+    ) -> "ZarrStore":
         """Opens a store.
 
         Args:
@@ -58,7 +59,8 @@ class Store:
 
         Raises:
             ArgumentError: the directory holds something else, or a store made with other settings
-                or by another version, or cannot be written.
+                or by another version, or may not be written.
+            ResourceError: its disk is full or fails.
         """
         check_store(path)
         path = path.absolute()
@@ -67,7 +69,7 @@ class Store:
                 _create(path, layout, settings, writer)
             check_same(path, settings)
             new = check_writers(path, writer, any_version)
-            store = Store(path, layout)
+            store = ZarrStore(path, layout)
         except OSError as error:
             raise unwritable(path, error) from None
         if new:
@@ -93,19 +95,12 @@ class Store:
             raise unwritable(path, error) from None
 
     def missing(self) -> np.ndarray:
-        """Numbers of the chunks that are not complete."""
         return np.flatnonzero(self._done == 0)
 
     def unsettled(self) -> np.ndarray:
-        """Numbers of the chunks that were not written with all gaits known."""
         return np.flatnonzero(self._done < _SETTLED)
 
     def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, settled: bool = False) -> None:
-        """Writes a chunk, then marks it as complete; `settled` where all gaits are known by now.
-
-        Raises:
-            ArgumentError: it cannot be written; what was written before stays.
-        """
         region = self.layout.region(chunk)
         shape = self.layout.shape_of(chunk)
         try:
@@ -123,28 +118,21 @@ class Store:
         self._group[_DONE][chunk] = complete
 
     def read(self, chunk: int, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-        """These fields of one chunk, flat."""
         region = self.layout.region(chunk)
         return {name: np.array(self._group[name][region]).ravel() for name in names}
 
-    def note(self, attributes: Mapping[str, Any]) -> None:
-        """Sets attributes.
-
-        Raises:
-            ArgumentError: they cannot be written.
-        """
+    def note(self, attributes: Mapping[str, str | float]) -> None:
         try:
             self._group.attrs.update(dict(attributes))
             consolidate(self.path)
         except OSError as error:
             raise unwritable(self.path, error) from None
 
-    def noted(self, name: str) -> Any:
-        """An attribute, None where it is not there."""
-        return self._group.attrs.get(name)
+    def noted(self, name: str) -> str | None:
+        text = self._group.attrs.get(name)
+        return None if text is None else str(text)
 
     def dataset(self) -> "xarray.Dataset":
-        """The results, opened lazily."""
         return open_store(self.path)
 
 
@@ -165,10 +153,10 @@ def open_store(path: Path) -> "xarray.Dataset":
     return xarray.open_zarr(path, chunks=None)
 
 
-def unwritable(path: Path, error: OSError) -> ArgumentError:
+def unwritable(path: Path, error: OSError) -> ArgumentError | ResourceError:
     """The sentence for a store that cannot be written."""
     why = (error.strerror or str(error)).lower()
-    return ArgumentError(
+    return failure_kind(error)(
         f"store = {str(path)!r} cannot be written ({why}): it must be a directory on a disk with "
         "room; the chunks that are complete stay."
     )

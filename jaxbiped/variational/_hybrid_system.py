@@ -32,7 +32,8 @@ class AbstractSystem(eqx.Module):
     """An autonomous system whose periodic orbits can be found and differentiated.
 
     The state is a pytree of scalars, and so are the parameters `args`. Subclass it to study a
-    system of your own: the walker is only one of them, `Walking`.
+    system of your own: the walker is only one of them, `Walking`. Numbers that are to be
+    differentiated belong in `args`; a system that holds arrays itself is XLA's, forwards only.
 
     Attributes:
         cyclic_coordinates: positions of the leaves that need not return, only advance: no rate may

@@ -120,7 +120,8 @@ def solve_to_section(
     controller: Any = step_control(precision.rtol, 1e-2 * precision.rtol, norm, carried)
     field: Any = watch.field
     if carries:
-        controller = TangentControl.around(controller, precision.tangent_rtol, units)
+        inverse = jnp.stack(jtu.tree_leaves(units.inverse))
+        controller = TangentControl(controller, precision.tangent_rtol, inverse)
         solver = TangentSolver(watch, solver, columns_only_choose_steps)
         field = VariationalField(watch.field)
     end = diffrax.SubSaveAt(t1=True)
@@ -136,7 +137,7 @@ def solve_to_section(
         y0=y0,
         args=args,
         saveat=diffrax.SaveAt(subs=subs, controller_state=True),
-        stepsize_controller=SwitchLocator.around(controller, watch),
+        stepsize_controller=SwitchLocator(controller, watch),
         max_steps=max_solver_steps,
         throw=False,
     )
@@ -177,11 +178,10 @@ def _plain_node(t: Any, y: Any, args: Any) -> PyTree:
 
 def _code(solution: diffrax.Solution, landed: SwitchLocatorState) -> Scalar:
     results = diffrax.RESULTS
-    out_of_steps = (solution.result == results.max_steps_reached) | (
-        solution.result == results.successful
-    )
-    failed = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), int(Ending.SOLVER_FAILED))
-    ended = jnp.where(landed.code != 0, landed.code, failed)
+    out_of_steps = solution.result == results.max_steps_reached
+    ended = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), int(Ending.SOLVER_FAILED))
+    ended = jnp.where(solution.result == results.successful, int(Ending.TIMED_OUT), ended)
+    ended = jnp.where(landed.code != 0, landed.code, ended)
     return jnp.where(landed.arrived, 0, ended)
 
 

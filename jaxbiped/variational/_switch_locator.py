@@ -17,6 +17,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
 from jaxbiped.variational._tangents import Seeded, Tangents
 
 _OVERSHOOT = 1e-4
@@ -76,7 +77,7 @@ class SwitchLocatorState(NamedTuple):
     at_peak: Any
 
 
-class SwitchLocator(diffrax.AbstractAdaptiveStepSizeController):
+class SwitchLocator(AbstractWrappedControl):
     """Wraps a controller; a step that crosses a switch is tried again, to end just past it.
 
     So no step straddles a jump of the Jacobian, which would ruin derivatives taken through the
@@ -85,20 +86,8 @@ class SwitchLocator(diffrax.AbstractAdaptiveStepSizeController):
     counts as an arrival, so a solve may start on its section.
     """
 
-    rtol: Any
-    atol: Any
-    norm: Callable[[PyTree], Any]
     controller: Any
     watch: Watch
-
-    @staticmethod
-    def around(controller: Any, watch: Watch) -> "SwitchLocator":
-        """Wraps a controller."""
-        return SwitchLocator(controller.rtol, controller.atol, controller.norm, controller, watch)
-
-    def wrap(self, direction: Any) -> "SwitchLocator":
-        """As diffrax asks; direction makes no difference here."""
-        return self
 
     def init(self, terms: Any, t0: Any, t1: Any, y0: Any, dt0: Any, args: Any, *rest: Any) -> Any:
         """The first step's end and the controller's state, as diffrax asks."""

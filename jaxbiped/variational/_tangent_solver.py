@@ -17,7 +17,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._projected_solver import Projected
-from jaxbiped.solve._units import Units
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._rosenbrock_tangents import rosenbrock_tangents
 from jaxbiped.variational._saltation import has_saltation, jump_surface_values, saltation_at
@@ -141,7 +141,7 @@ def _tangent_step(
     return Tangents(y1, as_columns(columns)), Tangents(error, as_columns(column_errors))
 
 
-class TangentControl(diffrax.AbstractAdaptiveStepSizeController):
+class TangentControl(AbstractWrappedControl):
     """Lets the columns' errors into a controller's norm, with a tolerance of their own.
 
     An entry's error is measured against its own size, a share of the largest entry of its column,
@@ -149,33 +149,18 @@ class TangentControl(diffrax.AbstractAdaptiveStepSizeController):
     choose the steps.
 
     Attributes:
-        controller: decides every step's size from the worse of the state's and the columns' norm.
+        controller: decides every step's size; its norm is `worst_norm`.
         tangent_rtol: tolerance of the columns, relative.
         inverse_units: of the state's leaves, shape (c,).
     """
 
-    rtol: Any
-    atol: Any
-    norm: Callable[[PyTree], Any]
     controller: Any
     tangent_rtol: Any
     inverse_units: Any
 
-    @staticmethod
-    def around(controller: Any, tangent_rtol: Any, units: Units) -> "TangentControl":
-        """Wraps a controller whose norm is `worst_norm`."""
-        each = jnp.stack(jtu.tree_leaves(units.inverse))
-        return TangentControl(
-            controller.rtol, controller.atol, controller.norm, controller, tangent_rtol, each
-        )
-
-    def wrap(self, direction: Any) -> "TangentControl":
-        """As diffrax asks; direction makes no difference here."""
-        return self
-
-    def init(self, terms: Any, t0: Any, t1: Any, y0: Any, dt0: Any, *rest: Any) -> Any:
+    def init(self, *request: Any) -> Any:
         """The first step's end and the controller's state, as diffrax asks."""
-        return self.controller.init(terms, t0, t1, y0, dt0, *rest)
+        return self.controller.init(*request)
 
     def adapt_step_size(
         self,

@@ -134,7 +134,9 @@ class AdaptiveColumns:
         return after, over
 
     def finish(self, given: VariationalProblem, now: _Now) -> VariationalSolution:
-        ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), int(Ending.OUT_OF_STEPS))
+        late = now.t >= given.time_limit
+        ended = jnp.where(late, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
+        ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), ended)
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
         by_state, by_parameter = now.columns
         by_parameter = jnp.where(given.carries_parameters > 0.0, by_parameter, jnp.nan)
@@ -247,7 +249,7 @@ class AdaptiveColumns:
             return jnp.maximum(rms_norm(error), columns_norm)
 
         control = step_control(given.rtol, 1e-2 * given.rtol, norm, given.units)
-        return SwitchLocator.around(control, self.watch)
+        return SwitchLocator(control, self.watch)
 
 
 def _select(keep: Scalar, new: Any, old: Any) -> Any:

@@ -1,6 +1,8 @@
 """`jaxbiped basin` as a user meets it."""
 
+import errno
 import json
+import os
 
 import numpy as np
 import pytest
@@ -152,3 +154,17 @@ def test_one_sentence_for_bad_files(text, sentence, tmp_path, capsys):
     (tmp_path / "starts.csv").write_text(text)
     assert _run("--starts", tmp_path / "starts.csv") == 2
     assert sentence in capsys.readouterr().err
+
+
+def test_a_full_disk_is_no_argument_of_ours(basin, tmp_path, monkeypatch, capsys):
+    """One sentence and exit code 1, not the 2 of what may be mended by another argument."""
+
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(zarr.Group, "create_array", full)
+    assert _run(*AXES, "--store", tmp_path / "store") == 1
+    assert capsys.readouterr().err.splitlines()[-1].startswith("jaxbiped: store = ")
+    monkeypatch.setattr(plot, "basin", full)
+    assert _run(*AXES, "--out", tmp_path / "out") == 1
+    assert "No space left on device" in capsys.readouterr().err.splitlines()[-1]

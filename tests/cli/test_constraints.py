@@ -42,6 +42,26 @@ def test_compares_methods_and_integrators(capsys, tmp_path):
     assert runs[0]["steps"] == pytest.approx(5000, abs=2)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--integrators", "euler:fast"), "write SOLVER:TOLERANCE or SOLVER:dt=STEP"),
+        (("--methods", "glue"), "methods = 'glue'"),
+        (("--repeats", "0"), "repeats = 0 is not allowed"),
+        (("--duration", "-1"), "duration = -1 is not allowed"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(arguments, said, capsys):
+    assert _run("constraints", *arguments) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_the_comparison_is_the_commands_own():
+    """A benchmark is no part of the package's interface."""
+    for name in ("compare_constraints", "ConstraintRun", "Integrator"):
+        assert not hasattr(jb, name)
+
+
 def test_flags_build_the_scene():
     scene = SceneOptions(formulation="redundant", method="baumgarte", orientation="euler").scene()
     assert isinstance(scene, jb.RedundantScene)

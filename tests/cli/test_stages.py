@@ -28,7 +28,7 @@ class _ReachedError(Exception):
         (["models"], "cli._models", "operation_counts", "counting"),
         (
             ["constraints"],
-            "simulate._compare_constraints",
+            "cli._constraint_comparison",
             "final_truth",
             "minimal formulation",
         ),

@@ -2,6 +2,7 @@
 
 import functools
 import math
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +16,7 @@ from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._fixed_point_search import search
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._orbit import orbit_of
-from jaxbiped.gait._precision import precision_of
+from jaxbiped.gait._precision import MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 
 
@@ -250,12 +251,66 @@ def test_modes_that_do_not_fit_are_refused():
             jax.jvp(reversible, (state[1],), (state[1],))
 
 
-def test_what_does_not_return_says_so():
+def test_what_does_not_return_says_so(monkeypatch):
     up = jb.Section(lambda args, y: y[0] - 100.0)
     args = (0.3, 0.8, 1.0)
     state = (jnp.asarray(0.0), jnp.asarray(3.0))
-    found = jb.return_map(args, state, section=up, system=Ball(), time_limit=1.0)
-    assert jb.Ending(int(found.code)) == jb.Ending.OUT_OF_STEPS
+    for most, ending in ((4096, jb.Ending.TIMED_OUT), (2, jb.Ending.OUT_OF_STEPS)):
+        monkeypatch.setitem(MOST_SOLVER_STEPS, "balanced", most)
+        for engine in ("lanes", "xla"):
+            options = dict(section=up, system=Ball(), time_limit=1.0, engine=engine)
+            found = jb.return_map(args, state, **options)
+            assert jb.Ending(int(found.code)) is ending
+
+
+class Held(Flowing):
+    """The oscillator with its frequency as a field, given ζ alone."""
+
+    omega: Any
+
+    def vector_field(self, t, y, args):
+        return Oscillator().vector_field(t, y, (self.omega, args))
+
+
+class Level(jb.dynamics.AbstractSection):
+    """Upwards through a level of the velocity."""
+
+    level: Any
+
+    def value(self, args, y):
+        return y[1] - self.level
+
+    def counts(self, args, y):
+        return jnp.asarray(True)
+
+
+def _swung(omega, zeta, section=TURNING_POINT, **options):
+    start = (jnp.asarray(1.0), jnp.asarray(0.0))
+    return jb.return_map(zeta, start, section=section, system=Held(omega), **options).time
+
+
+def test_a_system_may_hold_a_number_and_by_xla_an_array():
+    zeta = jnp.asarray(0.1)
+    exact = math.pi / (2.0 * math.sqrt(1.0 - 0.01))
+    assert float(_swung(jnp.asarray(2.0), zeta)) == pytest.approx(exact, rel=1e-6)
+    assert float(_swung(2.0, zeta, engine="lanes")) == pytest.approx(exact, rel=1e-6)
+    slope = jax.jacfwd(lambda z: _swung(jnp.asarray(2.0), z))(zeta)
+    assert float(slope) == pytest.approx(exact * 0.1 / 0.99, rel=1e-5)
+
+
+def test_what_systems_and_sections_hold_is_refused_where_it_would_not_be_seen():
+    """By lanes, in reverse mode, and where it is differentiated: before anything is compiled."""
+    omega, zeta = jnp.asarray(2.0), jnp.asarray(0.1)
+    with pytest.raises(jb.ArgumentError, match='"lanes" is not allowed here: the system Held'):
+        _swung(omega, zeta, engine="lanes")
+    with pytest.raises(jb.ArgumentError, match="Held holds arrays, which belong in args"):
+        _swung(omega, zeta, gradient=jb.Reverse())
+    with pytest.raises(jb.ArgumentError, match="Level holds arrays, which belong in args"):
+        _swung(2.0, zeta, section=Level(omega), gradient=jb.Reverse())
+    with pytest.raises(jb.ArgumentError, match=r"Held or .* must be among args"):
+        jax.jacfwd(lambda held: _swung(held, zeta))(omega)
+    with pytest.raises(jb.ArgumentError, match=r"or Level holds .* must be among args"):
+        jax.jacfwd(lambda level: _swung(2.0, zeta, section=Level(level)))(zeta)
 
 
 class Step(Flowing):

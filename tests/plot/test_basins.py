@@ -114,11 +114,11 @@ def test_gaits_of_one_period_have_shades_of_their_own():
 
 
 def test_all_labels_at_once_and_nothing_is_cut_off(tmp_path):
-    labels = np.arange(-1, 9)[:, None] * np.ones((1, 12), dtype=int)
-    period = np.tile(np.arange(1, 7), (10, 2))
-    figure = basin(labels, np.arange(12.0), np.arange(10.0), period=period, mark=(0, 9), **AXES)
+    labels = np.arange(-1, 10)[:, None] * np.ones((1, 12), dtype=int)
+    period = np.tile(np.arange(1, 7), (11, 2))
+    figure = basin(labels, np.arange(12.0), np.arange(11.0), period=period, mark=(0, 9), **AXES)
     assert isinstance(figure, Figure)
-    assert len(_legend(figure.axes[0])) == 9 + 6 + 1
+    assert len(_legend(figure.axes[0])) == 10 + 6 + 1
     _nothing_is_cut_off(figure)
     figure.savefig(tmp_path / "basin.png")
     assert (tmp_path / "basin.png").stat().st_size > 5000

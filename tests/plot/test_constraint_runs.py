@@ -20,7 +20,7 @@ def _run(method="standard", integrator="rodas4", by=1e-6, **changes):
         wall_s_run=0.01,
         steps=80,
     )
-    return jb.ConstraintRun(**(known | changes))
+    return known | changes
 
 
 def _marks(ax, label):
@@ -32,7 +32,7 @@ def test_a_row_for_each_method_and_a_mark_for_each_integrator(tmp_path):
         _run(),
         _run("index1", max_violation_m=0.0, state_error=2e-7),
         _run(integrator="euler", by=1e-5, wall_s_run=0.02),
-        _run("index1", "euler", 1e-5, ending="failed", state_error=float("nan")),
+        _run("index1", "euler", 1e-5, ending="failed", state_error=None),
     ]
     figure = constraint_runs(runs)
     assert isinstance(figure, Figure)

@@ -1,4 +1,4 @@
-"""Saving arrivals at sections, and extremes, by lanes."""
+"""Saving arrivals at sections, by lanes, and extremes, by both engines."""
 
 import jax
 import jax.numpy as jnp
@@ -61,18 +61,43 @@ def test_any_function_is_a_section():
     np.testing.assert_allclose(walk.state.hip_vz[:count], 0.0, atol=1e-10)
 
 
-def test_extremes_are_those_of_the_steps(seed_walk):
+@pytest.mark.parametrize("engine", ["lanes", "xla"])
+def test_extremes_are_those_of_the_steps(seed_walk, engine):
     _, whole = seed_walk
-    walk = _walk(save="end", extremes=_heights)
+    walk = _walk(save="end", extremes=_heights, engine=engine)
+    assert walk.engine == engine
     for found, reduce in ((walk.lowest, np.min), (walk.highest, np.max)):
         assert found["hip"] == pytest.approx(float(reduce(whole.state.hip_z)), abs=1e-6)
         assert found["speeds"][0] == pytest.approx(float(reduce(whole.state.hip_vx)), abs=1e-4)
 
 
-def test_extremes_beside_every_step():
-    walk = _walk(extremes=_heights)
+def test_extremes_by_both_engines_agree():
+    """To the tolerance: rounding decides on the steps, and extremes are taken at their ends."""
+    lanes, xla = (_walk(save="end", steps=2, extremes=_heights, engine=e) for e in ("lanes", "xla"))
+    for ours, theirs in zip(
+        jax.tree.leaves((lanes.lowest, lanes.highest)),
+        jax.tree.leaves((xla.lowest, xla.highest)),
+        strict=True,
+    ):
+        np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        dict(engine="lanes"),
+        dict(engine="xla"),
+        dict(solver="kvaerno3", accuracy="fast", duration=0.3),
+        dict(solver="euler", dt=1e-6, duration=0.05, max_solver_steps=1 << 16),
+    ],
+    ids=["lanes", "xla", "kvaerno3", "dt"],
+)
+def test_extremes_beside_every_step(options):
+    walk = _walk(extremes=_heights, **options)
+    assert walk.outcome is jb.Ending.WALKING
     for found, reduce in ((walk.lowest, np.min), (walk.highest, np.max)):
         assert float(found["hip"]) == float(reduce(walk.state.hip_z))
+        assert float(found["speeds"][1]) == float(reduce(walk.state.omega_1))
 
 
 def test_many_give_what_each_gives_alone():
@@ -100,7 +125,7 @@ def test_many_give_what_each_gives_alone():
     ("options", "sentence"),
     [
         (dict(save=jb.HeelStrike(), engine="xla"), "only lanes do that"),
-        (dict(save="end", extremes=_heights, solver="kvaerno3"), "Kvaerno3 is not one"),
+        (dict(save=jb.HeelStrike(), solver="kvaerno3"), "Kvaerno3 is not one"),
         (dict(save=jb.MidStance(), most_arrivals=0), "most_arrivals = 0 is not allowed"),
         (dict(save=jb.MidStance(), engine="fast"), "choose one of auto, xla, lanes"),
     ],

@@ -52,7 +52,7 @@ def test_a_walker_at_rest_waits_in_vain(engine):
     scene = jb.RigidScene(walker=walker, ground=jb.Ground(slope=0.0))
     state = jb.dynamics.RigidState(*map(jnp.asarray, (0.0,) * 5))
     walk = jb.rigid_walk(scene, state, steps=1, engine=engine)
-    assert walk.outcome is jb.Ending.OUT_OF_STEPS
+    assert walk.outcome is jb.Ending.TIMED_OUT
     assert int(walk.footsteps) == 0
     assert float(walk.t) == pytest.approx(50.0 * np.sqrt(0.4 / 9.8), rel=1e-12)
     assert [float(leaf) for leaf in walk.state] == [0.0] * 5

@@ -42,6 +42,26 @@ def test_out_of_steps():
     assert _walk(0.02, duration=None, steps=100, max_solver_steps=50).outcome == Ending.OUT_OF_STEPS
 
 
+@pytest.mark.parametrize("engine", ["lanes", "xla"])
+def test_waiting_in_vain_is_not_the_cap_on_steps(engine):
+    """Let down on both feet, legs astride, nothing ever comes down again."""
+    seed = jb.seed_scene(slope=0.0)
+    coulomb = jb.laws.RegularisedCoulomb(mu=0.8, v_d=1e-3)
+    scene = jb.Scene(seed.walker, seed.ground, seed.normal, coulomb, jb.laws.AlwaysTouching())
+    start = _state(
+        theta_1=0.3, theta_2=-0.3, omega_1=0.0, omega_2=0.0, hip_vx=0.0, hip_vz=0.0,
+        hip_z=float(jb.dynamics.standing_height(scene, jnp.asarray(0.3), 4e-4)),
+    )  # fmt: skip
+    options = {"save": "end", "watch": ("fall",), "engine": engine}
+    waiting = jb.simulate(scene, start, steps=1, **options)
+    assert waiting.outcome is Ending.TIMED_OUT
+    assert float(waiting.t[-1]) == 100.0
+    capped = jb.simulate(scene, start, steps=1, max_solver_steps=5, **options)
+    assert capped.outcome is Ending.OUT_OF_STEPS
+    bounded = jb.simulate(scene, start, steps=1, duration=1.0, **options)
+    assert bounded.outcome is Ending.WALKING
+
+
 def _state(**values):
     return jb.seed_state()._replace(**{name: jnp.asarray(v) for name, v in values.items()})
 
@@ -93,4 +113,6 @@ def test_names_in_words():
         "stumbled",
         "out of steps",
         "solver failed",
+        "timed out",
     ]
+    assert [int(ending) for ending in Ending] == [0, 1, 2, 3, 4, 5, 6, 9]

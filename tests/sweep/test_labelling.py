@@ -97,6 +97,29 @@ def test_a_start_without_any_verdict_is_unresolved_and_a_cap_is_told(simplest):
     assert (capped.names[0], capped.attempts[0]) == ("out of steps", 5)
 
 
+def test_a_walker_at_rest_is_given_up_after_the_longest_wait_for_a_footstep():
+    walker = jb.Walker(m=1.0, J=0.01, l=0.4, d=0.3, r=0.35)
+    scene = jb.RigidScene(walker=walker, ground=jb.Ground(slope=0.0))
+    at_rest = jb.dynamics.RigidState(*[np.zeros(())] * 5)
+    found = gaitless(scene, at_rest)(stacked([at_rest]))
+    assert found.names[0] == "timed out"
+    assert found.footsteps[0] == 0
+    assert found.time[0] >= 50.0 * np.sqrt(0.4 / 9.8)
+
+
+def test_every_ending_is_a_label_and_stored_codes_keep_their_meaning():
+    for ending in jb.Ending:
+        assert jb.basins.Label[ending.name].value == ending.value
+        assert str(jb.basins.Label(ending.value)) == str(ending)
+    own = {
+        label.name: int(label)
+        for label in jb.basins.Label
+        if label.name not in jb.Ending.__members__
+    }
+    assert own == {"SLID": 7, "UNRESOLVED": 8, "PENDING": -1}
+    assert (int(jb.basins.Label.OUT_OF_STEPS), int(jb.basins.Label.SOLVER_FAILED)) == (5, 6)
+
+
 def test_the_gait_itself_walks_and_its_rate_is_not_made_up(simplest, seed):
     for labelling in (simplest, seed):
         found = labelling(labelling.base({}, 1))

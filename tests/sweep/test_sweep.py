@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.sweep._zarr_store import Store
+from jaxbiped.sweep._zarr_store import ZarrStore
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same_results, simplest_grid
 
@@ -65,7 +65,7 @@ def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, write
     expected = jb.sweep(LABELLING, STARTS, chunk=8)
     assert jb.basins.Label.WALKING in expected.label
     assert len(json.loads(expected.attrs["gaits"])[0]["gaits"]) == 1
-    write, count = Store.write, []
+    write, count = ZarrStore.write, []
 
     def killing(self, chunk, fields, **settled):
         count.append(chunk)
@@ -76,10 +76,10 @@ def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, write
             raise _Killed
         write(self, chunk, fields, **settled)
 
-    monkeypatch.setattr(Store, "write", killing)
+    monkeypatch.setattr(ZarrStore, "write", killing)
     with pytest.raises(_Killed):
         jb.sweep(LABELLING, STARTS, store=path, chunk=8)
-    monkeypatch.setattr(Store, "write", write)
+    monkeypatch.setattr(ZarrStore, "write", write)
     same_results(jb.sweep(LABELLING, STARTS, store=path, chunk=8), expected)
 
 

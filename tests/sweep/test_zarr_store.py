@@ -17,7 +17,7 @@ import xarray as xr
 import zarr
 
 import jaxbiped as jb
-from jaxbiped.sweep._zarr_store import Store
+from jaxbiped.sweep._zarr_store import ZarrStore
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same_results, simplest_grid
 
@@ -165,15 +165,15 @@ def _full(*_, **__):
 
 
 def test_a_full_disk_is_told_and_what_is_complete_stays(tmp_path, monkeypatch):
-    path, mark, marked = tmp_path / "store", Store._mark, []
+    path, mark, marked = tmp_path / "store", ZarrStore._mark, []
 
     def filling(self, chunk, complete):
         marked.append(chunk)
         (_full if len(marked) > 2 else mark)(self, chunk, complete)
 
     with monkeypatch.context() as patched:
-        patched.setattr(Store, "_mark", filling)
-        with pytest.raises(jb.ArgumentError) as raised:
+        patched.setattr(ZarrStore, "_mark", filling)
+        with pytest.raises(jb.ResourceError) as raised:
             _swept(path)
     sentence = str(raised.value)
     assert f"store = {str(path)!r} cannot be written (no space left on device)" in sentence
@@ -187,7 +187,7 @@ def test_a_full_disk_is_told_and_what_is_complete_stays(tmp_path, monkeypatch):
 def test_a_disk_too_full_to_begin_leaves_nothing(tmp_path, monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr(zarr.Group, "create_array", _full)
-        with pytest.raises(jb.ArgumentError, match=r"cannot be written \(no space left"):
+        with pytest.raises(jb.ResourceError, match=r"cannot be written \(no space left"):
             _swept(tmp_path / "store")
     assert list(tmp_path.iterdir()) == []
 

@@ -22,7 +22,6 @@ class MachineCode:
 
     Attributes:
         address: of its entry.
-        instructions: how many machine instructions it has; None where it came from disk.
     """
 
     def __init__(self, engine: Any, entry: str) -> None:

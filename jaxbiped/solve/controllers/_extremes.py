@@ -3,46 +3,26 @@
 from collections.abc import Callable
 from typing import Any
 
-import diffrax
 import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
 
 
-class Extremes(diffrax.AbstractAdaptiveStepSizeController):
+class Extremes(AbstractWrappedControl):
     """Wraps a controller; keeps the least and largest values at the ends of the accepted steps.
 
     Exact for every solver, and without room for the steps themselves. The start counts as an end.
 
     Attributes:
-        rtol, atol, norm: the controller's own, where diffrax looks for them.
         controller: decides every step's size.
         function: of (args, state).
     """
 
-    rtol: Any
-    atol: Any
-    norm: Callable[[PyTree], Any]
     controller: Any
     function: Callable[[PyTree, PyTree], PyTree] = eqx.field(static=True)
-
-    @staticmethod
-    def around(controller: Any, function: Callable[[PyTree, PyTree], PyTree]) -> "Extremes":
-        """Wraps a controller."""
-        return Extremes(
-            rtol=getattr(controller, "rtol", 0.0),  # steps of one size have no tolerances
-            atol=getattr(controller, "atol", 0.0),
-            norm=getattr(controller, "norm", rms_norm),
-            controller=controller,
-            function=function,
-        )
-
-    def wrap(self, direction: Any) -> "Extremes":
-        """As diffrax asks; direction makes no difference here."""
-        return Extremes.around(self.controller.wrap(direction), self.function)
 
     def init(
         self, terms: Any, t0: Any, t1: Any, y0: PyTree, dt0: Any, args: Any, *rest: Any

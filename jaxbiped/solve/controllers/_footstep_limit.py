@@ -1,52 +1,31 @@
 """Footstep limit: a step-size controller that ends the solve after enough footsteps."""
 
-from collections.abc import Callable
 from typing import Any
 
 import diffrax
 import jax.numpy as jnp
-from jaxtyping import PyTree
 
 from jaxbiped.dynamics._feet import feet, landings, standing_foot
 from jaxbiped.dynamics._state import State
-from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
 
 PATIENCE = 100.0
 """Time allowed for each footstep asked for [s]."""
 
 
-class FootstepLimit(diffrax.AbstractAdaptiveStepSizeController):
+class FootstepLimit(AbstractWrappedControl):
     """Wraps a controller; ends the solve at the end of the step with the last heel strike.
 
     Its state carries what no function of the walker's state can tell: which foot struck last, and
     how many strikes there were. The solve's `args` must be the scene.
 
     Attributes:
-        rtol, atol, norm: the controller's own, where diffrax looks for them.
         controller: decides every step's size.
         limit: number of heel strikes after which the solve ends.
     """
 
-    rtol: Any
-    atol: Any
-    norm: Callable[[PyTree], Any]
     controller: Any
     limit: Any
-
-    @staticmethod
-    def around(controller: Any, limit: Any) -> "FootstepLimit":
-        """Wraps a controller."""
-        return FootstepLimit(
-            rtol=getattr(controller, "rtol", 0.0),  # steps of one size have no tolerances
-            atol=getattr(controller, "atol", 0.0),
-            norm=getattr(controller, "norm", rms_norm),
-            controller=controller,
-            limit=limit,
-        )
-
-    def wrap(self, direction: Any) -> "FootstepLimit":
-        """As diffrax asks; direction makes no difference here."""
-        return FootstepLimit.around(self.controller.wrap(direction), self.limit)
 
     def init(
         self,

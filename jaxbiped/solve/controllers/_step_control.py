@@ -10,6 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.solve._units import Units
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
 
 _FIRST_STEP = 1e-5
 """First step tried, in units of time; a start that is not a number must not choose it."""
@@ -40,7 +41,7 @@ def step_control(
         safety=_SAFETY,
         force_dtmin=True,  # a state that is no longer a number ends the solve in another way
     )
-    return control if units is None else InUnits(rtol, atol, norm, control, units.inverse)
+    return control if units is None else InUnits(control, units.inverse)
 
 
 def first_step(duration: Scalar, time_unit: Any = 1.0) -> Scalar:
@@ -48,24 +49,16 @@ def first_step(duration: Scalar, time_unit: Any = 1.0) -> Scalar:
     return jnp.minimum(jnp.full_like(duration, _FIRST_STEP) * time_unit, duration)
 
 
-class InUnits(diffrax.AbstractAdaptiveStepSizeController):
+class InUnits(AbstractWrappedControl):
     """Wraps a controller; shows it states and errors in units of their own.
 
     Attributes:
-        rtol, atol, norm: the controller's own, where diffrax looks for them.
         controller: decides every step's size.
         inverse: one over the unit of each leaf of the state.
     """
 
-    rtol: Any
-    atol: Any
-    norm: Callable[[PyTree], Any]
     controller: Any
     inverse: PyTree
-
-    def wrap(self, direction: Any) -> "InUnits":
-        """As diffrax asks; direction makes no difference here."""
-        return self
 
     def init(self, *request: Any) -> Any:
         """The first step's end and the controller's state, as diffrax asks."""

@@ -6,7 +6,6 @@ from jaxbiped._checks import check_choice, check_positive
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene.laws._abstract_laws import (
-    AbstractNormalLaw,
     depth_in_contact,
     hertz_energy,
     hertz_force,
@@ -14,10 +13,10 @@ from jaxbiped.scene.laws._abstract_laws import (
     pushing,
 )
 from jaxbiped.scene.laws.normal._restitution import RESTITUTION_FORMULAS
-from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
+from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw
 
 
-class HuntCrossley(AbstractNormalLaw):
+class HuntCrossley(AbstractDampedLaw):
     """F_N = K δⁿ (1 + hysteresis δ̇) while δ > 0, never below zero (no adhesion).
 
     The literature writes χ/v⁻ for the hysteresis, with a factor χ that depends on the restitution
@@ -71,32 +70,9 @@ class HuntCrossley(AbstractNormalLaw):
         check_positive("approach_speed", speed, "m/s")
         return cls(K=K, hysteresis=RESTITUTION_FORMULAS[formula](e) / speed, n=n)
 
-    @classmethod
-    def from_weight(
-        cls,
-        *,
-        mass: Parameter,
-        penetration: Parameter,
-        damping_ratio: Parameter,
-        g: Parameter = 9.8,
-        n: Parameter = 1.5,
-    ) -> Self:
-        """The law on which a mass stands and oscillates as told.
-
-        Args:
-            mass: what stands on the law [kg].
-            penetration: how deep it stands [m].
-            damping_ratio: of small oscillations about that [–].
-            g: gravitational acceleration [m/s²].
-            n: exponent [–].
-
-        Raises:
-            ArgumentError: mass, penetration or g not above 0, damping_ratio below 0, n below 1.
-        """
-        K, damper = matched_to_weight(
-            mass=mass, penetration=penetration, damping_ratio=damping_ratio, g=g, n=n
-        )
-        return cls(K=K, hysteresis=damper / (as_float(mass) * as_float(g)), n=n)
+    @staticmethod
+    def damping_coefficient(damper: Scalar, penetration: Scalar, weight: Scalar) -> Scalar:
+        return damper / weight
 
     def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
         depth = depth_in_contact(penetration)

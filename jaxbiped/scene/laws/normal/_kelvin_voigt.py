@@ -1,16 +1,16 @@
 """Kelvin and Voigt's law: a linear spring beside a linear damper."""
 
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import jax.numpy as jnp
 
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, pushing
-from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
+from jaxbiped.scene.laws._abstract_laws import pushing
+from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw
 
 
-class KelvinVoigt(AbstractNormalLaw):
+class KelvinVoigt(AbstractDampedLaw):
     """F_N = K δ + D δ̇ while δ > 0, never below zero (no adhesion).
 
     The damper acts at once, so the force jumps by D δ̇ at touchdown: `jumps_at_touchdown`. It
@@ -30,31 +30,11 @@ class KelvinVoigt(AbstractNormalLaw):
     D: Parameter = parameter("contact damping", "$D$", "N s/m", minimum=0.0)
 
     jumps_at_touchdown: ClassVar[bool] = True
+    exponent: ClassVar[float] = 1.0
 
-    @classmethod
-    def from_weight(
-        cls,
-        *,
-        mass: Parameter,
-        penetration: Parameter,
-        damping_ratio: Parameter,
-        g: Parameter = 9.8,
-    ) -> Self:
-        """The law on which a mass stands and oscillates as told.
-
-        Args:
-            mass: what stands on the law [kg].
-            penetration: how deep it stands [m].
-            damping_ratio: of small oscillations about that [–].
-            g: gravitational acceleration [m/s²].
-
-        Raises:
-            ArgumentError: mass, penetration or g not above 0, or damping_ratio below 0.
-        """
-        K, damper = matched_to_weight(
-            mass=mass, penetration=penetration, damping_ratio=damping_ratio, g=g, n=1.0
-        )
-        return cls(K=K, D=damper)
+    @staticmethod
+    def damping_coefficient(damper: Scalar, penetration: Scalar, weight: Scalar) -> Scalar:
+        return damper
 
     def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
         return pushing(penetration, self.K * penetration + self.D * rate)

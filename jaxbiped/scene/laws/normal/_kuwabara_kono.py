@@ -1,22 +1,19 @@
 """Kuwabara and Kono's law of the impact of viscoelastic spheres."""
 
-from typing import Self
-
 import jax.numpy as jnp
 
 from jaxbiped._parameter import parameter
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import (
-    AbstractNormalLaw,
     depth_in_contact,
     hertz_energy,
     hertz_force,
     pushing,
 )
-from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
+from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw
 
 
-class KuwabaraKono(AbstractNormalLaw):
+class KuwabaraKono(AbstractDampedLaw):
     """F_N = K δ^{3/2} + gamma δ^{1/2} δ̇ while δ > 0, never below zero (no adhesion).
 
     Weakly damped, the restitution falls with the approach speed as 1 − e ∝ (v⁻)^{1/5}. The force
@@ -36,30 +33,9 @@ class KuwabaraKono(AbstractNormalLaw):
     K: Parameter = parameter("contact stiffness", "$K$", "N/m^1.5", positive=True)
     gamma: Parameter = parameter("contact damping", r"$\gamma$", "N s/m^1.5", minimum=0.0)
 
-    @classmethod
-    def from_weight(
-        cls,
-        *,
-        mass: Parameter,
-        penetration: Parameter,
-        damping_ratio: Parameter,
-        g: Parameter = 9.8,
-    ) -> Self:
-        """The law on which a mass stands and oscillates as told.
-
-        Args:
-            mass: what stands on the law [kg].
-            penetration: how deep it stands [m].
-            damping_ratio: of small oscillations about that [–].
-            g: gravitational acceleration [m/s²].
-
-        Raises:
-            ArgumentError: mass, penetration or g not above 0, or damping_ratio below 0.
-        """
-        K, damper = matched_to_weight(
-            mass=mass, penetration=penetration, damping_ratio=damping_ratio, g=g
-        )
-        return cls(K=K, gamma=damper / jnp.sqrt(as_float(penetration)))
+    @staticmethod
+    def damping_coefficient(damper: Scalar, penetration: Scalar, weight: Scalar) -> Scalar:
+        return damper / jnp.sqrt(penetration)
 
     def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
         depth = depth_in_contact(penetration)

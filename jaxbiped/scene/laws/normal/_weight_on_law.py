@@ -1,11 +1,60 @@
 """Weight on a normal law: its parameters from how a mass stands on it."""
 
-from typing import Any
+import abc
+from typing import Any, ClassVar, Self
 
 import jax.numpy as jnp
 
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
+
+
+class AbstractDampedLaw(AbstractNormalLaw):
+    """A normal law of a stiffness K, a damping coefficient of its own, and perhaps an exponent n.
+
+    Attributes:
+        exponent: of the stiffness, unless n is told. A property of the class.
+    """
+
+    exponent: ClassVar[float] = 1.5
+
+    @staticmethod
+    @abc.abstractmethod
+    def damping_coefficient(damper: Scalar, penetration: Scalar, weight: Scalar) -> Scalar:
+        """The law's coefficient whose linear damper is `damper` [N·s/m] at rest.
+
+        The weight [N] rests at the penetration [m].
+        """
+
+    @classmethod
+    def from_weight(
+        cls,
+        *,
+        mass: Parameter,
+        penetration: Parameter,
+        damping_ratio: Parameter,
+        g: Parameter = 9.8,
+        **n: Parameter,
+    ) -> Self:
+        """The law on which a mass stands and oscillates as told.
+
+        Args:
+            mass: what stands on the law [kg].
+            penetration: how deep it stands [m].
+            damping_ratio: of small oscillations about that [–].
+            g: gravitational acceleration [m/s²].
+            n: exponent [–], for a law that has one as a parameter; 1.5 unless given.
+
+        Raises:
+            ArgumentError: mass, penetration or g not above 0, damping_ratio below 0, n below 1.
+        """
+        told = {"n": cls.exponent, **n}
+        K, damper = matched_to_weight(
+            mass=mass, penetration=penetration, damping_ratio=damping_ratio, g=g, **told
+        )
+        weight: Any = as_float(mass) * as_float(g)
+        return cls(K, cls.damping_coefficient(damper, as_float(penetration), weight), **n)
 
 
 def matched_to_weight(

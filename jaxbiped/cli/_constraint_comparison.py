@@ -1,16 +1,16 @@
 """Comparison of constraint methods: violation, error and time."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 from tqdm import tqdm
 
-from jaxbiped._checks import ArgumentError, check_positive, check_type
+from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
-from jaxbiped.constraints._constraint_methods import CONSTRAINT_METHODS, method_named
+from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.scene._redundant_scene import RedundantScene
@@ -94,9 +94,8 @@ def compare_constraints(
     *,
     duration: float,
     integrators: Sequence[Integrator],
-    methods: Mapping[str, Any] | None = None,
-    orientation: str = "angle",
-    repeats: int = 3,
+    methods: Sequence[str],
+    repeats: int,
     progress: bool = False,
 ) -> list[ConstraintRun]:
     """Runs every method with every integrator from one start, compiled and timed apart.
@@ -108,30 +107,20 @@ def compare_constraints(
         state: start, a `State`.
         duration: simulated time [s].
         integrators: how to integrate.
-        methods: `AbstractConstraintMethod`s by the names to give them; all seven unless given.
-        orientation: one of `ORIENTATIONS`.
+        methods: some of `CONSTRAINT_METHODS`.
         repeats: runs of which the fastest counts.
         progress: whether to show a bar on stderr.
 
     Returns:
         A `ConstraintRun` for every pair of method and integrator, the integrators of one method
         together.
-
-    Raises:
-        ArgumentError: an argument that is not allowed.
     """
-    check_type("scene", scene, Scene)
-    check_positive("duration", duration, "s")
-    check_positive("repeats", repeats)
-    chosen = {name: name for name in CONSTRAINT_METHODS} if methods is None else methods
-    scenes = {
-        name: RedundantScene(scene, method_named(how), orientation) for name, how in chosen.items()
-    }
     with stage("simulating the minimal formulation to compare with"):
         truth = final_truth(scene, state, duration)
-    every = [(name, integrator) for name in scenes for integrator in integrators]
+    scenes = {name: RedundantScene(scene, method_named(name)) for name in methods}
+    every = [(name, integrator) for name in methods for integrator in integrators]
     return [
-        _run(name, scenes[name], state, duration, integrator, truth, int(repeats))
+        _run(name, scenes[name], state, duration, integrator, truth, repeats)
         for name, integrator in tqdm(every, unit="runs", disable=not progress)
     ]
 
@@ -144,23 +133,6 @@ def final_truth(scene: Scene, state: Any, duration: float) -> np.ndarray:
     return np.array(request().final)
 
 
-def request_of(
-    scene: RedundantScene, state: Any, duration: float, integrator: Integrator, **options: Any
-) -> Simulation:
-    """The request to simulate with an integrator; stops for nothing but a failure."""
-    return Simulation.prepare(
-        scene,
-        state,
-        duration=duration,
-        solver=integrator.solver,
-        rtol=integrator.rtol,
-        dt=integrator.dt,
-        watch=(),
-        max_solver_steps=_MOST_STEPS,
-        **options,
-    )
-
-
 def _run(
     name: str,
     scene: RedundantScene,
@@ -171,7 +143,18 @@ def _run(
     repeats: int,
 ) -> ConstraintRun:
     # Not compiled by itself: another tolerance or step size runs the same program.
-    request = request_of(scene, state, duration, integrator, save="end", extremes=violation)
+    request = Simulation.prepare(
+        scene,
+        state,
+        duration=duration,
+        solver=integrator.solver,
+        rtol=integrator.rtol,
+        dt=integrator.dt,
+        save="end",
+        extremes=violation,
+        watch=(),  # stops for nothing but a failure
+        max_solver_steps=_MOST_STEPS,
+    )
     found, seconds = time_run(request, repeats)
     final = np.array(minimal_state(scene, found.final))
     error = float(np.max(np.abs(final - truth)))

@@ -1,0 +1,50 @@
+"""Wrapped step-size controllers: what diffrax looks for is the innermost one's."""
+
+import inspect
+
+import diffrax
+import jax.numpy as jnp
+import pytest
+
+from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve.controllers._extremes import Extremes
+from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
+from jaxbiped.solve.controllers._step_control import InUnits
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
+from jaxbiped.variational._switch_locator import SwitchLocator
+from jaxbiped.variational._tangent_solver import TangentControl
+
+WRAPPERS = {
+    Extremes: (lambda args, y: y,),
+    FootstepLimit: (3,),
+    InUnits: (1.0,),
+    SwitchLocator: (None,),
+    TangentControl: (1e-5, jnp.ones(1)),
+}
+
+
+def _largest(error):
+    return jnp.max(jnp.abs(error))
+
+
+@pytest.mark.parametrize("kind", WRAPPERS)
+def test_tolerances_and_norm_are_the_innermost_controllers(kind):
+    inner = diffrax.PIDController(rtol=1e-3, atol=1e-6, norm=_largest)
+    outer = FootstepLimit(kind(inner, *WRAPPERS[kind]), 1)
+    assert (outer.rtol, outer.atol, outer.norm) == (1e-3, 1e-6, _largest)
+    assert outer.wrap(1) is outer
+
+
+def test_steps_of_one_size_have_no_tolerances():
+    outer = Extremes(FootstepLimit(diffrax.ConstantStepSize(), 1), lambda args, y: y)
+    assert (outer.rtol, outer.atol, outer.norm) == (0.0, 0.0, rms_norm)
+
+
+@pytest.mark.parametrize("kind", WRAPPERS)
+def test_no_wrapper_overrides_what_all_have_in_common(kind):
+    assert kind.__bases__ == (AbstractWrappedControl,)
+    abstract = AbstractWrappedControl.__abstractmethods__
+    shared = {name for name in vars(AbstractWrappedControl) if not name.startswith("_")} - abstract
+    assert {"rtol", "atol", "norm", "wrap"} <= shared
+    assert not shared & set(vars(kind))
+    assert not inspect.isabstract(kind)
