@@ -19,7 +19,7 @@ _FLOPS = {"fadd": 1, "fsub": 1, "fmul": 1, "fdiv": 1, "sqrt": 1, "fma": 2}
 
 
 def final_slopes(duration: float, rtol: float) -> Callable[[], tuple[np.ndarray, np.ndarray]]:
-    """Final state (8,) and its derivatives by log K, log c and log ξ (8, 3), by lanes."""
+    """Final state (8,) and its derivatives in log K, log c and log ξ (8, 3), by lanes."""
     scene, state = jb.seed_scene(), jb.seed_state()
 
     def final(logs: Any) -> Any:

@@ -138,7 +138,7 @@ def laws(quick: bool) -> dict[str, jb.Scene]:
 def footstep(
     scene: jb.Scene, start: jb.State, lands: bool, precision: Precision
 ) -> LinearisedReturn:
-    """One footstep from mid-stance, with derivatives by the state and by log K.
+    """One footstep from mid-stance, with derivatives with respect to the state and log K.
 
     Landing and tolerances are traced: all of them share one compiled program.
     """

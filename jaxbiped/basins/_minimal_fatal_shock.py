@@ -96,6 +96,10 @@ def minimal_fatal_shock(
         improved: how many rays are turned, the nearest ones at least 0.5 rad apart.
         batch: the most points in a call.
 
+    Returns:
+        The push to the nearest start that was found to fail, its scaled distance, and the boundary
+        there.
+
     Raises:
         ArgumentError: an argument that is not allowed, or labels or normals of a wrong shape.
     """

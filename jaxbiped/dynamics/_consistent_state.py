@@ -48,6 +48,13 @@ class Consistent(NamedTuple):
 def project(scene: RedundantScene, state: Any) -> Any:
     """The state as the scene's method corrects it after each step; differentiable.
 
+    Args:
+        scene: whose constraint method projects.
+        state: redundant, leaves of any common shape, SI units.
+
+    Returns:
+        A state of the same kind and shape.
+
     Raises:
         ArgumentError: a method that does not project.
     """

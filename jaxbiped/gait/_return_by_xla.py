@@ -92,17 +92,17 @@ def reverse_by_xla(
 ) -> tuple[PyTree, Scalar, Scalar]:
     inverse = jnp.stack(jtu.tree_leaves(units_of(args, state).inverse))
     count = len(inverse)
-    steering = Tangents(state, jnp.eye(count))
+    start = Tangents(state, jnp.eye(count))
     seeded = Seeded(args, jnp.zeros((0, count)), STATE_FLOOR * inverse, ())
     found = solve_to_section(
         spec.watch(args, state, peak=False),
         spec.solver,
-        steering,
+        start,
         seeded,
         precision=precision,
         time_limit=spec.time_limit,
         max_solver_steps=spec.max_solver_steps,
-        columns_only_steer=True,
+        columns_only_choose_steps=True,
     )
     return reset_on_arrival(spec, args, found.y.state, found.time, found.code)
 

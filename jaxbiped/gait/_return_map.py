@@ -34,7 +34,8 @@ class Return(NamedTuple):
     """Where the return map leads.
 
     Attributes:
-        state: on the section, renewed (legs exchanged); cyclic components go on from the start's.
+        state: on the section, after the reset (legs exchanged); cyclic coordinates go on from the
+            start's.
         time: duration [s].
         code: 0 for a return, else that of the `Ending` that came instead; state and time are then
             where it ended.
@@ -76,6 +77,10 @@ def return_map(
         time_limit: longest time to an arrival [s].
         engine: "xla", "lanes" or "auto" (see `ENGINES`), which here is "xla" for a system of your
             own. By lanes all directions of a derivative share one solve.
+
+    Returns:
+        State at the arrival, time that it took [s], and the code of what ended the motion before
+        it, leaves shaped as the start's.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.

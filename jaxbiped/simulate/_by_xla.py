@@ -3,7 +3,10 @@
 from typing import TYPE_CHECKING, Any
 
 import diffrax
+import equinox as eqx
+import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
 from jaxtyping import Array
 
 from jaxbiped._caches import cached_jit
@@ -92,3 +95,15 @@ def _ending(
     masks: Any = solution.event_mask
     events = dict(zip(names, masks or [], strict=True))
     return ending_code(events, done=done, out_of_steps=out_of_steps, timed_out=timed_out)
+
+
+def trim(trajectory: Trajectory) -> Trajectory:
+    """Cuts unused room off a single trajectory; one that is being traced keeps it."""
+    if trajectory.dense is None or isinstance(trajectory.t, jax.core.Tracer):
+        return trajectory
+    length = int(trajectory.accepted) + 1
+    return eqx.tree_at(
+        lambda each: (each.t, each.state),
+        trajectory,
+        (trajectory.t[:length], jtu.tree_map(lambda leaf: leaf[:length], trajectory.state)),
+    )

@@ -89,8 +89,19 @@ def rigid_walk(
         max_solver_steps: cap on the attempted steps.
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
 
+    Returns:
+        Where and how the walk ended, and its first `most_arrivals` heel strikes.
+
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> scene = jb.ladder()["rigid"]
+        >>> start = jb.dynamics.rigid_state(jb.seed_state())
+        >>> walk = jb.rigid_walk(scene, start, steps=2, engine="lanes")
+        >>> str(walk.outcome), int(walk.footsteps)
+        ('walking', 2)
     """
     check_type("scene", scene, RigidScene)
     scene = jtu.tree_map(as_float, scene)

@@ -27,7 +27,7 @@ from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._by_lanes import by_lanes, can_by_lanes, prepare_lanes
-from jaxbiped.simulate._by_xla import by_xla
+from jaxbiped.simulate._by_xla import by_xla, trim
 from jaxbiped.simulate._engine_choice import choose_engine
 from jaxbiped.simulate._saved_times import check_times
 from jaxbiped.simulate._start import check_steps, start_for
@@ -92,7 +92,7 @@ def simulate(
         most_arrivals: how many arrivals at a section there is room for.
         extremes: a function of (scene, state) whose least and largest values, number by number,
             over the ends of all steps are wanted.
-        watch: which misfortunes end the solve: any of "fall", "stop", "stumble".
+        watch: which failures end the solve: any of "fall", "stop", "stumble".
         max_solver_steps: cap on the solver's attempted steps.
         adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
             needs `diffrax.ForwardMode()`. Where a method projects after each step, only adjoints
@@ -105,6 +105,14 @@ def simulate(
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> walk = jb.simulate(
+        ...     jb.seed_scene(), jb.seed_state(), duration=0.1, save="end", engine="lanes"
+        ... )
+        >>> str(walk.outcome), float(walk.t[-1])
+        ('walking', 0.1)
     """
     run = Simulation.prepare(
         scene,
@@ -128,7 +136,18 @@ def simulate(
 
 
 class Simulation(eqx.Module):
-    """A checked request to simulate. `prepare` it, then `compile` it to run it apart from that."""
+    """A checked request to simulate. `prepare` it, then `compile` it to run it apart from that.
+
+    Attributes:
+        scene, state, duration, rtol, atol, dt, solver, adjoint, steps, watch, max_solver_steps,
+            section, most_arrivals, extremes: as in `simulate`, checked, all of one precision.
+        correction: how a redundant start was put on its constraints, or None.
+        times: at which to save [s], shape (n,), or None.
+        save_steps: whether every step is saved.
+        units: scale of each leaf of the state, in which `atol` is measured.
+        engine: "xla" or "lanes".
+        replaceable: whether XLA may take over from lanes.
+    """
 
     scene: Scene | RedundantScene
     state: Any
@@ -251,7 +270,7 @@ class Simulation(eqx.Module):
 
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
-        return by_lanes(self) if self._lanes_can() else _trim(by_xla(self))
+        return by_lanes(self) if self._lanes_can() else trim(by_xla(self))
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
@@ -274,16 +293,4 @@ class CompiledSimulation:
 
     def __call__(self) -> Trajectory:
         """Runs the solve and waits for it."""
-        return _trim(jax.block_until_ready(self._program(self._request)))
-
-
-def _trim(trajectory: Trajectory) -> Trajectory:
-    """Cuts unused room off a single trajectory; one that is being traced keeps it."""
-    if trajectory.dense is None or isinstance(trajectory.t, jax.core.Tracer):
-        return trajectory
-    length = int(trajectory.accepted) + 1
-    return eqx.tree_at(
-        lambda each: (each.t, each.state),
-        trajectory,
-        (trajectory.t[:length], jtu.tree_map(lambda leaf: leaf[:length], trajectory.state)),
-    )
+        return trim(jax.block_until_ready(self._program(self._request)))

@@ -89,7 +89,7 @@ class AdaptiveSolve:
 
     Attributes:
         solver: its steps.
-        watch: misfortunes that end it.
+        watch: failures that end it.
         counting: whether footsteps are counted.
         saved: what is saved.
         fenced: whether XLA is to compile it, and not lanes (see `fenced`).

@@ -39,11 +39,14 @@ def nearest_failure(
 
     Args:
         labelling: one that knows a gait.
-        gradients: whether rays are turned to the boundary's normal by the simulator's derivatives,
+        gradients: whether rays are rotated to the boundary's normal by the simulator's derivatives,
             or by differences of the distances along nearby rays.
         farthest: distance up to which to look.
         tolerance: of the distance.
         options: others of `minimal_fatal_shock`.
+
+    Returns:
+        The push to the nearest failing start, and its distance in the scales above.
 
     Raises:
         ArgumentError: no gait is known, or an argument of `minimal_fatal_shock` is not allowed.

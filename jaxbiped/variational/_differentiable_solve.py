@@ -1,4 +1,7 @@
-"""Differentiable solve: scenes solved by lanes, with derivatives of their own."""
+"""Differentiable solve: scenes solved by lanes, with derivatives of their own.
+
+JAX cannot differentiate machine code, so the rules of both modes are given here.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -54,10 +57,10 @@ class Setting(NamedTuple):
 def solve_scene(solve: Solve, setting: Setting) -> Solved:
     """Solves one simulation, or under `vmap` many.
 
-    Its derivatives are those of the final state, and by the duration that of the time; at the time
-    where a simulation ended otherwise, they are at that fixed time. They come from tangent columns
-    of exactly the leaves that are differentiated, under a tolerance of their own, in a solve of
-    their own: in forward mode one for all directions, in reverse mode its transpose.
+    Its derivatives are those of the final state, and with respect to the duration that of the
+    time; where a simulation ended otherwise, they are at that fixed time. They come from tangent
+    columns of exactly the leaves that are differentiated, under a tolerance of their own, in a
+    solve of their own: in forward mode one for all directions, in reverse mode its transpose.
 
     Raises:
         UnknownPrimitiveError: the scene holds an operation that lanes do not have.
@@ -120,9 +123,9 @@ def _differentiable(setting: Setting, structure: Any) -> Callable[..., list[Scal
     def rule(primals: Sequence[Scalar], tangents: Sequence[Any]) -> tuple[Any, Any]:
         found = run(*primals)
         solve = jtu.tree_unflatten(structure, primals)
-        moved = jtu.tree_unflatten(structure, tangents)
+        solve_dot = jtu.tree_unflatten(structure, tangents)
         t, state, *counts = _unflatten(solve.state, found)
-        t_dot, state_dot = _tangents(setting, solve, moved, t, state)
+        t_dot, state_dot = _tangents(setting, solve, solve_dot, t, state)
         none = [np.zeros(jnp.shape(count), dtype=jax.dtypes.float0) for count in counts]
         return found, [t_dot, *state_dot, *none]
 
@@ -137,21 +140,21 @@ def _unflatten(like: Any, found: Sequence[Scalar]) -> tuple[Any, ...]:
 
 
 def _tangents(
-    setting: Setting, solve: Solve, moved: Solve, t: Scalar, state: State
+    setting: Setting, solve: Solve, solve_dot: Solve, t: Scalar, state: State
 ) -> tuple[Scalar, list[Scalar]]:
     """Derivatives of the time and of the final state along the tangents, linear in them."""
-    places = [i for i, dot in enumerate(moved.state) if not _is_zero(dot)]
-    scene_dots = jtu.tree_leaves(moved.scene, is_leaf=_is_zero)
+    places = [i for i, dot in enumerate(solve_dot.state) if not _is_zero(dot)]
+    scene_dots = jtu.tree_leaves(solve_dot.scene, is_leaf=_is_zero)
     active = tuple(i for i, dot in enumerate(scene_dots) if not _is_zero(dot))
     total = [jnp.zeros_like(leaf) for leaf in state]
     if places or active:
         columns = _columns(setting, solve, places, active, t).columns
-        dots = [moved.state[i] for i in places] + [scene_dots[i] for i in active]
+        dots = [solve_dot.state[i] for i in places] + [scene_dots[i] for i in active]
         for k, dot in enumerate(dots):
             total = [sum_ + columns[k, i] * dot for i, sum_ in enumerate(total)]
     t_dot = jnp.zeros_like(t)
-    if not _is_zero(moved.duration):
-        t_dot = jnp.where(t >= solve.duration, 1.0, 0.0) * moved.duration
+    if not _is_zero(solve_dot.duration):
+        t_dot = jnp.where(t >= solve.duration, 1.0, 0.0) * solve_dot.duration
         rates = vector_field(t, state, solve.scene)
         total = [sum_ + rate * t_dot for sum_, rate in zip(total, rates, strict=True)]
     return t_dot, total
@@ -164,7 +167,7 @@ def _is_zero(tangent: Any) -> bool:
 def _columns(
     setting: Setting, solve: Solve, places: list[int], active: tuple[int, ...], t: Scalar
 ) -> VariationalSolution:
-    """The final state's derivatives by components of the start and by leaves of the scene."""
+    """Derivatives of the final state with respect to start and scene."""
     c, m, p = len(solve.state), len(places), len(active)
     start = np.zeros((c, m + p))
     start[places, range(m)] = 1.0

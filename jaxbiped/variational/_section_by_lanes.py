@@ -26,9 +26,9 @@ def solve_to_section_by_lanes(
     precision: Precision,
     time_limit: Any,
     max_solver_steps: int,
-    steered: Any,
+    carries_parameters: Any,
 ) -> SectionArrival:
-    """`passage` for columns as `solve_variational` takes them; nodes are told as a `Recording`."""
+    """`solve_to_section` for columns as `solve_variational` takes them; nodes are a `Recording`."""
     found, recording = solve_variational(
         watch,
         solver,
@@ -38,7 +38,7 @@ def solve_to_section_by_lanes(
         precision=precision,
         time_limit=time_limit,
         max_solver_steps=max_solver_steps,
-        steered=steered,
+        carries_parameters=carries_parameters,
         save_nodes=True,
     )
     return SectionArrival(

@@ -31,15 +31,15 @@ def solve_variational(
     precision: Precision,
     time_limit: Any,
     max_solver_steps: int,
-    steered: Any = True,
+    carries_parameters: Any = True,
     save_nodes: bool = False,
 ) -> tuple[VariationalSolution, Recording | None]:
-    """Solves from `y0` to the section, a misfortune or `time_limit` [s].
+    """Solves from `y0` to the section, a failure or `time_limit` [s].
 
     Of the columns the last p move one parameter each, by `sizes`, shape (p,), in the order of the
-    active leaves; the columns before move none. Where not `steered`, the last p are not carried,
-    and NaN in the end. Seeds are not looked at. Records are the time and the state at the ends of
-    the accepted steps.
+    active leaves; the columns before move none. Unless `carries_parameters`, the last p are not
+    carried, and NaN in the end. Seeds are not looked at. Records are the time and the state at the
+    ends of the accepted steps.
     """
     m = y0.columns.shape[1] - len(args.active)
     inputs = VariationalProblem(
@@ -48,7 +48,7 @@ def solve_variational(
         by_state=y0.columns[:, :m].T,
         by_parameter=y0.columns[:, m:].T,
         sizes=sizes,
-        steered=_number(steered),
+        carries_parameters=_number(carries_parameters),
         state_floors=args.floors[:m],
         parameter_floors=args.floors[m:],
         rtol=_number(precision.rtol),

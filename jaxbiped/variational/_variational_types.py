@@ -15,7 +15,7 @@ class VariationalProblem(NamedTuple):
         by_state: columns of the first m directions, shape (m, c).
         by_parameter: of the others, shape (p, c).
         sizes: by how much these move their parameter, shape (p,).
-        steered: whether these are carried at all (0 or 1).
+        carries_parameters: whether these are carried at all (0 or 1).
         state_floors, parameter_floors: below which errors of columns are absolute, (m,) and (p,).
         rtol, tangent_rtol: tolerances of state and columns.
         units: of the state's leaves and of time.
@@ -28,7 +28,7 @@ class VariationalProblem(NamedTuple):
     by_state: Any
     by_parameter: Any
     sizes: Any
-    steered: Any
+    carries_parameters: Any
     state_floors: Any
     parameter_floors: Any
     rtol: Any
@@ -40,7 +40,7 @@ class VariationalProblem(NamedTuple):
 
 
 class VariationalSolution(NamedTuple):
-    """What a solve found: as in `Passage`, all columns as rows of shape (m + p, …).
+    """What a solve found: as in `SectionArrival`, all columns as rows of shape (m + p, …).
 
     Attributes:
         t, state, columns, time_columns: on the section.

@@ -36,13 +36,18 @@ class LaneEngine(AbstractEngine):
                 request.inputs,
                 room=request.room,
                 quick=quick,
-                tape=request.stream,
+                stream=request.stream,
                 once=request.reads_once,
             )
             return Result(recorded[0], recording=recorded[1])
         schedule = None if request.times is None else Schedule(request.times)
         found = call(
-            compiled, request.inputs, schedule, tape=request.stream, room=request.room, quick=quick
+            compiled,
+            request.inputs,
+            schedule,
+            stream=request.stream,
+            room=request.room,
+            quick=quick,
         )
         return Result(*found)
 

@@ -33,7 +33,7 @@ class LoopEngine(AbstractEngine):
         """None, or which part of a request only lanes have."""
         if request.times is not None or request.program.scheduled:
             return "records at given times are the lanes'"
-        if request.stream is not None or request.program.tape:
+        if request.stream is not None or request.program.stream:
             return "programs that read a stream are the lanes'"
         if request.keeps_records or (request.batch and request.room):
             return "records that stay on the host, or of a batch, are the lanes'"

@@ -75,7 +75,7 @@ class AbstractFrictionLaw(eqx.Module):
 
     @abc.abstractmethod
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
-        """Functions whose zeros are where a first or second derivative by the slip speed jumps."""
+        """Functions whose zeros are where a first or second derivative in the slip speed jumps."""
 
 
 def power(base: Scalar, exponent: Scalar | float) -> Scalar:

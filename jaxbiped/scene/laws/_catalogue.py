@@ -77,6 +77,9 @@ def normal_law_like(
         mass: what stands on the law [kg].
         g: gravitational acceleration [m/s²].
 
+    Returns:
+        The law, its parameters in SI units.
+
     Raises:
         ArgumentError: an unknown name, or a value that is not allowed.
     """
@@ -111,8 +114,19 @@ def friction_law_like(
         v0: the seed law's slip speed of the peak [m/s].
         xi: the seed law's Stribeck rate [s/m]; above 0 for a law that falls over 1/xi.
 
+    Returns:
+        The law, its parameters in SI units.
+
     Raises:
         ArgumentError: an unknown name, or a value that is not allowed.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> law = jb.laws.friction_law_like(
+        ...     "coulomb", mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0
+        ... )
+        >>> float(law.mu), float(law.v_d)
+        (0.4, 5e-05)
     """
     check_choice("name", name, FRICTION_LAWS)
     law = cast("type[NamedFrictionLaw]", FRICTION_LAWS[name])

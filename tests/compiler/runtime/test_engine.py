@@ -19,7 +19,7 @@ def _attempt(x, carried):
 
 ROOT = Program(lambda x: (x, jnp.zeros_like(x)), _attempt, lambda x, carried: carried)
 RECORDED = ROOT._replace(record=lambda x, carried, _: (carried[1] > 2.0, [carried[0]]))
-STREAM = ROOT._replace(attempt=lambda x, c, row: _attempt(x + 0.0 * row[0], c), tape=1)
+STREAM = ROOT._replace(attempt=lambda x, c, row: _attempt(x + 0.0 * row[0], c), stream=1)
 ERF = ROOT._replace(finish=lambda x, carried: jax.scipy.special.erf(carried[0]))
 
 

@@ -86,6 +86,9 @@ def hertz_stiffness(
         ground_modulus: Young's modulus of the plane, E₂ [Pa].
         ground_poisson: Poisson's ratio of the plane, ν₂ [–].
 
+    Returns:
+        K [N/m^1.5], a scalar or the shape that the arguments broadcast to.
+
     Raises:
         ArgumentError: a radius or modulus not above 0, or a Poisson's ratio that no isotropic
             material has: not above −1, or above 1/2.
