@@ -146,7 +146,7 @@ def footstep(
         system=Stepped(),
         section=Stance(),
         solver=jb.solvers.Rodas4(),
-        time_limit=jnp.asarray(10.0),
+        max_time=jnp.asarray(10.0),
         steps=1,
         max_solver_steps=MOST_STEPS,
         engine="xla",

@@ -52,7 +52,7 @@ def find_gait(
     scene: Scene | RigidScene | RedundantScene,
     guess: Any = None,
     *,
-    period: int = 1,
+    footsteps: int = 1,
     section: AbstractSection | None = None,
     parameters: tuple[str, ...] | None = None,
     accuracy: str = "balanced",
@@ -82,7 +82,7 @@ def find_gait(
             the seed scene's gait to this one; Newton's method from scattered starts. The gait is
             then the stable one, or where none was seen the one of smallest spectral radius. Under
             `jit` and `vmap` there are two stages, the first and the continuation.
-        period: footsteps in a cycle.
+        footsteps: how many a cycle has.
         section: where the cycle begins, `MidStance()` unless given. A rigid walker's cycles begin
             just after its impact, at `HeelStrike()`.
         parameters: names of the parameters to differentiate with respect to (see
@@ -114,7 +114,7 @@ def find_gait(
     check_type("scene", scene, Scene, RigidScene, RedundantScene)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_choice("method", method, ("newton", "optax"))
-    check_count("period", period)
+    check_count("footsteps", footsteps)
     check_unbatched("scene", scene)
     start = _check_start(scene, default_guess(scene) if guess is None else guess)
     check_unbatched("guess", start, "one state")
@@ -139,7 +139,7 @@ def find_gait(
         section,
         method_of_steps,
         runs_on,
-        steps=int(period),
+        steps=int(footsteps),
         most=MOST_SOLVER_STEPS[accuracy],
     )
     how = Method(
@@ -176,7 +176,7 @@ def _return_map_spec(
         system=system_of(scene),
         section=section,
         solver=solver,
-        time_limit=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
+        max_time=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
         steps=steps,
         max_solver_steps=most,
         engine=engine,

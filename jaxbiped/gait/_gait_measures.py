@@ -30,7 +30,7 @@ def gait_measures(
     guess: Any = None,
     *,
     gradient: AbstractGradient | None = None,
-    period: int = 1,
+    footsteps: int = 1,
     section: AbstractSection | None = None,
     accuracy: str = "balanced",
     engine: str = "auto",
@@ -45,7 +45,7 @@ def gait_measures(
     through `Implicit()` the derivatives with respect to a method's constants are zero.
 
     Args:
-        scene, guess, period, section, accuracy, engine: as for `find_gait`.
+        scene, guess, footsteps, section, accuracy, engine: as for `find_gait`.
         gradient: how to differentiate.
 
     Returns:
@@ -66,7 +66,7 @@ def gait_measures(
     gait = find_gait(
         jax.lax.stop_gradient(scene),
         None if guess is None else jax.lax.stop_gradient(guess),
-        period=period,
+        footsteps=footsteps,
         section=section,
         parameters=None if implicit else (),
         accuracy=accuracy,
@@ -81,7 +81,7 @@ def gait_measures(
             scene,
             state,
             section=section,
-            steps=period,
+            footsteps=footsteps,
             gradient=gradient,
             accuracy=accuracy,
             engine=engine,

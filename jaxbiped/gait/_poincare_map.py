@@ -121,7 +121,7 @@ def linearised_return(
     count, n = len(jtu.tree_leaves(y)), args.seeds.shape[1]
     start = jnp.zeros((count, n)).at[jnp.asarray(places), jnp.arange(len(places))].set(1.0)
     watch = _watch_for(spec, args.args, y)
-    limit = jnp.where(idle, 0.0, spec.time_limit)
+    limit = jnp.where(idle, 0.0, spec.max_time)
 
     def one(
         before: tuple[Tangents, Scalar], _: None
@@ -206,7 +206,7 @@ def _next_arrival(
             y0,
             args,
             precision=precision,
-            time_limit=limit,
+            max_time=limit,
             max_solver_steps=most,
             save_nodes=True,
         )
@@ -218,7 +218,7 @@ def _next_arrival(
         args,
         sizes,
         precision=precision,
-        time_limit=limit,
+        max_time=limit,
         max_solver_steps=most,
         carries_parameters=carries_parameters,
     )

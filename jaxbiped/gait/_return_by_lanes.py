@@ -139,7 +139,7 @@ def _solve(
         Seeded(args, jnp.zeros((p, m + p)), floors, active),
         jnp.stack(_sizes(args, active)) if active else jnp.zeros(0),
         precision=precision,
-        time_limit=spec.time_limit,
+        max_time=spec.max_time,
         max_solver_steps=spec.max_solver_steps,
     )
     return found

@@ -34,7 +34,7 @@ def forward_by_xla(
         state,
         args,
         precision=precision,
-        time_limit=spec.time_limit,
+        max_time=spec.max_time,
         max_solver_steps=spec.max_solver_steps,
     )
     return reset_on_arrival(spec, args, found.y, found.time, found.code)
@@ -69,7 +69,7 @@ def _by_xla_forward_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
         Tangents(state, column),
         seeded,
         precision=precision,
-        time_limit=spec.time_limit,
+        max_time=spec.max_time,
         max_solver_steps=spec.max_solver_steps,
     )
     structure = jtu.tree_structure(state)
@@ -100,7 +100,7 @@ def reverse_by_xla(
         start,
         seeded,
         precision=precision,
-        time_limit=spec.time_limit,
+        max_time=spec.max_time,
         max_solver_steps=spec.max_solver_steps,
         columns_only_choose_steps=True,
     )

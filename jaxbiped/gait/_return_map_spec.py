@@ -19,7 +19,7 @@ class ReturnMapSpec(eqx.Module):
         system, section: whose return map.
         solver: one-step solver.
         steps: arrivals that make one cycle.
-        time_limit: longest time to the next arrival [s].
+        max_time: longest time to the next arrival [s].
         max_solver_steps: cap on the attempted steps to the next arrival.
         engine: "xla" or "lanes".
         within: the system that is solved, where its coordinates are redundant: every solve
@@ -29,7 +29,7 @@ class ReturnMapSpec(eqx.Module):
     system: AbstractSystem
     section: AbstractSection
     solver: Any
-    time_limit: Any
+    max_time: Any
     steps: int = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)

@@ -51,7 +51,7 @@ def by_lanes(run: "Simulation") -> Trajectory:
         state = jtu.tree_map(lambda leaf: jnp.reshape(leaf, (1,)), ended.state)
     else:
         times = None if run.times is None else np.asarray(run.times)
-        room = 0 if run.section is None else run.most_arrivals
+        room = 0 if run.section is None else run.max_arrivals
         ended, recorded = solve_and_save(_solve(run), setting, times=times, room=room)
         assert recorded is not None
         # As diffrax has it: infinite where the solve ended before.
@@ -113,7 +113,7 @@ def _setting(run: "Simulation") -> Setting:
         section=run.section,
         extremes=run.extremes,
     )
-    return Setting(run.solver, run.watch, run.steps is not None, quick, saved)
+    return Setting(run.solver, run.watch, run.footsteps is not None, quick, saved)
 
 
 def _solve(run: "Simulation") -> Solve:
@@ -121,7 +121,7 @@ def _solve(run: "Simulation") -> Solve:
         return jnp.asarray(value, dtype=jnp.float64)
 
     assert isinstance(run.scene, Scene)
-    footsteps = 0 if run.steps is None else run.steps
+    footsteps = 0 if run.footsteps is None else run.footsteps
     return Solve(
         scene=run.scene,
         state=run.state,
@@ -132,5 +132,5 @@ def _solve(run: "Simulation") -> Solve:
         units=run.units,
         footsteps=number(footsteps),
         patience=number(PATIENCE * footsteps),
-        most_attempts=number(run.max_solver_steps),
+        max_attempts=number(run.max_solver_steps),
     )

@@ -41,7 +41,7 @@ class RigidWalked(eqx.Module):
         footsteps: number of heel strikes.
         attempts: number of attempted steps of the integrator.
         strikes: times [s] and states just after the first heel strikes, leaves of shape
-            (most_arrivals,), infinite beyond the last.
+            (max_arrivals,), infinite beyond the last.
         engine: what computed it.
     """
 
@@ -63,11 +63,11 @@ def rigid_walk(
     scene: RigidScene,
     state: RigidState,
     *,
-    steps: int | None = None,
+    footsteps: int | None = None,
     duration: float | None = None,
     accuracy: str = "balanced",
     rtol: float | None = None,
-    most_arrivals: int = 0,
+    max_arrivals: int = 0,
     max_solver_steps: int = 65536,
     engine: str = "auto",
 ) -> RigidWalked:
@@ -80,17 +80,17 @@ def rigid_walk(
     Args:
         scene: the walker.
         state: start, leg 2 standing.
-        steps: heel strikes after which to end; with a `duration`, too, whichever comes first.
+        footsteps: heel strikes after which to end; with a `duration`, too, whichever comes first.
         duration: simulated time [s].
         accuracy: "fast" (1e-4), "balanced" (1e-6) or "tight" (1e-11): the relative tolerance; the
             absolute one (SI) is a hundredth of it.
         rtol: relative tolerance, in place of the accuracy's.
-        most_arrivals: how many heel strikes to keep.
+        max_arrivals: how many heel strikes to keep.
         max_solver_steps: cap on the attempted steps.
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
 
     Returns:
-        Where and how the walk ended, and its first `most_arrivals` heel strikes.
+        Where and how the walk ended, and its first `max_arrivals` heel strikes.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
@@ -99,7 +99,7 @@ def rigid_walk(
         >>> import jaxbiped as jb
         >>> scene = jb.ladder()["rigid"]
         >>> start = jb.dynamics.rigid_state(jb.seed_state())
-        >>> walk = jb.rigid_walk(scene, start, steps=2, engine="lanes")
+        >>> walk = jb.rigid_walk(scene, start, footsteps=2, engine="lanes")
         >>> str(walk.outcome), int(walk.footsteps)
         ('walking', 2)
     """
@@ -108,15 +108,15 @@ def rigid_walk(
     state = in_one_precision(check_state(in_own_precision(state), RigidState))
     check_single_scene(scene)
     check_unbatched("state", state, "one start")
-    if duration is None and steps is None:
-        raise ArgumentError("duration = None and steps = None: say how long to walk.")
-    if steps is not None:
-        check_count("steps", steps)
+    if duration is None and footsteps is None:
+        raise ArgumentError("duration = None and footsteps = None: say how long to walk.")
+    if footsteps is not None:
+        check_count("footsteps", footsteps)
     if duration is not None:
         check_unbatched("duration", duration)
         check_positive("duration", duration, "s")
-    if most_arrivals:
-        check_count("most_arrivals", most_arrivals)
+    if max_arrivals:
+        check_count("max_arrivals", max_arrivals)
     check_count("max_solver_steps", max_solver_steps)
     check_choice("accuracy", accuracy, RIGID_ACCURACIES)
     tolerance = RIGID_ACCURACIES[accuracy] if rtol is None else rtol
@@ -125,21 +125,21 @@ def rigid_walk(
     narrow = any(jnp.result_type(leaf) != jnp.float64 for leaf in leaves)
     chosen = engine_for(engine, obstacle="it computes in 64 bits" if narrow else None)
     patience = _PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g)
-    longest = (1 if steps is None else steps) * patience if duration is None else duration
+    longest = (1 if footsteps is None else footsteps) * patience if duration is None else duration
     walk = RigidWalk(
         scene=scene,
         state=state,
         duration=as_float(longest),
-        footsteps=as_float(0 if steps is None else int(steps)),
+        footsteps=as_float(0 if footsteps is None else int(footsteps)),
         rtol=as_float(tolerance),
-        most_attempts=as_float(max_solver_steps),
+        max_attempts=as_float(max_solver_steps),
     )
     # In the precision of the start, as `simulate` has it.
     walk = jtu.tree_map(lambda leaf: leaf.astype(state.theta_1.dtype), walk)
-    program = rigid_program(most_arrivals > 0, duration is None)
-    request = Request(program, walk, room=int(most_arrivals), quick=True)
+    program = rigid_program(max_arrivals > 0, duration is None)
+    request = Request(program, walk, room=int(max_arrivals), quick=True)
     found, recorded, _ = (LANES if chosen == "lanes" else XLA).run(request)
-    strikes = jnp.full((int(most_arrivals), 1 + len(state)), jnp.inf, state.theta_1.dtype)
+    strikes = jnp.full((int(max_arrivals), 1 + len(state)), jnp.inf, state.theta_1.dtype)
     if recorded is not None:
         reached = jnp.arange(strikes.shape[0]) < recorded.counts
         strikes = jnp.where(reached[:, None], recorded.values, strikes)

@@ -39,7 +39,7 @@ class Solve(NamedTuple):
         units: of the state's leaves and of time.
         footsteps: after which to end, 0 for no limit.
         patience: time [s] that counts as waiting for footsteps in vain.
-        most_attempts: cap on the solver's steps.
+        max_attempts: cap on the solver's steps.
     """
 
     scene: Scene
@@ -51,7 +51,7 @@ class Solve(NamedTuple):
     units: Units
     footsteps: Any
     patience: Any
-    most_attempts: Any
+    max_attempts: Any
 
 
 class Solved(NamedTuple):
@@ -179,8 +179,8 @@ class AdaptiveSolve:
             last=last,
             extremes=self._extremes(solve.scene, now, keep, state),
         )
-        attempts = (after.accepted + after.rejected).astype(solve.most_attempts.dtype)
-        over = (t >= solve.duration) | (attempts >= solve.most_attempts) | ~none | counted
+        attempts = (after.accepted + after.rejected).astype(solve.max_attempts.dtype)
+        over = (t >= solve.duration) | (attempts >= solve.max_attempts) | ~none | counted
         return after, over
 
     def finish(self, solve: Solve, now: _Now) -> Solved:

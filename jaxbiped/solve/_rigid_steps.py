@@ -38,7 +38,7 @@ class RigidWalk(NamedTuple):
         duration: simulated time [s].
         footsteps: heel strikes after which to end, 0 for no limit.
         rtol: relative tolerance; the absolute one (SI) is a hundredth of it.
-        most_attempts: cap on the attempted steps.
+        max_attempts: cap on the attempted steps.
     """
 
     scene: RigidScene
@@ -46,7 +46,7 @@ class RigidWalk(NamedTuple):
     duration: Any
     footsteps: Any
     rtol: Any
-    most_attempts: Any
+    max_attempts: Any
 
 
 class RigidProgress(NamedTuple):
@@ -137,7 +137,7 @@ def attempt_step(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Sc
     after = after._replace(rates=rates, attempts=now.attempts + 1)
     enough = (walk.footsteps > 0.0) & (after.footsteps.astype(after.t.dtype) >= walk.footsteps)
     done = enough | ((after.landing == 0) & (after.t >= walk.duration))
-    tired = after.attempts.astype(after.t.dtype) >= walk.most_attempts
+    tired = after.attempts.astype(after.t.dtype) >= walk.max_attempts
     code = jnp.where((after.code == 0) & tired & ~done, int(Ending.OUT_OF_STEPS), after.code)
     return after._replace(code=code), done | (code != 0)
 

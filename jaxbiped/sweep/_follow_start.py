@@ -36,7 +36,7 @@ class Effort(NamedTuple):
     Attributes:
         rtol: relative tolerance; the absolute one is a hundredth of it in the scene's units.
         footsteps: after which a start that is not certain is given up.
-        most_attempts: cap on the solver's attempted steps.
+        max_attempts: cap on the solver's attempted steps.
         gap: see `arrived`.
         solver: of the compliant walker.
         engine: "lanes" or "xla".
@@ -44,7 +44,7 @@ class Effort(NamedTuple):
 
     rtol: float
     footsteps: int
-    most_attempts: int
+    max_attempts: int
     gap: float
     solver: AbstractRosenbrock
     engine: str
@@ -65,7 +65,7 @@ def follow_starts(
         duration=same(_LONGEST),
         footsteps=same(effort.footsteps),
         rtol=same(effort.rtol),
-        most_attempts=same(effort.most_attempts),
+        max_attempts=same(effort.max_attempts),
     )
     solve: Any = None
     if not scene.compliant:

@@ -37,7 +37,7 @@ def gait_sweep(
     over: Mapping[str, Sequence[float] | np.ndarray],
     *,
     parameters: tuple[str, ...] | None = None,
-    period: int = 1,
+    footsteps: int = 1,
     accuracy: str = "balanced",
     radius_sensitivities: bool = True,
     engine: str = "auto",
@@ -55,7 +55,7 @@ def gait_sweep(
     Args:
         scene: the walker; parameters that are not swept keep its values.
         over: values of each swept parameter by name (see `parameter_names`), shape (k,) each.
-        parameters, period, accuracy, radius_sensitivities, engine: as for `find_gait`.
+        parameters, footsteps, accuracy, radius_sensitivities, engine: as for `find_gait`.
         store: directory of a Zarr store; in memory unless given. A run that was killed continues
             where it was.
         progress: whether to show a bar on stderr.
@@ -77,7 +77,7 @@ def gait_sweep(
         check_store(Path(store))
     options = dict(
         parameters=parameters,
-        period=period,
+        footsteps=footsteps,
         accuracy=accuracy,
         radius_sensitivities=radius_sensitivities,
     )

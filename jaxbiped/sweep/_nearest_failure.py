@@ -27,7 +27,7 @@ def nearest_failure(
     labelling: Labelling,
     *,
     gradients: bool = True,
-    farthest: float = 1.0,
+    max_distance: float = 1.0,
     tolerance: float = 1e-5,
     **options: Any,
 ) -> FatalShock:
@@ -41,7 +41,7 @@ def nearest_failure(
         labelling: one that knows a gait.
         gradients: whether rays are rotated to the boundary's normal by the simulator's derivatives,
             or by differences of the distances along nearby rays.
-        farthest: distance up to which to look.
+        max_distance: distance up to which to look.
         tolerance: of the distance.
         options: others of `minimal_fatal_shock`.
 
@@ -72,7 +72,7 @@ def nearest_failure(
         fails,
         attractor.point,
         scales=family.scales[0],
-        farthest=farthest,
+        max_distance=max_distance,
         tolerance=tolerance,
         normal=boundary_normal(scene, attractor) if gradients else None,
         **options,

@@ -183,6 +183,6 @@ def _columns(
         Seeded(solve.scene, jnp.zeros((p, m + p)), floors, active),
         jnp.ones(p),
         precision=Precision(solve.rtol, _LOOSER * solve.rtol),
-        time_limit=t,
+        max_time=t,
         max_solver_steps=_MOST_ATTEMPTS,
     )[0]

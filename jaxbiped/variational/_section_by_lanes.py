@@ -24,7 +24,7 @@ def solve_to_section_by_lanes(
     sizes: Scalar,
     *,
     precision: Precision,
-    time_limit: Any,
+    max_time: Any,
     max_solver_steps: int,
     carries_parameters: Any,
 ) -> SectionArrival:
@@ -36,7 +36,7 @@ def solve_to_section_by_lanes(
         args,
         sizes,
         precision=precision,
-        time_limit=time_limit,
+        max_time=max_time,
         max_solver_steps=max_solver_steps,
         carries_parameters=carries_parameters,
         save_nodes=True,

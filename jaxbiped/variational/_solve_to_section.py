@@ -99,12 +99,12 @@ def solve_to_section(
     args: Any,
     *,
     precision: Precision,
-    time_limit: Any,
+    max_time: Any,
     max_solver_steps: int,
     columns_only_choose_steps: bool = False,
     save_nodes: bool = False,
 ) -> SectionArrival:
-    """Solves from `y0` until the section of `watch`, a failure, or `time_limit` [s].
+    """Solves from `y0` until the section of `watch`, a failure, or `max_time` [s].
 
     With `y0` a `Tangents` and `args` a `Seeded` the columns are carried along under
     `precision.tangent_rtol`.
@@ -127,7 +127,7 @@ def solve_to_section(
     end = diffrax.SubSaveAt(t1=True)
     every = diffrax.SubSaveAt(t0=True, steps=True, fn=_plain_node)
     subs = [end, every] if save_nodes else [end]
-    limit = jnp.asarray(time_limit, dtype=jnp.result_type(*jtu.tree_leaves(y0)))
+    limit = jnp.asarray(max_time, dtype=jnp.result_type(*jtu.tree_leaves(y0)))
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(field),
         solver,

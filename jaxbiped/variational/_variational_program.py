@@ -73,13 +73,13 @@ class AdaptiveColumns:
         return Program(self.start, self.attempt, self.finish, record=record)
 
     def start(self, given: VariationalProblem) -> _Now:
-        zero, none = jnp.zeros_like(given.time_limit), jnp.asarray(False)
+        zero, none = jnp.zeros_like(given.max_time), jnp.asarray(False)
         next_t, landed = self._controller(given, zero).init(
             self.term,
             zero,
-            given.time_limit,
+            given.max_time,
             given.state,
-            first_step(given.time_limit, given.units.time),
+            first_step(given.max_time, given.units.time),
             given.args,
             None,
             self.solver.error_order(self.term),
@@ -112,7 +112,7 @@ class AdaptiveColumns:
             self.solver.error_order(self.term),
             now.landed,
         )
-        limit = given.time_limit
+        limit = given.max_time
         t, next_t = clip_step(keep, t, next_t, limit, given.almost)
         state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), step.end, now.state)
         columns, peaks = now.columns, now.peak_columns
@@ -129,12 +129,12 @@ class AdaptiveColumns:
         attempted = now.attempted + 1
         lost = jnp.asarray(result == diffrax.RESULTS.dt_min_reached)
         over = (t >= limit) | jnp.asarray(result != diffrax.RESULTS.successful)
-        over = over | (attempted.astype(limit.dtype) >= given.most_attempts)
+        over = over | (attempted.astype(limit.dtype) >= given.max_attempts)
         after = _Now(t, next_t, state, columns, landed, peaks, attempted, keep, lost)
         return after, over
 
     def finish(self, given: VariationalProblem, now: _Now) -> VariationalSolution:
-        late = now.t >= given.time_limit
+        late = now.t >= given.max_time
         ended = jnp.where(late, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
         ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), ended)
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)

@@ -29,12 +29,12 @@ def solve_variational(
     sizes: Scalar,
     *,
     precision: Precision,
-    time_limit: Any,
+    max_time: Any,
     max_solver_steps: int,
     carries_parameters: Any = True,
     save_nodes: bool = False,
 ) -> tuple[VariationalSolution, Recording | None]:
-    """Solves from `y0` to the section, a failure or `time_limit` [s].
+    """Solves from `y0` to the section, a failure or `max_time` [s].
 
     Of the columns the last p move one parameter each, by `sizes`, shape (p,), in the order of the
     active leaves; the columns before move none. Unless `carries_parameters`, the last p are not
@@ -54,9 +54,9 @@ def solve_variational(
         rtol=_number(precision.rtol),
         tangent_rtol=_number(precision.tangent_rtol),
         units=jtu.tree_map(_number, units_of(args.args, y0.state)),
-        time_limit=_number(time_limit),
-        almost=just_before_end(_number(time_limit)),
-        most_attempts=_number(max_solver_steps),
+        max_time=_number(max_time),
+        almost=just_before_end(_number(max_time)),
+        max_attempts=_number(max_solver_steps),
     )
     found = LANES.run(
         Request(

@@ -19,8 +19,8 @@ class VariationalProblem(NamedTuple):
         state_floors, parameter_floors: below which errors of columns are absolute, (m,) and (p,).
         rtol, tangent_rtol: tolerances of state and columns.
         units: of the state's leaves and of time.
-        time_limit: longest time to the section [s]; from `almost` on, a step there ends there.
-        most_attempts: cap on attempted steps.
+        max_time: longest time to the section [s]; from `almost` on, a step there ends there.
+        max_attempts: cap on attempted steps.
     """
 
     args: PyTree
@@ -34,9 +34,9 @@ class VariationalProblem(NamedTuple):
     rtol: Any
     tangent_rtol: Any
     units: Units
-    time_limit: Any
+    max_time: Any
     almost: Any
-    most_attempts: Any
+    max_attempts: Any
 
 
 class VariationalSolution(NamedTuple):

@@ -97,8 +97,8 @@ def test_vmap_over_scenes_changes_nothing(found):
     ("options", "named"),
     [
         (dict(accuracy="fast"), "accuracy"),
-        (dict(period=0), "period"),
-        (dict(period=1.5), "period"),
+        (dict(footsteps=0), "footsteps"),
+        (dict(footsteps=1.5), "footsteps"),
         (dict(parameters=("K", "stiffness")), "parameters"),
         (dict(method="secant"), "method"),
         (dict(max_evaluations=0), "max_evaluations"),

@@ -55,7 +55,7 @@ def _inputs(starts, duration=0.3, most=20000.0, scene=SCENE):
         units=jtu.tree_map(each, units_of(SCENE, jb.seed_state())),
         footsteps=each(0),
         patience=each(0),
-        most_attempts=each(most),
+        max_attempts=each(most),
     )
 
 
@@ -91,7 +91,7 @@ def test_arrays_of_any_layout_and_dtype():
     inputs = _inputs(_perturbed(5))
     odd = inputs._replace(
         state=jb.State(*[starts[:, i] for i in range(8)]),
-        most_attempts=np.full(5, 20000, dtype=np.int16),
+        max_attempts=np.full(5, 20000, dtype=np.int16),
         scene=jtu.tree_map(lambda leaf: np.broadcast_to(leaf[0], (5,)), inputs.scene),
     )
     _same(_program().run(odd).outputs, _program().run(inputs).outputs)
