@@ -1,12 +1,19 @@
-# `make gait` runs the main job, `make walk` simulates the walker, `make test` runs all checks.
+# `make gait` runs the main job, `make walk` simulates the walker, `make test` runs all checks,
+# `make check` those that take minutes.
 # Each sets up what it needs in .venv inside this checkout; repeated runs do not set up again.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 OUT := out/walk
+# A file's tests share compiled programs; files begin in the order of tests/conftest.py.
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: walk gait test lint types notebooks clean
+# What `make figures` runs, at full size: all, or those named by `make figures ONLY="ladder"`.
+EXPERIMENTS := $(filter-out _% quote,$(patsubst experiments/%.py,%,$(wildcard experiments/*.py)))
+ONLY ?= $(EXPERIMENTS)
+
+.PHONY: walk gait check test lint types notebooks figures clean
 
 walk: $(VENV)/.installed
 	$(BIN)/jaxbiped walk --out $(OUT)
@@ -15,8 +22,12 @@ walk: $(VENV)/.installed
 gait: $(VENV)/.installed
 	$(BIN)/jaxbiped gait --out out/gait
 
+# Lint, types and the unit tests; docs/testing.md says which tests these are.
+check: lint types
+	$(PYTEST) -m "not slow"
+
 test: lint types
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(PYTEST)
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
@@ -28,6 +39,18 @@ types: $(VENV)/.installed-dev
 # Runs all notebooks at full size and keeps them with their outputs; takes some minutes.
 notebooks: $(VENV)/.installed-dev
 	$(BIN)/python notebooks/execute.py
+
+# Runs experiments at full size, one after the other, and keeps their numbers in experiments/results;
+# what the pages quote of these is printed at the end. Timings want an idle machine: on another,
+# UNTIMED=--untimed leaves them out.
+figures: $(VENV)/.installed-dev
+	mkdir -p out/figures
+	for name in $(ONLY); do \
+		$(BIN)/python experiments/$$name.py --out out/figures --json out/figures/$$name.json \
+			&& $(BIN)/python experiments/quote.py --keep out/figures/$$name.json $(UNTIMED) \
+			|| exit 1; \
+	done
+	$(BIN)/python experiments/quote.py
 
 $(VENV)/.made:
 	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "jaxbiped needs Python 3.11 or newer"'

@@ -11,6 +11,7 @@ if CORES:
     os.sched_setaffinity(0, CORES[-2:])
 os.environ.setdefault("NUMBA_NUM_THREADS", str(min(2, len(CORES) or 2)))
 
+import functools
 import time
 from collections.abc import Callable
 from typing import Any
@@ -32,6 +33,8 @@ CHECKED, QUICK_CHECKED = 8, 1
 """Lanes whose error is measured."""
 SINGLES, QUICK_SINGLES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8), (1e-6,)
 """Tolerances of single walks."""
+SLOPES, QUICK_SLOPES = (1e-6, 1e-7, 1e-8), (1e-6,)
+"""Tolerances of walks with their derivatives."""
 TOLERANCES = {"lanes": 2e-6, "xla": 2e-6, "numbalsoda": 1e-7}
 """Of batches: those that give errors of about 2e-5."""
 
@@ -153,29 +156,34 @@ def first_result() -> float:
     return time.perf_counter() - began
 
 
-def gaits(rounds: int, engines: tuple[str, ...]) -> dict[str, float]:
-    """Warm seconds of a whole gait with all sensitivities, with and without the radius's."""
+def gaits(rounds: int, engines: tuple[str, ...]) -> tuple[dict[str, float], dict[str, float]]:
+    """Warm seconds of a whole gait with all sensitivities, with and without the radius's.
+
+    And the period of each [s].
+    """
+    periods: dict[str, float] = {}
+
+    def find(name: str, engine: str, radius: bool) -> None:
+        gait = jb.find_gait(jb.seed_scene(), engine=engine, radius_sensitivities=radius)
+        jax.block_until_ready(gait.elasticities)
+        periods[name] = float(gait.measures.period)
+
     work = {
-        f"{engine}, {'with' if radius else 'without'} the radius's": (
-            lambda e=engine, r=radius: jax.block_until_ready(
-                jb.find_gait(jb.seed_scene(), engine=e, radius_sensitivities=r).elasticities
-            )
-        )
+        name: functools.partial(find, name, engine, radius)
         for engine in engines
         for radius in (False, True)
+        for name in [f"{engine}, {'with' if radius else 'without'} the radius's"]
     }
-    return timed(work, rounds)
+    return timed(work, rounds), periods
 
 
-def derivatives(rounds: int) -> list[dict[str, Any]]:
+def derivatives(rounds: int, tolerances: tuple[float, ...]) -> list[dict[str, Any]]:
     """The final state and its derivatives in log K, log c and log ξ."""
     exact = _lane_work.final_slopes(DURATION, 1e-9)()[1]
-    work = {("lanes", rtol): _lane_work.final_slopes(DURATION, rtol) for rtol in (1e-6, 1e-7, 1e-8)}
+    work = {("lanes", rtol): _lane_work.final_slopes(DURATION, rtol) for rtol in tolerances}
     if _casadi.is_installed():
-        work |= {
-            ("CasADi CVODES", rtol): _casadi.sensitivities(DURATION, rtol)
-            for rtol in (1e-6, 1e-7, 1e-8)
-        }
+        for rtol in tolerances:
+            work["CasADi CVODES", rtol] = _casadi.sensitivities(DURATION, rtol)
     seconds = timed(work, rounds)  # type: ignore[arg-type]
     return [
         dict(way=way, rtol=rtol, error=float(np.max(np.abs(run()[1] - exact))),
@@ -236,18 +244,21 @@ def main() -> None:
     starts = perturbed(QUICK_CHECKED if options.quick else CHECKED)
     exact = np.stack([_independent.reference(DURATION, start) for start in starts])
     sizes = [64] if options.quick else [8, 64, 512, 8192]
-    # The program for a batch is XLA's largest: a quick version leaves it to speed_batch.py.
+    # XLA's programs for batches and gaits compile for long: a quick version leaves them out.
     rows = batches(sizes, rounds, exact, ("lanes",) if options.quick else ("lanes", "xla"))
     levels = QUICK_SINGLES if options.quick else SINGLES
     alone = singles(rounds, _independent.reference(DURATION), levels)
+    slopes = derivatives(rounds, QUICK_SLOPES if options.quick else SLOPES)
+    gaits_s, periods_s = gaits(rounds, ("lanes",) if options.quick else ("lanes", "xla"))
     peak, used = _lane_work.peak_flops(), _lane_work.flops_per_step()
     best = max(row["steps_per_s"] for row in rows if row["way"] == "lanes")
     numbers = {
         "duration_s": DURATION,
         "batches": rows,
         "singles": alone,
-        "derivatives": [] if options.quick else derivatives(rounds),
-        "gaits_s": {} if options.quick else gaits(rounds, ("lanes", "xla")),
+        "derivatives": slopes,
+        "gaits_s": gaits_s,
+        "gait_periods_s": periods_s,
         "first_result_s": first_result(),
         "peak_flops": peak,
         "flops_per_step": used,

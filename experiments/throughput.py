@@ -51,7 +51,7 @@ def main() -> None:
     numbers["by_threads"] = by_threads(options, labellings, sizes[1], rounds)
     count = QUICK_COMPARED if quick else COMPARED
     numbers["peers"] = by_peer(options, labellings["compliant"], count, rounds)
-    numbers["engines"] = [] if quick else by_engine(options, 512)
+    numbers["engines"] = by_engine(options, "rigid", 64) if quick else by_engine(options)
     options.finish(numbers | {"picture": draw(options, numbers)})
 
 
@@ -135,14 +135,17 @@ def by_peer(
 ) -> list[dict[str, Any]]:
     """The same starts by us, numbalsoda and SciPy: how fast, and how often the labels are equal.
 
-    Of all the starts, then of those that walk, whose labels all ways are sure of equally soon.
+    Of all the starts, then of those that walk, whose labels all ways are sure of equally soon, and
+    of those that fall. Starts that come to rest are left to numbalsoda: SciPy takes minutes.
     """
     batch = _batches.starts_of(labelling.scene, count).batch(labelling, 0, count)
     states = np.stack(list(map(np.asarray, batch.states)), axis=1)
     codes = labelling(batch.states).label
     walking = np.flatnonzero(codes == int(jb.basins.Label.WALKING))
+    falling = np.flatnonzero(codes == int(jb.basins.Label.FELL_FORWARD))
     rows = peers_on(labelling, "all", states, rounds, scipy=False)
     rows += peers_on(labelling, "that walk", states[walking], rounds, scipy=True)
+    rows += peers_on(labelling, "that fall", states[falling], rounds, scipy=True)
     options.say(
         "\nway                starts               starts/s  of ours  fates  walking agrees"
     )
@@ -197,15 +200,18 @@ def fate(codes: np.ndarray) -> np.ndarray:
     return np.where(stumbled, int(jb.basins.Label.FELL_FORWARD), codes)
 
 
-def by_engine(options: Options, size: int) -> list[dict[str, Any]]:
-    options.say("\nengine      starts/s")
-    rows = []
+def by_engine(options: Options, model: str = "compliant", size: int = 512) -> list[dict[str, Any]]:
+    """Rates of both engines, and on how many of the same starts their labels agree."""
+    options.say("\nengine      starts/s  labels agree")
+    rows, labels = [], {}
     for engine in ("lanes", "xla"):
-        run = _batches.swept(_batches.labelling_of("compliant", engine=engine), size)
-        run()
+        run = _batches.swept(_batches.labelling_of(model, engine=engine), size)
+        labels[engine] = np.asarray(run().label)
         seconds = _batches.seconds_of({0: run}, 2)[0]
-        rows.append({"engine": engine, "starts": size, "starts_per_s": size / seconds})
-        options.say(f"{engine:<9} {size / seconds:10.0f}")
+        agree = float((labels[engine] == labels["lanes"]).mean())
+        row = {"engine": engine, "starts": size, "starts_per_s": size / seconds}
+        rows.append(row | {"labels_agree": agree})
+        options.say(f"{engine:<9} {size / seconds:10.0f}  {agree:12.1%}")
     return rows
 
 

@@ -24,6 +24,10 @@ from jaxbiped.scene import laws as laws
 from jaxbiped.solve import solvers as solvers
 from jaxbiped.sweep import starts as starts
 
+# Memory.
+from jaxbiped._caches import cache_info as cache_info
+from jaxbiped._caches import clear_caches as clear_caches
+
 # What is modelled.
 from jaxbiped.scene._ground import Ground as Ground
 from jaxbiped.scene._ladder import ladder as ladder

@@ -39,6 +39,28 @@ def _few_programs_are_kept():
         gc.collect()
 
 
+def pytest_collection_modifyitems(items):
+    """Files with slow tests begin first, so that no worker is left alone with one at the end."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
+LONGEST_UNIT = 10.0
+"""Seconds that a test of `make check` may take on an idle machine before it is called slow."""
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """Names tests that `make check` waits for too long, so that they can be marked."""
+    if config.option.markexpr != "not slow":
+        return
+    seconds: dict[str, float] = {}
+    for report in terminalreporter.getreports("passed") + terminalreporter.getreports(""):
+        seconds[report.nodeid] = seconds.get(report.nodeid, 0.0) + report.duration
+    for name, took in sorted(seconds.items(), key=lambda each: -each[1]):
+        if took > LONGEST_UNIT:
+            terminalreporter.write_line(f"{took:.0f} s, on an idle machine mark it slow: {name}")
+
+
 @pytest.fixture(scope="session")
 def seed_walk():
     """The seed's walker over two seconds at the tight accuracy: scene and trajectory."""

@@ -58,6 +58,22 @@ def impact_solution(scene, theta, rates):
 
 def footstep(scene, state):
     """Angles and rates of swing and stance leg after the next impact, and when it comes."""
+    solved = _until_strike(scene, state)
+    y, time = solved.y_events[0][0], solved.t_events[0][0]
+    after = impact_solution(scene, y[:2], y[[4, 5, 2, 3]])
+    return np.array([y[1], y[0], after[3], after[2]]), time
+
+
+def needed_friction(scene, state):
+    """Least coefficient that keeps the stance foot from slipping before the next impact [–]."""
+    solved = _until_strike(scene, state)
+    times = np.linspace(0.0, solved.t_events[0][0], 1001)
+    forces = [rolling_solution(scene, y[:2], y[[4, 5, 2, 3]])[4:] for y in solved.sol(times).T]
+    along, normal = np.transpose(forces)
+    return np.max(np.abs(along) / normal)
+
+
+def _until_strike(scene, state):
     _, theta, rates = coordinates(scene, state)
 
     def strikes(t, y):
@@ -66,13 +82,10 @@ def footstep(scene, state):
     strikes.terminal, strikes.direction = True, -1
     # Angles, their rates, and the hip's velocity.
     start = np.array([*theta, rates[2], rates[3], rates[0], rates[1]])
-    solved = solve_ivp(
+    return solve_ivp(
         lambda t, y: _rates(scene, y), (0.0, 5.0), start, "DOP853", rtol=1e-12, atol=1e-13,
-        events=strikes,
+        events=strikes, dense_output=True,
     )  # fmt: skip
-    y, time = solved.y_events[0][0], solved.t_events[0][0]
-    after = impact_solution(scene, y[:2], y[[4, 5, 2, 3]])
-    return np.array([y[1], y[0], after[3], after[2]]), time
 
 
 def _rates(scene, y):

@@ -37,6 +37,7 @@ def test_in_a_sweep():
     assert found.start_grip.attrs["units"] == "s/m"
 
 
+@pytest.mark.slow
 def test_in_a_sweep_of_gaits_and_in_the_chart_of_a_gaits_elasticities():
     gait = jb.find_gait(SCENE, parameters=("grip", "K"), radius_sensitivities=False)
     rows = {label.get_text() for label in elasticities(gait, "period").axes[0].get_yticklabels()}

@@ -3,10 +3,10 @@
 import math
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import RigidState
@@ -50,7 +50,7 @@ def _fitted_to(*parts: Any) -> Any:
     return structure, [float(leaf) for leaf in leaves]
 
 
-@eqx.filter_jit
+@cached_jit
 def _depth(law: AbstractNormalLaw, own: AbstractNormalLaw, depth: Scalar, load: Scalar) -> Scalar:
     """Where a law's elastic force is `load` times another one's at `depth` [m].
 

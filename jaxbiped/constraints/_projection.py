@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.constraints._constraint_method import (
     AbstractProjectingMethod,
@@ -40,7 +40,7 @@ def correct_step(
     return q, _add(v, method.step_back(masses, at.rows, at.rate))
 
 
-@eqx.filter_jit
+@cached_jit
 def nearest_consistent(
     linkage: Linkage, q: Sequence[Scalar], v: Sequence[Scalar]
 ) -> tuple[list[Scalar], list[Scalar]]:

@@ -1,11 +1,11 @@
 """Default initial guess of a search."""
 
-import functools
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 
+from jaxbiped._caches import bounded_cache
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._feet import standing_height
@@ -46,7 +46,7 @@ def default_guess(scene: Any) -> Any:
     return start
 
 
-@functools.cache
+@bounded_cache(1)
 def _seed() -> tuple[State, Scene]:
     """The seed's start and its scene, of plain numbers, which take no time to make."""
     with jax.ensure_compile_time_eval():

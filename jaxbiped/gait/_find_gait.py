@@ -1,7 +1,6 @@
 """Search for a periodic gait of a scene."""
 
 import dataclasses
-import functools
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Literal
 
@@ -14,6 +13,7 @@ import numpy as np
 import optax
 from jaxtyping import PyTree
 
+from jaxbiped._caches import PROGRAMS, Once, bounded_cache, cached_jit
 from jaxbiped._checks import check_choice, check_count, check_type, check_unbatched
 from jaxbiped._progress import stage
 from jaxbiped._types import as_float
@@ -225,18 +225,21 @@ def _check_start(scene: Any, start: Any) -> Any:
     return state_for(scene, start, "guess")
 
 
-@functools.cache  # the same object each time, so that nothing is compiled again
+@bounded_cache(1)  # the same object each time, so that nothing is compiled again
 def _adam() -> optax.GradientTransformation:
     return optax.adam(1e-2)
 
 
 def _compile_once(searching: tuple, describing: tuple, origin: Origin) -> None:
     """Compiles what is not compiled yet for this kind of search."""
-    kind = _kind_of((searching, describing[0], describing[2]))
-    if kind not in _COMPILED:
-        with stage("compiling the search (first time for this kind of scene)"):
-            _compile(searching, describing, origin)
-        _COMPILED.add(kind)
+    once = _compilation_of(_kind_of((searching, describing[0], describing[2])))
+    once(lambda: _compile(searching, describing, origin))
+
+
+@bounded_cache(PROGRAMS)
+def _compilation_of(kind: Any) -> Once[None]:
+    """What one kind of search is compiled by."""
+    return Once()
 
 
 def _compile(searching: tuple, describing: tuple, origin: Origin) -> None:
@@ -245,7 +248,8 @@ def _compile(searching: tuple, describing: tuple, origin: Origin) -> None:
     no_result = _empty_arrays(eqx.filter_eval_shape(_search, *searching))
     first: Any = _search
     second: Any = summarise_gait
-    with ThreadPoolExecutor() as meanwhile:
+    told = stage("compiling the search (first time for this kind of scene)")
+    with told, ThreadPoolExecutor() as meanwhile:
         with deferred_checks() as programs:
             # What takes lanes longest begins first.
             lowered = second.lower(spec, scene, start, no_result, *describing, origin)
@@ -255,10 +259,6 @@ def _compile(searching: tuple, describing: tuple, origin: Origin) -> None:
             program.check()
         for each in ready:
             each.result()
-
-
-_COMPILED: set[Any] = set()
-"""Kinds of searches whose programs are compiled."""
 
 
 def _kind_of(tree: PyTree) -> Any:
@@ -273,7 +273,7 @@ def _is_traced(tree: PyTree) -> bool:
     return any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(tree))
 
 
-@eqx.filter_jit
+@cached_jit
 def _search(*searching: Any) -> Found:
     # Without weak types, which would make the next program another one than was compiled.
     return jtu.tree_map(

@@ -3,12 +3,12 @@
 import dataclasses
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._rigid_state import RigidState
@@ -81,7 +81,7 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
     )
 
 
-@eqx.filter_jit
+@cached_jit
 def _find_each(scene: Scene | RigidScene, starts: Any, options: dict[str, Any]) -> Gait:
     def one(start: Any) -> Gait:
         return find_gait(scene, start, parameters=(), radius_sensitivities=False, **options)

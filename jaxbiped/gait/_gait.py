@@ -9,6 +9,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Recording
@@ -142,7 +143,7 @@ class Gait(eqx.Module):
         return (self.ending == int(Search.FOUND)) & (self.measures.spectral_radius < 1.0)
 
 
-@eqx.filter_jit
+@cached_jit
 def summarise_gait(
     spec: ReturnMapSpec,
     scene: Any,

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
@@ -101,7 +102,7 @@ def seed_directions(args: PyTree, active: tuple[int, ...], m: int) -> tuple[Seed
     return Seeded(args, seeds, floors, active), sizes
 
 
-@eqx.filter_jit  # for its trace cache
+@cached_jit  # for its trace cache
 def linearised_return(
     spec: ReturnMapSpec,
     args: Seeded,

@@ -2,12 +2,12 @@
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import exchange_legs
@@ -65,7 +65,7 @@ def component_sizes(scene: Scene | RigidScene, state: Any) -> np.ndarray:
     return np.array([by_prefix.get(name[:5], length) for name in state._fields[1:]])
 
 
-@eqx.filter_jit
+@cached_jit
 def _arrivals(scene: Scene, starts: Any) -> tuple[Any, Any]:
     """Arrivals at mid-stance of each walk, and the states at the last ones, leg 2 standing."""
 
@@ -87,7 +87,7 @@ def _arrivals(scene: Scene, starts: Any) -> tuple[Any, Any]:
     return jax.vmap(one)(starts)
 
 
-@eqx.filter_jit
+@cached_jit
 def _rigid_arrivals(scene: RigidScene, starts: Any) -> tuple[Scalar, Any]:
     """Heel strikes of each walk, and the states just after the last ones."""
 

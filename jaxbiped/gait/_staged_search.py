@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.gait._continuation import Branch, BranchEnd, Change, follow_branch
@@ -236,7 +236,7 @@ def _follow_from_seed(search: Searching, scout: ReturnMapSpec, line: Homotopy, l
     return follow_branch(change, point, scales=component_sizes(line.first, like))
 
 
-@eqx.filter_jit
+@cached_jit
 def _scene_along(
     scout: ReturnMapSpec, line: Homotopy, like: Any, point: Scalar, s: Scalar
 ) -> tuple[Scalar, Scalar, Scalar, Scalar]:

@@ -3,12 +3,12 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._types import as_float
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
@@ -108,7 +108,7 @@ def moments_of_change(
     return right
 
 
-@eqx.filter_jit
+@cached_jit
 def _apply(function: Any, scene: Scene, states: State) -> PyTree:
     values = function(scene, states)
     shape = jnp.shape(jtu.tree_leaves(states)[0])

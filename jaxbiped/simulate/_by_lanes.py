@@ -4,13 +4,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import diffrax
-import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import Array
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
+from jaxbiped.compiler import LANES, Request
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._recorded_steps import recorded_steps
@@ -22,8 +23,7 @@ from jaxbiped.solve.controllers._footstep_limit import PATIENCE
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._differentiable_solve import (
     Setting,
-    compiled_solve,
-    is_expressible,
+    request_of,
     solve_and_save,
     solve_scene,
     solve_step_by_step,
@@ -75,7 +75,12 @@ def by_lanes(run: "Simulation") -> Trajectory:
 
 def can_by_lanes(run: "Simulation") -> bool:
     """Whether lanes have all operations that a request needs."""
-    return is_expressible(_setting(run), jtu.tree_structure(run.scene))
+    return LANES.can(lane_request(run)) is None
+
+
+def lane_request(run: "Simulation") -> Request:
+    """What a request asks of lanes."""
+    return request_of(_solve(run), _setting(run))
 
 
 def prepare_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
@@ -84,11 +89,11 @@ def prepare_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
     Where only the end is asked for, what JAX does around it is compiled as well.
     """
     setting = _setting(run)
-    compiled_solve(setting, jtu.tree_structure(run.scene)).code(1)
+    LANES.compile(lane_request(run)).code(1)
     return by_lanes if setting.saved.within else _compiled
 
 
-_compiled = eqx.filter_jit(by_lanes)
+_compiled = cached_jit(by_lanes)
 
 
 def _step_by_step(

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import Array
 
+from jaxbiped._caches import cached_jit
 from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._accuracy import rms_norm
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from jaxbiped.simulate._simulate import Simulation
 
 
-@eqx.filter_jit
+@cached_jit
 def by_xla(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`. A trajectory saved step by step keeps its full length."""
     controller: Any = step_control(run.rtol, run.atol, rms_norm, run.units)

@@ -1,9 +1,6 @@
 """Walks of the rigid walker."""
 
-from typing import Any
-
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
@@ -16,20 +13,16 @@ from jaxbiped._checks import (
     check_unbatched,
 )
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.compiler import LANES, XLA, Request
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import check_state
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._start import check_single_scene, in_one_precision, in_own_precision
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._engine import engine_for
-from jaxbiped.solve._rigid_program import rigid_walk_by_lanes
+from jaxbiped.solve._rigid_program import rigid_program
 from jaxbiped.solve._rigid_steps import (
-    RigidProgress,
     RigidWalk,
-    attempt_step,
-    ending_of,
-    initial_progress,
-    state_with_hip,
 )
 
 RIGID_ACCURACIES = {"fast": 1e-4, "balanced": 1e-6, "tight": 1e-11}
@@ -143,63 +136,20 @@ def rigid_walk(
     )
     # In the precision of the start, as `simulate` has it.
     walk = jtu.tree_map(lambda leaf: leaf.astype(state.theta_1.dtype), walk)
-    run = _by_lanes if chosen == "lanes" else _by_xla
-    return run(walk, int(most_arrivals), duration is None)
-
-
-def _by_lanes(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
-    found, recorded = rigid_walk_by_lanes(walk, room=room, waits=waits)
-    times, states = _empty_walk(walk, room)
+    program = rigid_program(most_arrivals > 0, duration is None)
+    request = Request(program, walk, room=int(most_arrivals), quick=True)
+    found, recorded, _ = (LANES if chosen == "lanes" else XLA).run(request)
+    strikes = jnp.full((int(most_arrivals), 1 + len(state)), jnp.inf, state.theta_1.dtype)
     if recorded is not None:
-        reached = jnp.arange(room) < recorded.counts
-        values = jnp.where(reached[:, None], recorded.values, jnp.inf)
-        times, states = values[:, 0], RigidState(*[values[:, 1 + i] for i in range(5)])
+        reached = jnp.arange(strikes.shape[0]) < recorded.counts
+        strikes = jnp.where(reached[:, None], recorded.values, strikes)
+    states = RigidState(*[strikes[:, 1 + i] for i in range(len(state))])
     return RigidWalked(
         t=found.t,
         state=found.state,
-        ending=found.code,
+        ending=found.ending,
         footsteps=found.footsteps,
         attempts=found.attempts,
-        strikes=(times, states),
-        engine="lanes",
+        strikes=(strikes[:, 0], states),
+        engine=chosen,
     )
-
-
-def _by_xla(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
-    end, strikes = _loop(walk, room)
-    return RigidWalked(
-        t=end.t,
-        state=state_with_hip(walk, end),
-        ending=ending_of(walk, end, jnp.asarray(waits)),
-        footsteps=end.footsteps,
-        attempts=end.attempts,
-        strikes=strikes,
-        engine="xla",
-    )
-
-
-@eqx.filter_jit
-def _loop(walk: RigidWalk, room: int) -> tuple[RigidProgress, Any]:
-    def advance(
-        loop: tuple[RigidProgress, Any, Scalar],
-    ) -> tuple[RigidProgress, Any, Scalar]:
-        now, strikes, _ = loop
-        after, over = attempt_step(walk, now)
-        if room:
-            # Without a strike the place is past the end, and nothing is written.
-            place = jnp.where(after.struck, now.footsteps, room)
-            strikes = jtu.tree_map(
-                lambda kept, new: kept.at[place].set(new, mode="drop"),
-                strikes,
-                (after.t, state_with_hip(walk, after)),
-            )
-        return after, strikes, over
-
-    begin = (initial_progress(walk), _empty_walk(walk, room), jnp.asarray(False))
-    end, strikes, _ = jax.lax.while_loop(lambda loop: ~loop[2], advance, begin)
-    return end, strikes
-
-
-def _empty_walk(walk: RigidWalk, room: int) -> tuple[Scalar, RigidState]:
-    empty = jnp.full(room, jnp.inf, dtype=walk.state.theta_1.dtype)
-    return empty, RigidState(*[empty] * 5)

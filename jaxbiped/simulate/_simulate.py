@@ -276,7 +276,7 @@ class Simulation(eqx.Module):
         """Compiles the solve, so that its run can be timed by itself."""
         if self._lanes_can():
             return CompiledSimulation(prepare_lanes(self), self)
-        program = by_xla.lower(self).compile()  # type: ignore[attr-defined]
+        program = by_xla.lower(self).compile()
         return CompiledSimulation(program, self)
 
     def _lanes_can(self) -> bool:

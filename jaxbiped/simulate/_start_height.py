@@ -6,7 +6,9 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.scene._clearance import AbstractClearance
@@ -42,7 +44,8 @@ def check_start_height(scene: Any, state: Any) -> None:
     depths = [walker.r - hip_z + walker.hip_to_foot * math.cos(float(angle)) for angle in angles]
     if max(depths) <= 0.0:
         return
-    energies = _contact_energies(scene.clearance, scene.normal, depths, rates)
+    given = scene.clearance, scene.normal, depths, rates
+    energies = _contact_energies(*jtu.tree_map(np.asarray, given))
     stored, depth, leg = max(zip(map(float, energies), depths, (1, 2), strict=True))
     if stored > 0.0 and (depth > _DEEPEST * walker.l or stored > _HIGHEST * lift > 0.0):
         raise ArgumentError(
@@ -52,7 +55,7 @@ def check_start_height(scene: Any, state: Any) -> None:
         )
 
 
-@jax.jit
+@cached_jit
 def _contact_energies(
     clearance: AbstractClearance, law: AbstractNormalLaw, depths: Any, rates: Any
 ) -> list[Scalar]:

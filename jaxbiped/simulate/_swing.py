@@ -7,6 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._checks import ArgumentError, check_count, check_finite, check_positive, check_type
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
@@ -99,7 +100,7 @@ def swing(
     return _solve(scene, state, times, method, control, dt, max_solver_steps, chosen)
 
 
-@eqx.filter_jit
+@cached_jit
 def _solve(
     scene: LinkageScene,
     state: LinkageState,

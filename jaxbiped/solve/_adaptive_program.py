@@ -7,14 +7,12 @@ import contextlib
 from typing import Any, NamedTuple
 
 import diffrax
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Program
-from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
@@ -235,13 +233,3 @@ class AdaptiveSolve:
 
 def _numbers(values: PyTree) -> PyTree:
     return jtu.tree_map(lambda x: jnp.asarray(x, dtype=jnp.float64), values)
-
-
-def shapes_of(scene: Scene) -> Solve:
-    """The shapes of one simulation's inputs, for a scene of these laws."""
-    number: Any = jax.ShapeDtypeStruct((), jnp.float64)
-    scene = jtu.tree_map(lambda _: number, scene)
-    kind = state_type(scene)
-    state = kind(*[number] * len(kind._fields))
-    numbers = dict.fromkeys(Solve._fields[2:], number) | {"units": Units(state, number)}
-    return Solve(scene, state, **numbers)

@@ -3,12 +3,13 @@
 from typing import Any
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
+
+from jaxbiped._caches import cached_jit
 
 AT_ONCE = 4096
 """Times or states in one call of a compiled function: one size for all lengths."""
@@ -44,7 +45,7 @@ def evaluate_dense(dense: diffrax.DenseInterpolation, times: np.ndarray) -> PyTr
     return join_parts(found, len(times))
 
 
-@eqx.filter_jit
+@cached_jit
 def _evaluate(kind: Any, start: np.ndarray, end: np.ndarray, info: PyTree, t: np.ndarray) -> PyTree:
     def evaluate(start: Any, end: Any, info: Any, t: Any) -> PyTree:
         return kind(t0=start, t1=end, **info).evaluate(t)

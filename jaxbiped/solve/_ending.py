@@ -4,10 +4,10 @@ import enum
 from collections.abc import Callable
 from typing import Any
 
-import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import Foot, feet, touches
@@ -66,7 +66,7 @@ def has_fallen(scene: Scene, state: State) -> Scalar:
     return state.hip_z < walker.r + walker.hip_to_foot * jnp.cos(_FALL_ANGLE)
 
 
-@eqx.filter_jit  # for its trace cache
+@cached_jit  # for its trace cache
 def is_barred(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
     """Whether the motion has no continuation at the surface where a leg turns back (two booleans).
 
@@ -103,7 +103,7 @@ def is_barred(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
     return ahead, (barred_1 | barred_2) & ~ahead
 
 
-@eqx.filter_jit  # for its trace cache
+@cached_jit  # for its trace cache
 def has_stopped(scene: Scene, state: State) -> Scalar:
     """Whether the stance leg is at rest in single support, or all the walker is (boolean)."""
     foot_1, foot_2 = feet(scene, state)
@@ -125,7 +125,7 @@ def has_stopped(scene: Scene, state: State) -> Scalar:
     return slow | (~touch_1 & ~touch_2 & sinking)
 
 
-@eqx.filter_jit  # for its trace cache
+@cached_jit  # for its trace cache
 def has_stumbled(scene: Scene, state: State) -> Scalar:
     """Whether the rear foot comes down, moving forward, while the other carries (boolean)."""
     foot_1, foot_2 = feet(scene, state)
@@ -150,39 +150,48 @@ def rigid_ending(state: RigidState) -> Scalar:
     return jnp.where(jnp.isfinite(sum(state)), code, int(Ending.SOLVER_FAILED))
 
 
-WATCHES = ("fall", "stop", "stumble")
+def _failed(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+    return ~jnp.isfinite(sum(jtu.tree_leaves(y)))
+
+
+def _fell_forward(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+    y = minimal_state(args, y)
+    too_late, _ = is_barred(args, y)
+    return too_late | (has_fallen(args, y) & (y.hip_vx >= 0.0))
+
+
+def _fell_back(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+    y = minimal_state(args, y)
+    return has_fallen(args, y) & (y.hip_vx < 0.0)
+
+
+def _stopped(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+    return has_stopped(args, minimal_state(args, y))
+
+
+def _stumbled(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+    y = minimal_state(args, y)
+    _, too_short = is_barred(args, y)
+    return too_short | has_stumbled(args, y)
+
+
+_EVENTS: dict[str, dict[Ending, Callable[..., Any]]] = {
+    "fall": {Ending.FELL_FORWARD: _fell_forward, Ending.FELL_BACK: _fell_back},
+    "stop": {Ending.STOPPED: _stopped},
+    "stumble": {Ending.STUMBLED: _stumbled},
+}
+WATCHES = tuple(_EVENTS)
 
 
 def ending_events(watch: tuple[str, ...]) -> dict[Ending, Callable[..., Any]]:
-    """The conditions, for `diffrax.Event`, that end a solve whose `args` is the scene."""
+    """The conditions, for `diffrax.Event`, that end a solve whose `args` is the scene.
 
-    def fell_forward(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
-        y = minimal_state(args, y)
-        too_late, _ = is_barred(args, y)
-        return too_late | (has_fallen(args, y) & (y.hip_vx >= 0.0))
-
-    def fell_back(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
-        y = minimal_state(args, y)
-        return has_fallen(args, y) & (y.hip_vx < 0.0)
-
-    def stopped(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
-        return has_stopped(args, minimal_state(args, y))
-
-    def stumbled(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
-        y = minimal_state(args, y)
-        _, too_short = is_barred(args, y)
-        return too_short | has_stumbled(args, y)
-
-    def failed(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
-        return ~jnp.isfinite(sum(jtu.tree_leaves(y)))
-
-    events: dict[Ending, Callable[..., Any]] = {Ending.SOLVER_FAILED: failed}
-    if "fall" in watch:
-        events |= {Ending.FELL_FORWARD: fell_forward, Ending.FELL_BACK: fell_back}
-    if "stop" in watch:
-        events[Ending.STOPPED] = stopped
-    if "stumble" in watch:
-        events[Ending.STUMBLED] = stumbled
+    The same functions each time: JAX's caches know what they have traced by the functions.
+    """
+    events = {Ending.SOLVER_FAILED: _failed}
+    for name, conditions in _EVENTS.items():
+        if name in watch:
+            events |= conditions
     return events
 
 

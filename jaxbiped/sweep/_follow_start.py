@@ -1,13 +1,13 @@
 """Following of starts until each is certain, by either engine."""
 
-import functools
-import threading
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._caches import PROGRAMS, bounded_cache
+from jaxbiped.compiler import LANES, XLA, Program, Request
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._adaptive_program import Solve
@@ -16,8 +16,6 @@ from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._goals import Goals
-from jaxbiped.sweep._labelling_by_lanes import label_by_lanes
-from jaxbiped.sweep._labelling_by_xla import label_by_xla
 from jaxbiped.sweep._labelling_loop import (
     AbstractLabellingLoop,
     CompliantLabelling,
@@ -30,8 +28,6 @@ _LONGEST = 1e6
 """Simulated time [s] that no start takes: its footsteps or its patience end it before."""
 _PATIENCE = 50.0
 """Longest time between two footsteps, in units of √(l/g)."""
-
-_MAKING = threading.Lock()
 
 
 class Effort(NamedTuple):
@@ -81,21 +77,23 @@ def follow_starts(
         solve = Solve(**common, almost=last, atol=atol, units=units, patience=same(np.inf))
     waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
-    with _MAKING:
-        loop = _labelling_loop(scene.compliant, effort.solver, periods, effort.engine)
     if not count:
         return _empty_outcome(len(states) - 1)
-    run = label_by_lanes if effort.engine == "lanes" else label_by_xla
-    return run(loop, jtu.tree_map(np.asarray, starts))
+    program = _program(scene.compliant, effort.solver, periods, effort.engine)
+    engine = LANES if effort.engine == "lanes" else XLA
+    given = jtu.tree_map(np.asarray, starts)
+    outcome: Outcome = engine.run(Request(program, given, batch=True)).outputs
+    return outcome
 
 
-@functools.cache  # the same object each time, so that nothing is compiled again
-def _labelling_loop(
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
+def _program(
     compliant: bool, solver: AbstractRosenbrock, periods: tuple[int, ...], engine: str
-) -> AbstractLabellingLoop:
+) -> Program:
+    loop: AbstractLabellingLoop = RigidLabelling(periods)
     if compliant:
-        return CompliantLabelling(solver, periods, fenced=engine == "xla")
-    return RigidLabelling(periods)
+        loop = CompliantLabelling(solver, periods, fenced=engine == "xla")
+    return Program(loop.begin, loop.attempt, loop.finish)
 
 
 def _empty_outcome(size: int) -> Outcome:

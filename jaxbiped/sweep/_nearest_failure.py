@@ -6,7 +6,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._types import as_float
 from jaxbiped.basins._label import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock, minimal_fatal_shock
 from jaxbiped.basins._ray_descent import Normal
@@ -84,14 +86,7 @@ def boundary_normal(scene: Any, attractor: Attractor) -> Normal:
     that distance is constant along the boundary, but for what has not died out by then. As many
     footsteps are taken as the start has left before it fails, up to a few.
     """
-
-    def arrival(point: Any) -> tuple[Any, Any]:
-        state = type(attractor.state)(jnp.zeros(()), *point)
-        came = return_map(scene, state)
-        after = jnp.stack(came.state[1:])
-        return after, (after, came.code)
-
-    many = jax.jit(jax.vmap(jax.jacfwd(arrival, has_aux=True)))
+    scene = jax.tree.map(as_float, scene)
     squared = attractor.metric.T @ attractor.metric
 
     def some(points: np.ndarray) -> np.ndarray:
@@ -99,7 +94,8 @@ def boundary_normal(scene: Any, attractor: Attractor) -> Normal:
         slopes = np.broadcast_to(np.eye(at.shape[1]), (*at.shape, at.shape[1])).copy()
         walked = np.zeros(len(points), dtype=int)
         for _ in range(_MOST_FOOTSTEPS):
-            change, (after, code) = jax.tree.map(np.asarray, many(jnp.asarray(at)))
+            found = _arrivals(scene, type(attractor.state), jnp.asarray(at))
+            change, (after, code) = jax.tree.map(np.asarray, found)
             on = on & (code == 0) & np.isfinite(change).all(axis=(1, 2))
             slopes[on] = change[on] @ slopes[on]
             at[on] = after[on]
@@ -114,3 +110,15 @@ def boundary_normal(scene: Any, attractor: Attractor) -> Normal:
         return np.concatenate(blocks)[:count] if count else np.array(points)
 
     return normal
+
+
+@cached_jit
+def _arrivals(scene: Any, kind: type, points: Any) -> Any:
+    """Derivatives of the next arrivals from points (n, m), these arrivals and their codes."""
+
+    def arrival(point: Any) -> tuple[Any, Any]:
+        came = return_map(scene, kind(jnp.zeros(()), *point))
+        after = jnp.stack(came.state[1:])
+        return after, (after, came.code)
+
+    return jax.vmap(jax.jacfwd(arrival, has_aux=True))(points)

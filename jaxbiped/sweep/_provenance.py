@@ -1,6 +1,5 @@
 """Provenance of results."""
 
-import functools
 import hashlib
 import json
 import platform
@@ -9,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from jaxbiped._caches import bounded_cache
 from jaxbiped.sweep._identity import code_digests
 
 _PACKAGES = ("jaxbiped", "jax", "diffrax", "numpy", "llvmlite")
@@ -25,7 +25,7 @@ def provenance(*models: Any) -> dict[str, str]:
     return found | {"user_code": json.dumps(code_digests(*models))}
 
 
-@functools.cache
+@bounded_cache(len(_PACKAGES))
 def _version(name: str) -> str:
     try:
         return version(name)
@@ -33,7 +33,7 @@ def _version(name: str) -> str:
         return "unknown"
 
 
-@functools.cache  # what runs is what was imported
+@bounded_cache(1)  # what runs is what was imported
 def _revision() -> str:
     """Of the source that runs, "unknown" where it is not a checkout.
 

@@ -1,6 +1,5 @@
 """Adjoint solve of the second variation along a known motion, by lanes."""
 
-import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -9,8 +8,9 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import CompiledProgram, Program, Recording, call, call_recording
+from jaxbiped.compiler import LANES, Program, Recording, Request
 from jaxbiped.variational._adjoint_step import Adjoints, adjoint_step
 from jaxbiped.variational._collocated_step import Rows, linearise_about
 from jaxbiped.variational._first_variation import (
@@ -58,9 +58,18 @@ class _Now(NamedTuple):
 def carry_tangents(flow: Flow, nodes: Nodes, leading: Scalar) -> tuple[FirstVariation, Recording]:
     """Turned tangents (v, c) carried along a motion to its arrival; and the steps of that."""
     given = FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, leading, nodes.steps)
-    compiled = _compiled(_kind(flow), None)
-    room = nodes.ends.recorder.room
-    return call_recording(compiled, given, room=room, quick=True, stream=nodes.ends, once=True)
+    request = Request(
+        _program(_kind(flow), None),
+        given,
+        room=nodes.ends.recorder.room,
+        stream=nodes.ends,
+        quick=True,
+        keeps_records=True,
+        reads_once=True,
+    )
+    found = LANES.run(request)
+    assert found.recording is not None
+    return found.outputs, found.recording
 
 
 def pull_back(
@@ -82,7 +91,9 @@ def pull_back(
         final: whether the cycle ends there: of that arrival tangents on the section are told.
     """
     given = _Given(flow.args.args, nodes.arrival, leading, after)
-    return call(_compiled(_kind(flow), final), given, stream=steps, quick=True)[0]
+    request = Request(_program(_kind(flow), final), given, stream=steps, quick=True)
+    adjoints: Adjoints = LANES.run(request).outputs
+    return adjoints
 
 
 class _Kind(NamedTuple):
@@ -91,22 +102,16 @@ class _Kind(NamedTuple):
     system: AbstractSystem
     arrival: Arrival
     active: tuple[int, ...]
-    args: Any
     state: Any
 
 
 def _kind(flow: Flow) -> _Kind:
-    args = jtu.tree_structure(flow.args.args)
-    return _Kind(flow.system, flow.arrival, flow.args.active, args, flow.structure)
+    return _Kind(flow.system, flow.arrival, flow.args.active, flow.structure)
 
 
-@functools.lru_cache(maxsize=256)
-def _compiled(kind: _Kind, final: bool | None) -> CompiledProgram:
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
+def _program(kind: _Kind, final: bool | None) -> Program:
     """The program that carries leading tangents, or where `final` is given, that of adjoints."""
-
-    def numbers(*shape: int) -> Any:
-        return jax.ShapeDtypeStruct(shape, jnp.float64)
-
     # Compiled by itself, the field is traced once, not at each of its many uses.
     field = jax.jit(kind.system.vector_field)
 
@@ -115,17 +120,10 @@ def _compiled(kind: _Kind, final: bool | None) -> CompiledProgram:
         seeded = Seeded(given.args, no_columns, no_columns, kind.active)
         return Flow(kind.system, kind.arrival, field, seeded, kind.state)
 
-    c, p = kind.state.num_leaves, len(kind.active)
-    args = jtu.tree_unflatten(kind.args, [numbers()] * kind.args.num_leaves)
-    row, leading = numbers(1 + c), numbers(COUNT, c)
+    c = kind.state.num_leaves
     if final is None:
-        given = FirstVariationInputs(args, row, row, leading, numbers())
-        return CompiledProgram(FirstVariationSolve(flow, 1 + c).program(), given)
-    after = Adjoints(leading, numbers(c), numbers(p))
-    program = _AdjointSolve(flow, Step.shape(c, COUNT), final).program()
-    return CompiledProgram(
-        program, _Given(args, row, FirstVariation(leading, numbers(c), numbers()), after)
-    )
+        return FirstVariationSolve(flow, 1 + c).program()
+    return _AdjointSolve(flow, Step.shape(c, COUNT), final).program()
 
 
 class _AdjointSolve:

@@ -3,7 +3,6 @@
 JAX cannot differentiate machine code, so the rules of both modes are given here.
 """
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -13,12 +12,13 @@ import jax.tree_util as jtu
 import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
+from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import CompiledProgram, Recorded, Schedule, UnknownPrimitiveError, call
+from jaxbiped.compiler import LANES, Program, Recorded, Request
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._state import State
 from jaxbiped.dynamics._switches import switches
-from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, shapes_of
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved
 from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -67,8 +67,7 @@ def solve_scene(solve: Solve, setting: Setting) -> Solved:
     """
     leaves, structure = jtu.tree_flatten(solve)
     if not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
-        compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
-        return call(compiled, solve, quick=setting.quick)[0]
+        return _run(solve, setting)[0]
     return Solved(*_unflatten(solve.state, _differentiable(setting, structure)(*leaves)))
 
 
@@ -80,20 +79,16 @@ def solve_and_save(
     They are made at each of `times`, or for the first `room` arrivals at a section. It has no
     derivatives.
     """
-    compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
-    schedule = None if times is None else Schedule(times)
-    return call(compiled, solve, schedule, room=room, quick=setting.quick)
+    return _run(solve, setting, times=times, room=room)
 
 
 def solve_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[Solved, np.ndarray]:
     """One simulation, not traced, and the records of its at most so many steps, (n, numbers)."""
-    compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
     one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], solve)
 
-    def run(room: int) -> tuple[Solved, Recorded]:
-        outputs, recorded = compiled.run(one, room=room, width=1, quick=setting.quick)
-        assert recorded is not None
-        return outputs, recorded
+    def run(room: int) -> tuple[Solved, Any]:
+        found = LANES.run(request_of(one, setting)._replace(room=room, batch=True))
+        return found.outputs, found.records
 
     outputs, recorded = run(min(most, _ROOM))
     if recorded.counts[0] > _ROOM:
@@ -102,34 +97,28 @@ def solve_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[So
     return jtu.tree_map(lambda leaf: leaf[0], outputs), recorded.values[0, : recorded.counts[0]]
 
 
-@functools.lru_cache(maxsize=256)
-def compiled_solve(setting: Setting, scene: Any) -> CompiledProgram:
-    """The program for scenes of one structure (see `jax.tree.structure`)."""
-    body = AdaptiveSolve(
-        setting.solver, setting.watch, counting=setting.counting, saved=setting.saved
-    )
-    placeholder = jtu.tree_unflatten(scene, [0.0] * scene.num_leaves)
-    return CompiledProgram(body.program(), shapes_of(placeholder))
+def request_of(solve: Solve, setting: Setting) -> Request:
+    """What is asked of lanes; they may hold no operation that it needs (see `LaneEngine.can`)."""
+    return Request(_program(setting), solve, quick=setting.quick)
 
 
-@functools.lru_cache(maxsize=256)
-def is_expressible(setting: Setting, scene: Any) -> bool:
-    """Whether lanes have all operations of scenes of this structure (see `jax.tree.structure`)."""
-    try:
-        compiled_solve(setting, scene).check()
-    except UnknownPrimitiveError:
-        return False
-    return True
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
+def _program(setting: Setting) -> Program:
+    solver, watch, counting, _, saved = setting
+    return AdaptiveSolve(solver, watch, counting=counting, saved=saved).program()
 
 
-@functools.lru_cache(maxsize=256)
+def _run(solve: Solve, setting: Setting, **options: Any) -> tuple[Solved, Any]:
+    found = LANES.run(request_of(solve, setting)._replace(**options))
+    return found.outputs, found.records
+
+
+@bounded_cache(PROGRAMS)
 def _differentiable(setting: Setting, structure: Any) -> Callable[..., list[Scalar]]:
     @jax.custom_jvp
     def run(*leaves: Scalar) -> list[Scalar]:
         solve = jtu.tree_unflatten(structure, leaves)
-        compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
-        found, _ = call(compiled, solve, quick=setting.quick)
-        return jtu.tree_leaves(found)
+        return jtu.tree_leaves(_run(solve, setting)[0])
 
     def rule(primals: Sequence[Scalar], tangents: Sequence[Any]) -> tuple[Any, Any]:
         found = run(*primals)

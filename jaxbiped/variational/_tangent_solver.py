@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._projected_solver import Projected
@@ -122,7 +123,7 @@ def _plain_step(
     return y1, error
 
 
-@eqx.filter_jit  # for its trace cache
+@cached_jit  # for its trace cache
 def _tangent_step(
     solver: TangentSolver, t0: Any, t1: Any, y0: Tangents, args: Seeded
 ) -> tuple[Tangents, Tangents]:

@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 import xarray as xr
 import zarr
-from PIL import Image
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import to_hex
 
 import jaxbiped as jb
 from jaxbiped import plot
 from jaxbiped.cli import main
+from jaxbiped.plot._label_colours import label_colour
+from tests.drawn import assert_is_drawn, saved_figures
+
+pytestmark = pytest.mark.slow
 
 HEADER = "hip_x,hip_z,theta_1,theta_2,hip_vx,hip_vz,omega_1,omega_2"
 AXES = ("--x", "theta_swing=-0.5:0.3:9", "--y", "omega_swing=-2:4:7")
@@ -26,22 +31,17 @@ def _run(*arguments):
 
 @pytest.fixture(scope="module")
 def basin(tmp_path_factory):
-    """The command run once with every output: its folder."""
+    """The command run once with every output: its folder, and the figures in it."""
     folder = tmp_path_factory.mktemp("basin")
     outputs = ("--out", folder / "out", "--json", folder / "b.json", "--store", folder / "store")
-    with pytest.MonkeyPatch.context() as patch:
-        drawn = []
-        draw = plot.basin
-        patch.setattr(plot, "basin", lambda *a, **k: drawn.append(draw(*a, **k)) or drawn[-1])
+    with saved_figures() as figures:
         assert _run(*AXES, *outputs, "--chunk", 18) == 0
-    (ax,) = drawn[0].axes
-    assert ax.get_xlabel() == r"swing leg angle, $\theta_1$ (rad)"
-    return folder
+    return folder, figures
 
 
 @pytest.fixture(scope="module")
 def numbers(basin):
-    return json.loads((basin / "b.json").read_text())
+    return json.loads((basin[0] / "b.json").read_text())
 
 
 def test_json(numbers):
@@ -59,32 +59,40 @@ def test_json(numbers):
 
 
 def test_picture_and_results(basin, numbers):
-    with Image.open(basin / "out" / "basin.png") as picture:
-        assert min(picture.size) > 300
-    found = xr.open_dataset(basin / "out" / "basin.nc")
+    folder, figures = basin
+    (ax,) = figures["basin.png"].axes
+    assert_is_drawn(ax.figure)
+    assert ax.get_xlabel() == r"swing leg angle, $\theta_1$ (rad)"
+    found = xr.open_dataset(folder / "out" / "basin.nc")
+    # Every cell has its label's colour.
+    (mesh,) = [one for one in ax.collections if isinstance(one, QuadMesh)]
+    mesh.update_scalarmappable()
+    shown = [to_hex(colour).upper() for colour in mesh.get_facecolors()]
+    names = jb.basins.label_names(found.label.values, 1).ravel()
+    assert shown == [label_colour(str(name)) for name in names]
     assert found.label.dims == ("omega_swing", "theta_swing")
     assert found.theta_swing.attrs["units"] == "rad"
-    stored = xr.open_zarr(basin / "store")
+    stored = xr.open_zarr(folder / "store")
     assert np.array_equal(stored.label, found.label)
     walks = int((found.label == jb.basins.Label.WALKING).sum())
     assert walks == numbers["counts"]["walking period-1"]
 
 
 def test_a_second_run_finds_all_chunks(basin, capsys):
-    outputs = ("--store", basin / "store", "--chunk", 18)
+    outputs = ("--store", basin[0] / "store", "--chunk", 18)
     assert _run(*AXES, *outputs) == 0
     assert "63 starts, 0 of them labelled in this run" in capsys.readouterr().out
 
 
 def test_a_store_of_other_settings_is_refused(basin, capsys):
-    outputs = ("--store", basin / "store", "--chunk", 18)
+    outputs = ("--store", basin[0] / "store", "--chunk", 18)
     assert _run(*AXES, *outputs, "--footsteps", 7) == 2
     assert "effort.footsteps = 30 there, 7 here" in capsys.readouterr().err
 
 
 def test_a_store_of_another_revision_is_refused_unless_asked_for(basin, capsys):
-    outputs = ("--store", basin / "store", "--chunk", 18)
-    group = zarr.open_group(str(basin / "store"), mode="r+")
+    outputs = ("--store", basin[0] / "store", "--chunk", 18)
+    group = zarr.open_group(str(basin[0] / "store"), mode="r+")
     group.attrs.update({"git_revision": "another"})
     assert _run(*AXES, *outputs) == 2
     assert "--any-version" in capsys.readouterr().err

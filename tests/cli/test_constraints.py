@@ -2,11 +2,13 @@
 
 import json
 
+import numpy as np
 import pytest
 
 import jaxbiped as jb
 from jaxbiped.cli import main
 from jaxbiped.cli._walk_options import SceneOptions
+from tests.drawn import assert_is_drawn, points_of, saved_figures
 
 
 def _run(*arguments):
@@ -15,13 +17,17 @@ def _run(*arguments):
     return stopped.value.code
 
 
+@pytest.mark.slow
 def test_compares_methods_and_integrators(capsys, tmp_path):
     flags = ("--methods", "standard", "described", "--duration", "0.05")
     integrators = ("--integrators", "euler:dt=1e-5", "euler:dt=2e-3")
     picture = tmp_path / "made" / "constraints.png"
     out = ("--json", "-", "--out", str(picture.parent))
-    assert _run("constraints", *flags, *integrators, *out) == 0
-    assert picture.stat().st_size > 10_000
+    with saved_figures() as figures:
+        assert _run("constraints", *flags, *integrators, *out) == 0
+    assert picture.is_file()
+    (figure,) = figures.values()
+    assert_is_drawn(figure, unitless={"method"})
     shown = capsys.readouterr()
     assert "4/4" in shown.err
     runs = json.loads(shown.out)["runs"]
@@ -31,6 +37,8 @@ def test_compares_methods_and_integrators(capsys, tmp_path):
         ("described", 1e-5),
         ("described", 2e-3),
     ]
+    marks = points_of(figure.axes[0], "euler, steps of 1e-05 s")[0]
+    np.testing.assert_allclose(marks[0, 0], runs[0]["max_violation_m"])
     for run in runs:
         assert run["integrator"] == "euler"
         assert run["wall_s_run"] > 0.0
@@ -93,6 +101,7 @@ def test_bad_flags_are_one_sentence(arguments, said, capsys):
     assert len(error.strip().splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_walk_tells_of_the_hip(tmp_path):
     written = tmp_path / "walk.json"
     flags = ("--formulation", "redundant", "--method", "described", "--duration", "1.3")

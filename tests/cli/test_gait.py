@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 import pytest
-from PIL import Image
 
 import jaxbiped as jb
 from jaxbiped.cli import _gait as command
 from jaxbiped.cli import main
+from tests.drawn import assert_is_drawn, points_of, saved_figures
+
+pytestmark = pytest.mark.slow
 
 MEASURES = {"period_s", "step_length_m", "speed_m_s", "peak_normal_N", "spectral_radius"}
 
@@ -32,7 +34,7 @@ def _read(path):
 
 @pytest.fixture(scope="module")
 def gait(tmp_path_factory):
-    """The command run once, with every output: exit code, folder and the gait."""
+    """The command run once, with every output: exit code, folder, the gait and figures."""
     folder = tmp_path_factory.mktemp("gait")
     found = []
 
@@ -40,15 +42,15 @@ def gait(tmp_path_factory):
         found.append(jb.find_gait(*arguments, **options))
         return found[-1]
 
-    with pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch, saved_figures() as figures:
         patch.setattr(command, "find_gait", find)
         code = _run("--out", str(folder / "out"), "--json", str(folder / "gait.json"))
-    return code, folder, found[0]
+    return code, folder, found[0], figures
 
 
 @pytest.fixture(scope="module")
 def numbers(gait):
-    code, folder, _ = gait
+    code, folder, _, _ = gait
     assert code == 0
     return _read(folder / "gait.json")
 
@@ -97,13 +99,16 @@ def test_elasticities_are_relative_sensitivities(numbers):
         assert relative[name] == pytest.approx(0.02 * slopes[name] / numbers[name], rel=1e-6)
 
 
-def test_writes_pictures(gait):
-    _, folder, _ = gait
+def test_writes_pictures(gait, numbers):
+    _, folder, _, figures = gait
     names = {path.name for path in (folder / "out").iterdir()}
-    assert names == {"multipliers.png", "elasticities.png", "orbit.png"}
-    for name in names:
-        with Image.open(folder / "out" / name) as picture:
-            assert min(picture.size) > 100
+    assert names == set(figures) == {"multipliers.png", "elasticities.png", "orbit.png"}
+    for figure in figures.values():
+        assert_is_drawn(figure, unitless={"d log measure / d log parameter"})
+    drawn = points_of(figures["multipliers.png"].axes[0], "multipliers")[0]
+    np.testing.assert_allclose(drawn, numbers["multipliers"][: len(drawn)], atol=1e-3)
+    start = numbers["state"]["theta_1"], numbers["state"]["omega_1"]
+    assert points_of(figures["orbit.png"].axes[0])[0][0] == pytest.approx(start, abs=1e-6)
 
 
 def test_a_search_that_fails_says_so(gait, tmp_path, capsys, monkeypatch):

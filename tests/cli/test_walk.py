@@ -5,9 +5,11 @@ import subprocess
 import sys
 
 import pytest
-from PIL import Image
 
 from jaxbiped.cli import main
+from tests.drawn import leg_pixels
+
+pytestmark = pytest.mark.slow
 
 
 def _run(*arguments):
@@ -54,10 +56,13 @@ def test_writes_pictures_an_animation_and_the_trajectory(walk):
     out, _ = walk
     names = {path.name for path in (out / "out").iterdir()}
     assert {"strobe.png", "contact_forces.png", "walk.gif", "trajectory.nc"} <= names
-    for name in names:
-        if name.endswith((".png", ".gif")):
-            with Image.open(out / "out" / name) as picture:
-                assert min(picture.size) > 100
+    pictures = [name for name in names if name.endswith((".png", ".gif"))]
+    assert len(pictures) >= 5
+    for name in pictures:
+        # A phase portrait is of one leg, all else of both.
+        assert sorted(leg_pixels(out / "out" / name))[-1] > 100, name
+    assert min(leg_pixels(out / "out" / "strobe.png")) > 100
+    assert min(leg_pixels(out / "out" / "walk.gif")) > 100
 
 
 @pytest.mark.parametrize(

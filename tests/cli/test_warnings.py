@@ -6,6 +6,8 @@ import pytest
 
 from jaxbiped.cli import main
 
+pytestmark = pytest.mark.slow
+
 
 def _walked(capsys, *arguments):
     """The numbers that the command writes."""

@@ -1,15 +1,22 @@
+import numpy as np
 import pytest
 
-from tests.experiments.quick import quick_numbers
+from tests.drawn import assert_is_drawn, labels_of, points_of
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
 
 
 def test_the_seeds_basin(tmp_path):
-    numbers = quick_numbers(
-        "basin_seed",
-        tmp_path,
-        keys={"fractions", "boundary", "refined", "tolerances", "pushes", "along"},
-        pictures={"basin_seed.png", "basin_seed_refined.png", "basin_seed_along.png"},
-    )
+    numbers, figures = quick_run("basin_seed", tmp_path)
+    assert set(figures) == {"basin_seed.png", "basin_seed_refined.png", "basin_seed_along.png"}
+    for figure in figures.values():
+        assert_is_drawn(figure, unitless={"fraction of the starts"})
+    plane, refined = (figures[f"basin_seed{end}.png"] for end in ("", "_refined"))
+    assert len(labels_of(plane)) == 2
+    assert labels_of(plane) == labels_of(refined)
+    walks = points_of(figures["basin_seed_along.png"].axes[0], "walking period-1")[0][:, 1]
+    np.testing.assert_allclose(walks, [row[0] for row in numbers["along"]["c"]["walking"]])
     fractions = numbers["fractions"]
     assert sum(part["estimate"] for part in fractions.values()) == pytest.approx(1.0)
     walking = fractions["walking period-1"]

@@ -1,10 +1,16 @@
-from tests.experiments.quick import quick_numbers
+import pytest
+
+from tests.drawn import assert_is_drawn
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
 
 
 def test_the_simplest_walkers_basin_is_thin_and_as_the_equations_say(tmp_path):
-    numbers = quick_numbers(
-        "basin_simplest", tmp_path, keys={"slopes", "picture"}, pictures={"basin_simplest.png"}
-    )
+    numbers, figures = quick_run("basin_simplest", tmp_path)
+    (figure,) = figures.values()
+    assert_is_drawn(figure)
+    assert len(figure.axes) >= 2 * len(numbers["slopes"]) == 4
     for found in numbers["slopes"].values():
         assert found["gait_off"] < 1e-6
         assert found["intervals_overlap"]

@@ -1,15 +1,25 @@
 import numpy as np
+import pytest
 
-from tests.experiments.quick import quick_numbers
+from tests.drawn import assert_is_drawn, labels_of, points_of
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
 
 
 def test_errors_costs_and_maps(tmp_path):
-    numbers = quick_numbers(
-        "constraint_trade",
-        tmp_path,
-        keys={"runs", "maps", "costs"},
-        pictures={"trade.png", "constants.png"},
-    )
+    numbers, figures = quick_run("constraint_trade", tmp_path)
+    assert_is_drawn(figures["trade.png"])
+    assert labels_of(figures["trade.png"]) == {"time of a run (s)", "error of the state (SI)"}
+    for method in ("standard", "index1"):
+        shown = [
+            (run["wall_s_run"], run["state_error"])
+            for run in numbers["runs"]
+            if run["method"] == method
+        ]
+        np.testing.assert_array_equal(points_of(figures["trade.png"].axes[0], method)[0], shown)
+    assert_is_drawn(figures["constants.png"])
+    assert {"a (1/s)", "b (1/s)"} <= labels_of(figures["constants.png"])
     runs = {(run["method"], run["rtol_or_dt"]): run for run in numbers["runs"]}
     for method in ("standard", "index1"):
         coarse, fine = runs[method, 1e-4], runs[method, 1e-5]

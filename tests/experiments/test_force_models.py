@@ -1,21 +1,26 @@
 import pytest
 
-from tests.experiments.quick import quick_numbers
+from tests.drawn import assert_is_drawn, labels_of
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
 
 
 def test_laws_are_measured_and_judged(tmp_path):
-    numbers = quick_numbers(
-        "force_models",
-        tmp_path,
-        keys={"criteria", "normal", "friction", "slopes"},
-        pictures={
-            "force_models_normal.png",
-            "force_models_friction.png",
-            "force_models_measures.png",
-            "figure_9_leg_angle.png",
-            "figure_10_contact_force.png",
-        },
-    )
+    numbers, figures = quick_run("force_models", tmp_path)
+    assert set(figures) == {
+        "force_models_normal.png",
+        "force_models_friction.png",
+        "force_models_measures.png",
+        "figure_9_leg_angle.png",
+        "figure_10_contact_force.png",
+    }
+    for figure in figures.values():
+        assert_is_drawn(figure)
+    time = "time, $t$ (s)"
+    angle, force = r"leg angle, $\theta$ (rad)", "normal force, $F_N$ (N)"
+    assert labels_of(figures["figure_9_leg_angle.png"]) == {time, angle}
+    assert labels_of(figures["figure_10_contact_force.png"]) == {time, force}
     laws = numbers["normal"] | numbers["friction"]
     assert set(laws) == {"ristow-schafer", "hunt-crossley", "bengisu-akay", "coulomb"}
     for law in laws.values():

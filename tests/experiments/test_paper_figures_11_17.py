@@ -1,4 +1,9 @@
-from tests.experiments.quick import quick_numbers
+import pytest
+
+from tests.drawn import assert_is_drawn, labels_of
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
 
 FIGURES = {
     "fig11_violation",
@@ -12,12 +17,19 @@ FIGURES = {
 
 
 def test_judges_the_papers_sentences(tmp_path):
-    numbers = quick_numbers(
-        "paper_figures_11_17",
-        tmp_path,
-        keys={"methods", "integrators", "costs", "verdicts"},
-        pictures={f"{figure}.png" for figure in FIGURES},
-    )
+    numbers, figures = quick_run("paper_figures_11_17", tmp_path)
+    assert set(figures) == {f"{figure}.png" for figure in FIGURES}
+    for name, figure in figures.items():
+        names, values = {"time (s)"}, {"violation (m)"}
+        if name == "fig14_time_ratio.png":
+            names, values = {"method"}, {"time by Euler steps, standard = 1"}
+        elif name == "fig17_times.png":
+            names, values = {"integrator"}, {"time of a run (s)"}
+        assert labels_of(figure) == names | values, name
+        assert_is_drawn(figure, unitless={"method", "integrator", *values})
+    bars = [bar.get_height() for bar in figures["fig14_time_ratio.png"].axes[0].patches]
+    shown = [numbers["costs"][name] for name in numbers["costs"] if name != "minimal"]
+    assert bars == [row[key] for key in ("single", "batch") for row in shown]
     methods = numbers["methods"]
     assert methods["described"]["max_violation_m"] < 1e-14
     assert methods["standard"]["last_half_m"] > 1.5 * methods["standard"]["first_half_m"]

@@ -1,6 +1,10 @@
 import pytest
+from PIL import Image
 
-from tests.experiments.quick import quick_numbers
+from tests.drawn import assert_is_drawn, points_of
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
 
 FIGURES = {
     "fig4_strobe",
@@ -12,11 +16,15 @@ FIGURES = {
 
 
 def test_walks_as_the_paper_says(tmp_path):
-    numbers = quick_numbers(
-        "paper_figures_4_8",
-        tmp_path,
-        keys={"outcome", *FIGURES},
-        pictures={"walk.gif", *(f"{figure}.png" for figure in FIGURES)},
+    numbers, figures = quick_run("paper_figures_4_8", tmp_path)
+    assert set(figures) == {f"{figure}.png" for figure in FIGURES}
+    for figure in figures.values():
+        assert_is_drawn(figure)
+    with Image.open(tmp_path / "walk.gif") as moving:
+        assert moving.n_frames > 1
+    angles = points_of(figures["fig6_leg_angles.png"].axes[0], "leg 1")[0][:, 1]
+    assert [angles.min(), angles.max()] == pytest.approx(
+        numbers["fig6_leg_angles"]["angle_range_leg_1_rad"], abs=1e-4
     )
     assert numbers["outcome"] == "walking"
     assert max(numbers["fig8_contact_forces"]["peak_normal_N"]) == pytest.approx(312.6, rel=0.01)

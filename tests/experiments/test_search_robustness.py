@@ -1,13 +1,20 @@
-from tests.experiments.quick import quick_numbers
+import numpy as np
+import pytest
+
+from tests.drawn import assert_is_drawn, points_of
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
 
 
 def test_no_gait_that_walks_settle_on_is_missed(tmp_path):
-    numbers = quick_numbers(
-        "search_robustness",
-        tmp_path,
-        keys={"slope", "mu", "simplest"},
-        pictures={"search_robustness.png"},
-    )
+    numbers, figures = quick_run("search_robustness", tmp_path)
+    assert set(numbers) == {"slope", "mu", "simplest"}
+    (figure,) = figures.values()
+    assert_is_drawn(figure)
+    drawn = np.concatenate(points_of(figure.axes[0]))
+    found = [(row["value"], row["period"] / row["cycle"]) for row in numbers["slope"]]
+    np.testing.assert_allclose(drawn, found)
     rows = [row for family in numbers.values() for row in family]
     assert not [row for row in rows if row["verdict"] == "missed"]
     assert [row["verdict"] for row in numbers["slope"]] == ["agrees"] * 3

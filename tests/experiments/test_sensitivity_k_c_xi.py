@@ -1,15 +1,17 @@
 import pytest
 
-from tests.experiments.quick import quick_numbers
+from tests.drawn import assert_is_drawn, labels_of
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
 
 
 def test_every_gait_is_found_with_its_elasticities(tmp_path):
-    numbers = quick_numbers(
-        "sensitivity_K_c_xi",
-        tmp_path,
-        keys={"parameters", "points", "without_a_gait", "disagreement_with_neighbours"},
-        pictures={"sensitivity_K_c_xi.png"},
-    )
+    numbers, figures = quick_run("sensitivity_K_c_xi", tmp_path)
+    (figure,) = figures.values()
+    elasticities = {label for label in labels_of(figure) if label.startswith("elasticity of")}
+    assert elasticities
+    assert_is_drawn(figure, unitless=elasticities)
     assert numbers["without_a_gait"] == []
     points = {name: row[len(row) // 2] for name, row in numbers["points"].items()}
     for seed in points.values():

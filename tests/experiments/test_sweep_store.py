@@ -1,8 +1,13 @@
-from tests.experiments.quick import quick_numbers
+import pytest
+
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
 
 
 def test_a_killed_sweep_is_resumed_to_the_same_labels(tmp_path):
-    numbers = quick_numbers("sweep_store", tmp_path, keys={"runs"}, pictures=set())
+    numbers, _ = quick_run("sweep_store", tmp_path)
+    assert numbers["runs"]
     for run in numbers["runs"]:
         assert run["killed"] == len(run["kills"])
         assert 0 < run["labelled_in_last_run"] < run["starts"]

@@ -7,6 +7,8 @@ import pytest
 
 import jaxbiped as jb
 
+pytestmark = pytest.mark.slow
+
 
 def test_many_starts_find_a_stable_and_an_unstable_gait():
     scene = jb.seed_scene()

@@ -9,6 +9,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def found():

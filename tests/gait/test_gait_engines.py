@@ -9,6 +9,8 @@ import pytest
 
 import jaxbiped as jb
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def gaits():

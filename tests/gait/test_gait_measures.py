@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 
+pytestmark = pytest.mark.slow
+
 
 def measured(log_changes, gradient):
     """Period and step length as functions of log K, log c and log l."""

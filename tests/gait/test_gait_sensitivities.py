@@ -14,6 +14,8 @@ from tests.orbit_reference import (
     turn_by_scipy,
 )
 
+pytestmark = pytest.mark.slow
+
 MEASURES = ("period", "step_length", "speed", "peak_normal", "spectral_radius")
 IN_REFERENCE = {"mu_static": "mu_s", "mu_kinetic": "mu_k", "hip_mass": "hip"}
 RADIUS_FLOOR = 2e-8

@@ -12,6 +12,8 @@ from jaxbiped.cli import _gait as command
 from jaxbiped.cli import main
 from jaxbiped.gait import _gait_measures as measuring
 
+pytestmark = pytest.mark.slow
+
 HOW = dict(parameters=("K", "c"), radius_sensitivities=False, accuracy="tight")
 """All tests here ask for the same, so that one compiled search serves them."""
 

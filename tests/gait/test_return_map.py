@@ -19,6 +19,8 @@ from jaxbiped.gait._orbit import orbit_of
 from jaxbiped.gait._precision import MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 
+pytestmark = pytest.mark.slow
+
 
 class Smooth(jb.gait.AbstractSystem):
     """Without switches, endings or load."""

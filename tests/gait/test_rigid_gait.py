@@ -19,6 +19,8 @@ from tests.rigid_walkers import (
     simplest_walker,
 )
 
+pytestmark = pytest.mark.slow
+
 PLAIN = dict(parameters=(), radius_sensitivities=False)
 
 

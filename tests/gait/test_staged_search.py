@@ -9,6 +9,8 @@ import pytest
 import jaxbiped as jb
 from tests.rigid_walkers import rigid_seed, simplest_walker
 
+pytestmark = pytest.mark.slow
+
 PLAIN = dict(parameters=(), radius_sensitivities=False)
 # Periods of the stable gaits, by an independent integrator.
 TRUTH = {0.01: 0.43236, 0.012: 0.43554, 0.03: 0.44644, 0.04: 0.45210, 0.06: 0.46361, 0.08: 0.47508}

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from tests.reference import reference_works
 
 
 def test_the_ledger_closes_at_the_tight_setting(seed_walk):
@@ -13,17 +14,24 @@ def test_the_ledger_closes_at_the_tight_setting(seed_walk):
     assert ledger.friction_loss[0] > 0.0
 
 
-def test_the_residual_measures_the_error():
-    scene = jb.seed_scene()
-    residuals = [
-        abs(
-            jb.energy_ledger(
-                scene, jb.simulate(scene, jb.seed_state(), duration=2.0, rtol=rtol)
-            ).residual[0]
-        )
-        for rtol in (1e-4, 1e-7)
-    ]
-    assert residuals[0] > 10 * residuals[1]
+def test_the_residual_follows_the_tolerance():
+    """In proportion to it: a thousand times tighter is at least a thousand times better."""
+    scene, tolerances = jb.seed_scene(), np.array([1e-4, 1e-5, 1e-6, 1e-7])
+    residuals = []
+    for rtol in tolerances:
+        walk = jb.simulate(scene, jb.seed_state(), duration=2.0, rtol=rtol)
+        ledger = jb.energy_ledger(scene, walk)
+        residuals.append(abs(ledger.residual[0]) / ledger.gravity_work[0])
+    assert np.all(residuals < 10.0 * tolerances)
+    assert np.all(np.diff(residuals) < -0.8 * np.array(residuals[:-1]))
+    assert residuals[0] > 1e3 * residuals[-1]
+
+
+def test_parts_are_those_of_an_independent_solve(seed_walk):
+    """Not only their sum: what goes into one part could be missing in another."""
+    ledger = jb.energy_ledger(*seed_walk)
+    for name, expected in reference_works().items():
+        assert getattr(ledger, name)[0] == pytest.approx(expected, abs=1e-7), name
 
 
 def test_parts_add_up_to_the_whole(seed_walk):

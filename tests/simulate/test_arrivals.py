@@ -7,6 +7,8 @@ import pytest
 
 import jaxbiped as jb
 
+pytestmark = pytest.mark.slow
+
 DURATION = 2.0
 
 

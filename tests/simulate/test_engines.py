@@ -14,6 +14,8 @@ from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.simulate._recorded_steps import recorded_steps
 from tests.reference import reference_states
 
+pytestmark = pytest.mark.slow
+
 SCENES = {
     "seed": jb.seed_scene(),
     "frictionless": jb.Scene(

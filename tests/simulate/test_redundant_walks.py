@@ -8,6 +8,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.cli._constraint_comparison import Integrator, compare_constraints
 
+pytestmark = pytest.mark.slow
+
 FOOTSTEP = 0.440835
 HUNDRED = 100.0 * FOOTSTEP
 PROJECTING = ("index1", "index1aug", "described")

@@ -15,7 +15,10 @@ GAIT = jb.dynamics.RigidState(
 )
 
 
-@pytest.mark.parametrize("engine", ["lanes", "xla"])
+ENGINES = ["lanes", pytest.param("xla", marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
 def test_the_gait_goes_on(engine):
     walk = jb.rigid_walk(
         rigid_seed(), GAIT, steps=5, most_arrivals=6, accuracy="tight", engine=engine
@@ -30,7 +33,7 @@ def test_the_gait_goes_on(engine):
     assert float(walk.t) == float(times[4])
 
 
-@pytest.mark.parametrize("engine", ["lanes", "xla"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_endings(engine):
     def walk(omega, slope=0.02, **options):
         state = GAIT._replace(omega_2=jnp.asarray(omega))
@@ -45,7 +48,7 @@ def test_endings(engine):
     assert (float(bounded.t), int(bounded.footsteps)) == (1.0, 2)
 
 
-@pytest.mark.parametrize("engine", ["lanes", "xla"])
+@pytest.mark.parametrize("engine", ENGINES)
 def test_a_walker_at_rest_waits_in_vain(engine):
     """Upright on level ground, on feet that carry it there: no footstep comes in 50 √(l/g)."""
     walker = jb.Walker(m=1.0, J=0.01, l=0.4, d=0.3, r=0.35)

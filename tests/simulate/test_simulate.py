@@ -11,6 +11,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.solve._accuracy import ACCURACIES
 
+pytestmark = pytest.mark.slow
+
 
 def _error(trajectory, state):
     return np.abs(np.array(trajectory.final) - state).max()

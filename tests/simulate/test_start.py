@@ -21,6 +21,7 @@ def test_a_start_in_float32_stays_so(kind):
     assert {leaf.dtype for leaf in start} == {np.dtype("float32")}
 
 
+@pytest.mark.slow
 def test_a_simulation_from_numpy_s_float32_is_solved_in_it():
     start = jb.State(*[np.float32(x) for x in jb.seed_state()])
     walk = jb.simulate(SEED, start, duration=0.05, accuracy="fast", solver="rodas3p", save="end")

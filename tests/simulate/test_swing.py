@@ -16,6 +16,8 @@ from tests.linkages import (
     with_euler_parameters,
 )
 
+pytestmark = pytest.mark.slow
+
 TIMES = jnp.linspace(0.0, 2.0, 201)
 START = hanging(0.5, -0.8, rates=(1.0, 2.0))
 PROJECTING = ("index1", "index1aug", "described")

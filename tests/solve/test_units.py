@@ -58,6 +58,7 @@ def test_units_have_the_dimensions_of_what_they_measure():
     assert np.isfinite(np.array(units_of(still, start).inverse)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [1e-6, 1e-3, 1e3])
 @pytest.mark.parametrize("engine", ["lanes", "xla"])
 def test_a_walker_of_any_size_is_as_exact(length, engine, truth):

@@ -7,6 +7,8 @@ import xarray
 import jaxbiped as jb
 from jaxbiped.sweep import _gait_grid, _gait_sweep
 
+pytestmark = pytest.mark.slow
+
 PLAIN = dict(parameters=("K",), radius_sensitivities=False)
 OVER = {"slope": [0.005, 0.012, 0.02, 0.03], "K": [1e6, 1.1e6]}
 

@@ -5,6 +5,8 @@ import pytest
 
 import jaxbiped as jb
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def labelling():

@@ -20,6 +20,8 @@ from jaxbiped.sweep._workers import _AHEAD, compute_chunks
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same, same_results, simplest_grid, with_attractor
 
+pytestmark = pytest.mark.slow
+
 SCENE = simplest_walker(0.009)
 LABELLING = gaitless(SCENE, simplest_state(*STABLE))
 STARTS = simplest_grid(SCENE)

@@ -21,6 +21,8 @@ from jaxbiped.sweep._zarr_store import ZarrStore
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same_results, simplest_grid
 
+pytestmark = pytest.mark.slow
+
 SWEEP = importlib.import_module("jaxbiped.sweep._sweep")
 SCENE = simplest_walker(0.009)
 LABELLING = gaitless(SCENE, simplest_state(*STABLE))

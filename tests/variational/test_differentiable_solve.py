@@ -8,6 +8,8 @@ import pytest
 
 import jaxbiped as jb
 
+pytestmark = pytest.mark.slow
+
 LEAVES = {
     "K": lambda scene: scene.normal.K,
     "c": lambda scene: scene.normal.c,

@@ -7,6 +7,8 @@ import pytest
 
 import jaxbiped as jb
 
+pytestmark = pytest.mark.slow
+
 LAW = jb.laws.normal_law_like("kelvin-voigt", K=1e6, c=1e7, n=1.5, mass=2.0)
 SCENE = dataclasses.replace(jb.seed_scene(), normal=LAW)
 STEPS = {"K": 100.0, "D": 10.0, "slope": 1e-4}

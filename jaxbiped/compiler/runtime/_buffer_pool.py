@@ -2,6 +2,7 @@
 
 import math
 import weakref
+from collections.abc import Callable
 
 import numpy as np
 
@@ -9,7 +10,7 @@ import numpy as np
 class BufferPool:
     """Gives arrays, and takes their memory back when nobody refers to them or to views of them."""
 
-    def __init__(self, most: int) -> None:
+    def __init__(self, most: Callable[[], int]) -> None:
         """Keeps at most `most` bytes that nobody uses; what waits longest goes first."""
         self._most = most
         self._free: dict[int, np.ndarray] = {}
@@ -18,6 +19,11 @@ class BufferPool:
     def kept(self) -> int:
         """Bytes that wait to be used again."""
         return sum(owner.nbytes for owner in list(self._free.values()))
+
+    def clear(self) -> None:
+        """Keeps nothing of what nobody uses now."""
+        for key in list(self._free):
+            self._free.pop(key, None)
 
     def array(self, shape: tuple[int, ...]) -> np.ndarray:
         """Of 64-bit floating-point numbers, whatever was there before."""
@@ -37,10 +43,11 @@ class BufferPool:
 
     def _take_back(self, owner: np.ndarray) -> None:
         # Called wherever garbage is found, by any thread: nothing here may wait for a lock.
-        if owner.nbytes > self._most:
+        most = self._most()
+        if owner.nbytes > most:
             return
         self._free[id(owner)] = owner
         for key in list(self._free):
-            if self.kept <= self._most:
+            if self.kept <= most:
                 return
             self._free.pop(key, None)

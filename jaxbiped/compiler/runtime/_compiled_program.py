@@ -5,7 +5,7 @@ import ctypes
 import functools
 import threading
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.tree_util as jtu
@@ -242,9 +242,17 @@ class CompiledProgram:
             [arrays[n].ctypes.data if n in arrays else numbers[n] for n in FIELDS], dtype=np.int64
         )
         if count:
-            entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(self.code(chosen).address)
+            code = self.code(chosen)
+            entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(code.address)
+            # What a thread runs and where it writes lives as long as the thread, even where a
+            # second interrupt leaves it behind.
+            used = code, fields, arrays, streams
+
+            def work(_: Any = used) -> None:
+                entry(fields.ctypes.data)
+
             workers = min(threads or default_threads(), -(-count // chosen))
-            run_in_threads(lambda: entry(fields.ctypes.data), workers, stop, quick=quick)
+            run_in_threads(work, workers, stop, quick=quick)
         recorded = Recorded(records, record_counts) if self.graph.recording is not None else None
         return self._whole(outputs), recorded
 

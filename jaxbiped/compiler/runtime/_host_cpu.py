@@ -1,9 +1,10 @@
 """Host CPU: the features that code is generated for."""
 
-import functools
 from typing import NamedTuple
 
 import llvmlite.binding as llvm
+
+from jaxbiped._caches import bounded_cache
 
 
 class Host(NamedTuple):
@@ -23,7 +24,7 @@ class Host(NamedTuple):
     scales: bool
 
 
-@functools.cache
+@bounded_cache(1)
 def host() -> Host:
     """This machine."""
     llvm.initialize_native_target()

@@ -25,12 +25,24 @@ class InputStreams(NamedTuple):
 def input_streams_of(
     stream: Sequence[np.ndarray] | None, count: int, numbers: int, *, backwards: bool
 ) -> InputStreams:
-    """Of `count` simulations that read rows of so many numbers, of none where these are 0."""
+    """Of `count` simulations that read rows of so many numbers, of none where these are 0.
+
+    Raises:
+        ValueError: another number of arrays, or one without rows or with rows of another length.
+    """
     rows = [
         np.ascontiguousarray(each, dtype=np.float64) for each in ([] if stream is None else stream)
     ]
-    assert len(rows) == (count if numbers else 0)
-    assert all(len(each) > 0 and each.shape[1] == numbers for each in rows)
+    wanted = count if numbers else 0
+    if len(rows) != wanted:
+        raise ValueError(f"stream has {len(rows)} arrays of rows: it must have {wanted}.")
+    for each in rows:
+        # Machine code reads the rows unchecked.
+        if each.ndim != 2 or len(each) == 0 or each.shape[1] != numbers:
+            raise ValueError(
+                f"stream holds an array of shape {each.shape}: it must be (rows, {numbers}), "
+                "with at least one row."
+            )
     lengths = np.array([len(each) for each in rows], dtype=np.int64)
     starts = np.array([each.ctypes.data for each in rows], dtype=np.int64)
     if not backwards:

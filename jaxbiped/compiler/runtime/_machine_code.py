@@ -4,6 +4,7 @@ import hashlib
 import os
 import tempfile
 import threading
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,13 @@ from jaxbiped.compiler.runtime._host_cpu import Host
 
 CACHE_VARIABLE = "JAXBIPED_CACHE"
 """Environment variable: the folder for compiled code; empty for none on disk."""
+_DISK_BYTES = 1 << 30
+"""What the folder may hold; code that was read or written longest ago goes first."""
 _DIGEST = 32
 
 
 class MachineCode:
-    """A loaded function. It stays for the life of the process.
+    """A loaded function. Who calls its address has to keep it: without it the code is freed.
 
     Attributes:
         address: of its entry.
@@ -29,7 +32,8 @@ class MachineCode:
         self.address: int = engine.get_function_address(entry)
 
 
-_LOADED: dict[str, MachineCode] = {}
+_LOADED: weakref.WeakValueDictionary[str, MachineCode] = weakref.WeakValueDictionary()
+"""Code that some program still has, by what it was made from."""
 _LOCK = threading.Lock()
 
 
@@ -42,9 +46,10 @@ def machine_code(text: str, entry: str, host: Host, *, as_written: bool) -> Mach
     parts = [text, entry, str(as_written), *map(str, host), *_versions()]
     name = hashlib.sha256("\n".join(parts).encode()).hexdigest()
     with _LOCK:
-        if name not in _LOADED:
-            _LOADED[name] = _load(text, entry, host, as_written, _folder(), name)
-        return _LOADED[name]
+        code = _LOADED.get(name)
+        if code is None:
+            code = _LOADED[name] = _load(text, entry, host, as_written, _folder(), name)
+        return code
 
 
 def assembly(text: str, host: Host, *, as_written: bool) -> str:
@@ -106,6 +111,7 @@ def _read(path: Path) -> bytes | None:
     """Stored code; None where there is none, or not what was written."""
     try:
         content = path.read_bytes()
+        os.utime(path)
     except OSError:
         return None
     digest, code = content[:_DIGEST], content[_DIGEST:]
@@ -120,5 +126,17 @@ def _write(path: Path, code: bytes) -> None:
         with os.fdopen(handle, "wb") as file:
             file.write(hashlib.sha256(code).digest() + code)
         os.replace(temporary, path)
+        _prune(path.parent)
     except OSError:
         return
+
+
+def _prune(folder: Path) -> None:
+    """Removes what is too much for the disk: who misses it compiles it again."""
+    files = [(entry.stat(), entry.path) for entry in os.scandir(folder) if entry.is_file()]
+    excess = sum(stat.st_size for stat, _ in files) - _DISK_BYTES
+    for stat, name in sorted(files, key=lambda file: file[0].st_mtime_ns):
+        if excess <= 0:
+            return
+        Path(name).unlink(missing_ok=True)
+        excess -= stat.st_size

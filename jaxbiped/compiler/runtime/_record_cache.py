@@ -21,11 +21,22 @@ class RecordCache:
     they need not travel through it. Nothing depends on what is held: what is missing is run again.
     """
 
-    def __init__(self, most: int) -> None:
-        """Holds `most` bytes; beyond them what came first goes first."""
+    def __init__(self, most: Callable[[], int]) -> None:
+        """Holds `most` bytes, inputs included; beyond them what came first goes first."""
         self._most, self._size = most, 0
         self._records: collections.OrderedDict[Any, np.ndarray] = collections.OrderedDict()
         self._lock = threading.Lock()
+
+    @property
+    def kept(self) -> int:
+        """Bytes of what is held."""
+        return self._size
+
+    def clear(self) -> None:
+        """Holds nothing any more."""
+        with self._lock:
+            self._records.clear()
+            self._size = 0
 
     def ran(
         self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
@@ -103,11 +114,16 @@ class RecordCache:
                 key = program, column.tobytes()
                 self._drop(key)
                 self._records[key] = each
-                self._size += each.nbytes
-            while self._size > self._most:
+                self._size += _bytes_of(key, each)
+            most = self._most()
+            while self._size > most:
                 self._drop(next(iter(self._records)))
         return outputs, found
 
     def _drop(self, key: Any) -> None:
         records = self._records.pop(key, None)
-        self._size -= 0 if records is None else records.nbytes
+        self._size -= 0 if records is None else _bytes_of(key, records)
+
+
+def _bytes_of(key: tuple[Any, bytes], records: np.ndarray) -> int:
+    return len(key[1]) + records.nbytes

@@ -5,13 +5,16 @@ from typing import NamedTuple, Optional
 
 import numpy as np
 
+from jaxbiped._caches import half_of_cache_bytes, register_bytes
 from jaxbiped.compiler.runtime._buffer_pool import BufferPool
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._record_cache import RecordCache, Tables
 from jaxbiped.compiler.runtime._threads import default_threads
 
-_HELD_BACK = RecordCache(most=1 << 29)
-_MEMORY = BufferPool(most=1 << 29)
+_RECORDS = RecordCache(most=half_of_cache_bytes)
+_BUFFERS = BufferPool(most=half_of_cache_bytes)
+register_bytes("records of simulations", _RECORDS)
+register_bytes("buffers for records", _BUFFERS)
 
 
 class Recorder(NamedTuple):
@@ -34,17 +37,17 @@ class Recorder(NamedTuple):
 
     def outputs(self, numbers: np.ndarray) -> np.ndarray:
         """Outputs of simulations with these numbers (n, k); their records are then known."""
-        return _HELD_BACK.ran(self, numbers.T, self._run_for(len(numbers)))
+        return _RECORDS.ran(self, numbers.T, self._run_for(len(numbers)))
 
     def rows(self, numbers: np.ndarray) -> list[np.ndarray]:
         """Their records, as `RecordCache.rows`."""
         run = self._run_for(len(numbers))
-        return _HELD_BACK.rows(self, numbers.T, run, once=self.once)
+        return _RECORDS.rows(self, numbers.T, run, once=self.once)
 
     def columns(self, numbers: np.ndarray, first: np.ndarray) -> list[np.ndarray]:
         """Each number in their records, as `RecordCache.columns`."""
         run = self._run_for(len(numbers))
-        return _HELD_BACK.columns(self, numbers.T, first, self.room, run)
+        return _RECORDS.columns(self, numbers.T, first, self.room, run)
 
     def _run_for(self, count: int) -> Callable[[np.ndarray], Tables]:
         """Runs those of `count` simulations that nobody ran yet."""
@@ -59,7 +62,7 @@ class Recorder(NamedTuple):
                 room = min(room, max(len(each) for each in rows))
             alone = self.quick and table.shape[1] == 1
             found, recorded = self.compiled.run_table(
-                own, stream=rows, room=room, memory=_MEMORY, quick=alone, width=width
+                own, stream=rows, room=room, memory=_BUFFERS, quick=alone, width=width
             )
             assert recorded is not None
             return found, *recorded

@@ -31,16 +31,24 @@ def run_in_threads(work: Callable[[], Any], workers: int, stop: np.ndarray, *, q
     if workers == 1 and quick:
         work()
         return
-    others = [threading.Thread(target=work, daemon=True) for _ in range(workers)]
-    for thread in others:
-        thread.start()
+    # Not their joins: one that an interrupt ends may take a thread that runs for one that stopped.
+    ends = [threading.Event() for _ in range(workers)]
+
+    def worked(end: threading.Event) -> None:
+        try:
+            work()
+        finally:
+            end.set()
+
+    for end in ends:
+        threading.Thread(target=worked, args=(end,), daemon=True).start()
     try:
-        for thread in others:
-            while thread.is_alive():
-                # Waiting without end would keep the interrupt waiting, too.
-                thread.join(_POLL)
+        for end in ends:
+            # Waiting without end would keep the interrupt waiting, too.
+            while not end.wait(_POLL):
+                pass
     except BaseException:
         stop[0] = 1
-        for thread in others:
-            thread.join()
+        for end in ends:
+            end.wait()
         raise

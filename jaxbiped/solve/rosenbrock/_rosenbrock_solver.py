@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
 
 import diffrax
-import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from equinox.internal import ω
 from jaxtyping import PyTree
 
+from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.rosenbrock._linearisation import (
@@ -152,7 +152,7 @@ def step_of(
     return join(end), join(error), dense
 
 
-_cached_step = eqx.filter_jit(step_of)
+_cached_step = cached_jit(step_of)
 """Jitted for its cache alone: diffrax traces a step many times over, and this makes every time
 but the first free."""
 

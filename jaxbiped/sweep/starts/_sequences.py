@@ -1,10 +1,11 @@
 """Sequences of points in the unit cube, each a function of its number alone."""
 
-import functools
 import warnings
 from collections.abc import Iterator
 
 import numpy as np
+
+from jaxbiped._caches import bounded_cache
 
 SAMPLINGS = ("uniform", "latin-hypercube", "sobol", "halton")
 """Ways to draw samples."""
@@ -62,7 +63,7 @@ def _uniform(dimensions: int, seed: int, first: int, last: int) -> np.ndarray:
     return drawn[offset:].reshape(last - first, dimensions)
 
 
-@functools.lru_cache(maxsize=1)
+@bounded_cache(1)
 def _latin_hypercube(dimensions: int, count: int, seed: int) -> np.ndarray:
     """All of them: each dimension is a permutation, which has to be drawn whole."""
     from scipy.stats import qmc

@@ -14,7 +14,7 @@ def _address(array):
 
 
 def test_memory_that_nobody_uses_is_given_again():
-    memory = BufferPool(most=1 << 20)
+    memory = BufferPool(lambda: 1 << 20)
     first = memory.array((10, 100))
     first[:] = 1.0
     where = _address(first)
@@ -24,7 +24,7 @@ def test_memory_that_nobody_uses_is_given_again():
 
 
 def test_memory_that_a_view_refers_to_is_not_given_again():
-    memory = BufferPool(most=1 << 20)
+    memory = BufferPool(lambda: 1 << 20)
     first = memory.array((10, 100))
     where, row = _address(first), first[3, 5:]
     del first
@@ -39,7 +39,7 @@ def test_memory_that_a_view_refers_to_is_not_given_again():
 
 
 def test_no_more_is_kept_than_allowed():
-    memory = BufferPool(most=20_000)
+    memory = BufferPool(lambda: 20_000)
     arrays = [memory.array((1000,)) for _ in range(3)]
     places = [_address(each) for each in arrays]
     while arrays:
@@ -55,7 +55,7 @@ def test_no_more_is_kept_than_allowed():
 
 
 def test_other_sizes_make_room():
-    memory = BufferPool(most=20_000)
+    memory = BufferPool(lambda: 20_000)
     for size in (100, 1000, 1500, 2000):
         array = memory.array((size,))
         where = _address(array)
@@ -65,7 +65,7 @@ def test_other_sizes_make_room():
 
 
 def test_threads_never_share_memory():
-    memory = BufferPool(most=1 << 20)
+    memory = BufferPool(lambda: 1 << 20)
 
     def use(number):
         for _ in range(300):
@@ -83,7 +83,7 @@ def test_threads_never_share_memory():
 
 @pytest.mark.parametrize("shape", [(0, 5), (1,), (3, 0), (7, 11, 13)])
 def test_shapes(shape):
-    array = BufferPool(most=0).array(shape)
+    array = BufferPool(lambda: 0).array(shape)
     assert array.shape == shape
     assert array.dtype == np.float64
     array[...] = 2.0

@@ -1,5 +1,8 @@
 """The cache of compiled code: safe to delete, rebuilt where it is damaged."""
 
+import os
+import weakref
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -13,7 +16,7 @@ POINTS = np.linspace(-1.0, 1.0, 5)
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv(_machine_code.CACHE_VARIABLE, str(tmp_path))
-    monkeypatch.setattr(_machine_code, "_LOADED", {})
+    monkeypatch.setattr(_machine_code, "_LOADED", weakref.WeakValueDictionary())
     return tmp_path / "lanes"
 
 
@@ -57,3 +60,18 @@ def test_a_folder_that_cannot_be_written_does_no_harm(cache, monkeypatch):
     cache.parent.joinpath("file").write_text("in the way")
     monkeypatch.setenv(_machine_code.CACHE_VARIABLE, str(cache.parent / "file"))
     _run()
+
+
+def test_what_was_used_longest_ago_makes_room_on_disk(cache, monkeypatch):
+    _run(2.0)
+    (first,) = cache.iterdir()
+    _run(3.0)
+    (second,) = set(cache.iterdir()) - {first}
+    os.utime(second, (1.0, 1.0))
+    os.utime(first, (0.0, 0.0))
+    _run(2.0)  # read: now used later than the second
+    monkeypatch.setattr(_machine_code, "_DISK_BYTES", 5 * first.stat().st_size // 2)
+    _run(4.0)
+    assert first in cache.iterdir()
+    assert second not in cache.iterdir()
+    assert len(list(cache.iterdir())) == 2

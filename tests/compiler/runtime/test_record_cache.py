@@ -94,7 +94,7 @@ def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
 
 
 def test_what_is_no_longer_held_is_run_again(powers, runs, monkeypatch):
-    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._HELD_BACK", RecordCache(most=0))
+    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._RECORDS", RecordCache(lambda: 0))
     _, recording = _recording(powers, 1.5, 2.0)
     _, values = recording.columns(np.array([0.0, 1.0]))
     np.testing.assert_array_equal(values[:3], [1.0, 1.5, 2.25])
@@ -140,7 +140,7 @@ def test_a_recording_can_be_read_backwards(powers):
 
 @pytest.mark.parametrize("most", [0, 1 << 20])
 def test_what_reads_a_recording_may_record_as_well(powers, monkeypatch, most):
-    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._HELD_BACK", RecordCache(most=most))
+    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._RECORDS", RecordCache(lambda: most))
     doubled, reader = _doubled(), _last_sum()
 
     def total(factor, steps):
@@ -181,8 +181,8 @@ def test_what_came_first_goes_first():
         ran.extend(table[0])
         return table.copy(), np.ones((table.shape[1], 3, 1)), np.full(table.shape[1], 2)
 
-    # Two records of one number each: 16 bytes a simulation.
-    held = RecordCache(most=40)
+    # An input and two records of one number each: 24 bytes a simulation.
+    held = RecordCache(lambda: 50)
     for number in (1.0, 2.0, 3.0):
         np.testing.assert_array_equal(held.ran("program", np.array([[number]]), run), [[number]])
     held.rows("program", np.array([[3.0, 2.0]]), run)
@@ -192,3 +192,16 @@ def test_what_came_first_goes_first():
     assert ran == [1.0, 2.0, 3.0, 1.0]
     held.rows("another", np.array([[3.0]]), run)
     assert ran == [1.0, 2.0, 3.0, 1.0, 3.0]
+
+
+def test_simulations_without_records_take_room_as_well():
+    held = RecordCache(lambda: 800)
+
+    def run(table):
+        n = table.shape[1]
+        return table, np.zeros((n, 3, 1)), np.zeros(n, dtype=int)
+
+    held.ran("program", np.arange(1000.0)[None], run)
+    assert held.kept == 800
+    held.clear()
+    assert held.kept == 0

@@ -127,6 +127,7 @@ def test_exchanging_legs_exchanges_bristles():
     assert swapped == [0.0, 1.0, 3.0, 2.0, 4.0, 5.0, 7.0, 6.0, 9.0, 8.0]
 
 
+@pytest.mark.slow
 def test_engines_agree_and_bristles_straighten_in_the_swing():
     scene = with_law(LUGRE)
     lanes, xla = (
@@ -139,6 +140,7 @@ def test_engines_agree_and_bristles_straighten_in_the_swing():
     assert abs(float(lanes.state.bristle_2[0])) < 1e-5
 
 
+@pytest.mark.slow
 def test_the_gait_on_bristles_is_the_seeds_but_for_their_give():
     gait = jb.find_gait(with_law(LUGRE), parameters=("sigma_0", "K"), radius_sensitivities=False)
     assert gait.outcome is jb.gait.Search.FOUND

@@ -13,6 +13,7 @@ FRICTION = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
 BRISTLES = ("dahl", "lugre")
 EXACT = ("ristow-schafer", "smooth-ristow-schafer")
 ONE = jnp.asarray(1.0)
+_FRICTION = (jb.laws.AbstractFrictionLaw, jb.laws.AbstractBristleLaw)
 
 
 @pytest.mark.parametrize("name", jb.laws.NORMAL_LAWS)
@@ -86,6 +87,7 @@ def test_bristle_laws_resemble_the_seeds(name, peak, give):
         assert 20.0 * float(law.sigma_1) == pytest.approx(2.0 * np.sqrt(20.0 * stiffness))
 
 
+@pytest.mark.slow
 def test_the_gait_on_dahls_bristles_is_found():
     law = jb.laws.friction_law_like("dahl", **FRICTION)
     scene = eqx.tree_at(lambda s: s.friction, jb.seed_scene(), law)
@@ -164,9 +166,20 @@ def test_all_laws_run_by_lanes(normal, friction):
     assert float(walk.final.theta_1) == pytest.approx(-0.21805, abs=3e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("normal", "friction"), [("tsuji", "stribeck")])
 def test_both_engines_agree(normal, friction):
     by_lanes, by_xla = (_walk(normal, friction, engine) for engine in ("lanes", "xla"))
     assert int(by_lanes.accepted) == int(by_xla.accepted)
     for ours, theirs in zip(by_lanes.final, by_xla.final, strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("laws", [jb.laws.NORMAL_LAWS, jb.laws.FRICTION_LAWS])
+def test_every_public_law_is_in_the_catalogue_under_its_own_name(laws):
+    kind = jb.laws.AbstractNormalLaw if laws is jb.laws.NORMAL_LAWS else _FRICTION
+    public = {each for each in vars(jb.laws).values() if isinstance(each, type)}
+    assert set(laws.values()) == {
+        law for law in public if issubclass(law, kind) and "Abstract" not in law.__name__
+    }
+    assert all(law.name == name for name, law in laws.items())

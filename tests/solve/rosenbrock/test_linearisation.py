@@ -141,6 +141,7 @@ def _steps(field, start):
     ).ys
 
 
+@pytest.mark.slow
 def test_arrays_and_large_states_step_as_scalars_do():
     """Six scalars, one (2, 3) array beside a scalar, and thirty entries (dense algebra)."""
 

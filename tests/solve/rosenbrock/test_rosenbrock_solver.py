@@ -73,6 +73,7 @@ def _final_x(adjoint):
 POINT = (jnp.asarray(1.0), jnp.asarray(SPRING))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "adjoint",
     [

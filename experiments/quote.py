@@ -1,0 +1,193 @@
+"""What the pages quote of the experiments' results.
+
+`--keep` turns the numbers of a run into the file of results: without the paths of its pictures, and
+with `--untimed`, for a machine that was not idle, without its timings. Without it, all that the
+results say is printed as the pages must have it, which tests/test_results.py asks for.
+"""
+
+import dataclasses
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import tyro
+
+RESULTS = Path(__file__).parent / "results"
+PICTURES = {"picture", "pictures"}
+TIMINGS = {
+    "batch_ratio", "batch_us", "compile_s", "first_compile_s", "first_result_s", "gaits_s",
+    "seconds", "single_us", "wall_ms", "wall_s", "wall_s_run",
+}  # fmt: skip
+"""Keys of what an idle machine must measure."""
+UNKNOWN = "…"
+"""Stands for what the results do not hold: the pages may say anything there."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Options:
+    """Options of keeping and quoting."""
+
+    keep: Path | None = None
+    """Numbers of a run; they are kept under the file's name."""
+    untimed: bool = False
+    """Leave timings out."""
+
+
+def without(numbers: Any, keys: set[str]) -> Any:
+    """The same numbers without the entries of these keys, at any depth."""
+    if isinstance(numbers, dict):
+        return {key: without(value, keys) for key, value in numbers.items() if key not in keys}
+    if isinstance(numbers, list):
+        return [without(value, keys) for value in numbers]
+    return numbers
+
+
+def keep(path: Path, *, untimed: bool) -> Path:
+    """Writes a run's numbers into the folder of results, a list of numbers on one line."""
+    numbers = without(json.loads(path.read_text()), PICTURES | (TIMINGS if untimed else set()))
+    text = json.dumps(numbers, indent=1, ensure_ascii=False)
+    text = re.sub(r"\[[^][{}]*\]", lambda found: " ".join(found[0].split()), text)
+    RESULTS.mkdir(exist_ok=True)
+    kept = RESULTS / path.name
+    kept.write_text(text + "\n")
+    return kept
+
+
+def small(number: float | None, digits: int = 1) -> str:
+    """A number as the pages write it: 1.7e-3, 2.1e-1, 1.6."""
+    if number is None:
+        return UNKNOWN
+    mantissa, exponent = f"{number:.{digits}e}".split("e")
+    return mantissa if int(exponent) == 0 else f"{mantissa}e{int(exponent)}"
+
+
+def row(*cells: str) -> str:
+    """A row of a table."""
+    return f"| {' | '.join(cells)} |"
+
+
+def percents(number: float) -> str:
+    """A fraction as the pages write it."""
+    return f"{100.0 * number:.1f}"
+
+
+def of_basin_seed(numbers: dict[str, Any]) -> Iterator[str]:
+    """How much of the slice walks, how folded boundaries are, and what changes the basin."""
+    walks, boundary = numbers["fractions"]["walking period-1"], numbers["boundary"]
+    interval = f"[{percents(walks['low'])}, {percents(walks['high'])}]"
+    yield f"Of that slice {percents(walks['estimate'])} % {interval} walks"
+    yield (
+        f"the boundary of what walks has dimension {boundary['walking or not']['dimension']:.2f}, "
+        f"that of all labels {boundary['all labels']['dimension']:.2f}"
+    )
+    for name, said in (("c", "falls with damping"), ("K", "grows with stiffness")):
+        (first, *_), *_, (last, *_) = numbers["along"][name]["walking"]
+        yield f"{said} ({percents(first)} to {percents(last)} %"
+    yield f"{min(row['distance'] for row in numbers['pushes']):.4f} (units of"
+    yield f"rays alone find {numbers['pushes'][0]['distance']:.4f}"
+
+
+def of_basin_simplest(numbers: dict[str, Any]) -> Iterator[str]:
+    """How thin the simplest walker's basin is."""
+    shares = {slope: found["fractions"][-1] for slope, found in numbers["slopes"].items()}
+    (low, first), (high, second) = shares.items()
+    yield (
+        f"{100.0 * first['estimate']:.2f} % of a square at a slope of {low} and "
+        f"{100.0 * second['estimate']:.2f} % at {high}"
+    )
+
+
+def of_gradient_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
+    """The unit multiplier's error against tolerance, stepping for the state and ours."""
+    points = numbers["points"]["exact laws"]
+    for plain, both in zip(points["plain"], points["both"], strict=True):
+        yield row(
+            small(plain["rtol"], 0),
+            str(plain["steps"]),
+            small(plain["unit_multiplier"]),
+            str(both["steps"]),
+            small(both["unit_multiplier"]),
+        )
+
+
+def of_ladder(numbers: dict[str, Any]) -> Iterator[str]:
+    """Measures and costs of the rungs, and the rates of the way to the rigid limit."""
+    for name, found in numbers["measures"].items():
+        cost = numbers["costs"][name]
+        timed = "batch_us" in cost
+        single, batch = cost.get("single_us"), cost.get("batch_us")
+        yield row(
+            f"{name}{UNKNOWN}",
+            f"{found['period']:.5f}",
+            f"{found['step_length']:.5f}",
+            f"{found['spectral_radius']:.4f}",
+            f"{single:.{0 if single > 100 else 1}f} µs" if timed else UNKNOWN,
+            f"{batch:.{1 if batch > 10 else 2}f} µs" if timed else UNKNOWN,
+            small(cost["error"]) if timed else UNKNOWN,
+        )
+    both, alone = (numbers["paths"][path]["rates"] for path in ("c with K", "c alone"))
+    yield (
+        f"its period differs by s^−{both['period']:.2f} and its step length by "
+        f"s^−{both['step_length']:.2f}, with c alone by s^−{alone['period']:.1f}"
+    )
+
+
+def of_force_models(numbers: dict[str, Any]) -> Iterator[str]:
+    """How far the gait moves under other laws, and what tells that a law is not to be trusted."""
+    seed = numbers["normal"]["ristow-schafer"]["measures"]
+
+    def moved(law: dict[str, Any], key: str) -> float:
+        return float(law["measures"][key] / seed[key] - 1.0)
+
+    damped = {name: law for name, law in numbers["normal"].items() if law["measures"]}
+    keys = ("period_s", "step_length_m", "speed_m_s")
+    most = max(abs(moved(law, key)) for law in damped.values() for key in keys)
+    least = min(moved(law, "peak_normal_N") for law in damped.values())
+    largest = max(moved(law, "peak_normal_N") for law in damped.values()) + 1.0
+    yield f"period, step length and speed move by at most {100 * most:.1f} %"
+    yield f"the peak force by −{-100 * least:.0f} % (Hunt–Crossley) to {largest:.1f} times"
+    yield f"(off by {numbers['normal']['tsuji']['unit_multiplier_error']:.2f})"
+
+
+def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
+    """How many scenes were searched, in how many walks settle, and how many were missed."""
+    rows = [each for family in numbers.values() for each in family]
+    settles = [each for each in rows if each["cycle"] >= 1]
+    missed = [each for each in settles if each["verdict"] == "missed"]
+    found = "all of them" if not missed else f"all but {len(missed)} of them"
+    yield f"of {len(rows)} scenes"
+    yield f"settle on a gait or a longer cycle in {len(settles)}, and the search finds {found}"
+
+
+QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
+    "basin_seed": of_basin_seed,
+    "basin_simplest": of_basin_simplest,
+    "force_models": of_force_models,
+    "gradient_accuracy": of_gradient_accuracy,
+    "ladder": of_ladder,
+    "search_robustness": of_search_robustness,
+}
+"""Of each experiment: the phrases and rows that the pages quote."""
+
+
+def quoted(name: str) -> list[str]:
+    """What the pages must say of an experiment's results."""
+    return list(QUOTES[name](json.loads((RESULTS / f"{name}.json").read_text())))
+
+
+def main() -> None:
+    options = tyro.cli(Options, description=__doc__)
+    if options.keep is not None:
+        known = options.keep.stem in QUOTES
+        print(keep(options.keep, untimed=options.untimed) if known else "no page quotes this")
+        return
+    for path in sorted(RESULTS.glob("*.json")):
+        print(path.stem)
+        for phrase in quoted(path.stem):
+            print(f"  {phrase}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,188 @@
+"""Caches: all that the process keeps between calls is created here, with its bound.
+
+What is kept makes the next call faster and changes no number. `docs/memory.md` lists it.
+"""
+
+import contextlib
+import functools
+import gc
+import os
+import threading
+import weakref
+from collections.abc import Callable
+from typing import Any, Generic, NamedTuple, ParamSpec, Protocol, TypeVar
+
+import equinox as eqx
+
+CACHE_BYTES_VARIABLE = "JAXBIPED_CACHE_BYTES"
+"""Environment variable: bytes for records of simulations and for buffers; 0 to keep none."""
+_CACHE_BYTES = 1 << 30
+PROGRAMS = 64
+"""Compiled programs that each maker of such keeps; the one unused for longest goes first."""
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+class CacheInfo(NamedTuple):
+    """How full a cache is.
+
+    Attributes:
+        size: what it holds, in `unit`.
+        bound: what it may hold at most.
+        unit: "entries" or "bytes".
+    """
+
+    size: int
+    bound: int
+    unit: str
+
+
+class _Cache(NamedTuple):
+    info: Callable[[], CacheInfo]
+    clear: Callable[[], Any]
+
+
+_CACHES: dict[str, _Cache] = {}
+
+
+def _register(name: str, info: Callable[[], CacheInfo], clear: Callable[[], Any]) -> None:
+    _CACHES[name] = _Cache(info, clear)
+
+
+def clear_caches() -> None:
+    """Forgets all that calls left behind: compiled programs, records of simulations, buffers.
+
+    The next calls compile again and give the same numbers. Safe at any time and in any thread:
+    what a running call uses lives until it ends. Compiled code on disk stays.
+    """
+    for _ in range(2):  # what goes in the first round may give buffers back
+        for cache in list(_CACHES.values()):
+            cache.clear()
+        # Programs and their traces refer to each other.
+        gc.collect()
+
+
+def cache_info() -> dict[str, CacheInfo]:
+    """What each cache holds and may hold at most, by the name of what fills it.
+
+    Returns:
+        A `CacheInfo` of size, bound and unit for each cache.
+    """
+    return {name: cache.info() for name, cache in sorted(_CACHES.items())}
+
+
+class Store(Protocol):
+    """What keeps bytes."""
+
+    @property
+    def kept(self) -> int:
+        """How many."""
+
+    def clear(self) -> None:
+        """Keeps none."""
+
+
+def register_bytes(name: str, store: Store) -> None:
+    """Puts one that keeps at most `half_of_cache_bytes` under `clear_caches`."""
+    _register(name, lambda: CacheInfo(store.kept, half_of_cache_bytes(), "bytes"), store.clear)
+
+
+def half_of_cache_bytes() -> int:
+    """Bound of the records, and that of the buffers [bytes]."""
+    chosen = os.environ.get(CACHE_BYTES_VARIABLE, "")
+    return (int(chosen) if chosen.isdecimal() else _CACHE_BYTES) // 2
+
+
+class Once(Generic[_T]):
+    """A value that is made once: of many threads one makes it, the others wait for it."""
+
+    def __init__(self) -> None:
+        self._lock, self._made = threading.Lock(), list[_T]()
+
+    def __call__(self, make: Callable[[], _T]) -> _T:
+        """The value, made where it is not; where making fails, the next call tries again."""
+        if not self._made:
+            with self._lock:
+                if not self._made:
+                    self._made.append(make())
+        return self._made[0]
+
+
+def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]]:
+    """Decorator: keeps a function's last `bound` results by its hashable positional arguments.
+
+    As `functools.lru_cache`, but there are never two results of the same arguments: calls at the
+    same time make one, and one that somebody still has is found again when it was forgotten here.
+    A trace that holds a program, for one, goes on with the same.
+    """
+
+    def decorate(function: Callable[..., _T]) -> Callable[..., _T]:
+        lock = threading.Lock()
+        alive: weakref.WeakValueDictionary[Any, Any] = weakref.WeakValueDictionary()
+
+        @functools.lru_cache(maxsize=bound)
+        def result_of(*args: Any) -> Once[_T]:
+            return Once()
+
+        def make(args: tuple[Any, ...]) -> _T:
+            with lock:
+                known = alive.get(args)
+            if known is not None:
+                return known
+            made = function(*args)
+            with lock, contextlib.suppress(TypeError):  # plain values have no identity to keep
+                made = alive.setdefault(args, made)
+            return made
+
+        @functools.wraps(function)
+        def cached(*args: Any) -> _T:
+            with lock:
+                result = result_of(*args)
+            return result(lambda: make(args))
+
+        def info() -> CacheInfo:
+            return CacheInfo(result_of.cache_info().currsize, bound, "entries")
+
+        _register(_name_of(function), info, result_of.cache_clear)
+        return cached
+
+    return decorate
+
+
+class cached_jit(Generic[_P, _T]):  # noqa: N801
+    """Decorator: `equinox.filter_jit`, whose compiled programs and traces are bounded.
+
+    What is not an array is compiled in, functions too: a new one at each call would compile
+    and be kept each time. Beyond the bound all go.
+    """
+
+    def __init__(self, function: Callable[_P, _T]) -> None:
+        functools.update_wrapper(self, function)
+        self._jitted: Any = eqx.filter_jit(function)
+        _register(_name_of(function), self._info, self.clear)
+
+    def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        """Runs the function, compiled."""
+        if self._programs() >= PROGRAMS:
+            self.clear()
+        found: _T = self._jitted(*args, **kwargs)
+        return found
+
+    def lower(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
+        """The function, ready to be compiled for these arguments; see `equinox.filter_jit`."""
+        return self._jitted.lower(*args, **kwargs)
+
+    def clear(self) -> None:
+        """Forgets its programs and traces."""
+        self._jitted._cached.clear_cache()
+
+    def _programs(self) -> int:
+        return int(self._jitted._cached._cache_size())
+
+    def _info(self) -> CacheInfo:
+        return CacheInfo(self._programs(), PROGRAMS, "entries")
+
+
+def _name_of(function: Callable[..., Any]) -> str:
+    return f"{function.__module__}.{function.__qualname__}"
