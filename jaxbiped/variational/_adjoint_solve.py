@@ -28,7 +28,7 @@ from jaxbiped.variational._switch_crossings import earlier_at
 from jaxbiped.variational._tangents import Seeded
 
 COUNT = 2
-"""Turned tangents: a multiplier's eigenvector has a real and an imaginary part."""
+"""Leading tangents: a multiplier's eigenvector has a real and an imaginary part."""
 
 
 class _Given(NamedTuple):
@@ -56,7 +56,7 @@ class _Now(NamedTuple):
 
 
 def carry_tangents(flow: Flow, nodes: Nodes, leading: Scalar) -> tuple[FirstVariation, Recording]:
-    """Turned tangents (v, c) carried along a motion to its arrival; and the steps of that."""
+    """Leading tangents (v, c) carried along a motion to its arrival; and the steps of that."""
     given = FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, leading, nodes.steps)
     request = Request(
         _program(_kind(flow), None),

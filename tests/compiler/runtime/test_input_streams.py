@@ -66,7 +66,7 @@ def test_streams_under_jit_and_vmap():
         (np.ones((2, 2)), r"shape \(2,\)"),
     ],
 )
-def test_a_tape_of_another_size_is_refused(stream, said):
+def test_a_stream_of_another_size_is_refused(stream, said):
     """By an error that `python -O` keeps: the machine code would read what is not there."""
     with pytest.raises(ValueError, match=said):
         _summing().run((np.ones(2), np.ones(2)), stream=stream)
