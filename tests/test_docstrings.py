@@ -99,9 +99,12 @@ def _examples():
     for each in FUNCTIONS:
         (example,) = finder.find(each.values[0], name=each.id, globs={})
         if example.examples:
-            yield pytest.param(example, id=each.id)
+            slow = [pytest.mark.slow] if each.id in COMPILING else []
+            yield pytest.param(example, id=each.id, marks=slow)
 
 
+COMPILING = {"jb.simulate", "jb.footsteps", "jb.energy_ledger", "jb.find_gait", "jb.rigid_walk"}
+"""Functions whose examples compile a walk or a gait."""
 EXAMPLES = list(_examples())
 
 

@@ -1,3 +1,5 @@
+"""The seed's basin, at the experiment's quick size."""
+
 import numpy as np
 import pytest
 
