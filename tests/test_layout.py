@@ -1,5 +1,7 @@
 """The house rules that a program can check."""
 
+import ast
+
 import jax.numpy as jnp
 import pytest
 
