@@ -21,7 +21,7 @@ def pushes(labelling: jb.Labelling) -> list[dict[str, Any]]:
     rows = []
     for way, options in ways.items():
         began = time.perf_counter()
-        found = jb.nearest_failure(labelling, farthest=FARTHEST, tolerance=TOLERANCE, **options)
+        found = jb.nearest_failure(labelling, max_distance=FARTHEST, tolerance=TOLERANCE, **options)
         seconds = time.perf_counter() - began
         rows.append(
             {

@@ -61,14 +61,16 @@ def strip(labelling: jb.Labelling, slope: float, side: int) -> tuple[np.ndarray,
     return theta, off, labels_at(labelling)(points).reshape(side, side)
 
 
-def reach(labelling: jb.Labelling, gait: np.ndarray, *, farthest: float = 0.5) -> dict[str, Any]:
+def reach(
+    labelling: jb.Labelling, gait: np.ndarray, *, max_distance: float = 0.5
+) -> dict[str, Any]:
     """How far the basin reaches from the gait each way along each axis, by bisection."""
     found = {}
     for k, name in enumerate(("angle", "rate")):
         for sign, way in ((1.0, "+"), (-1.0, "-")):
             ray = np.eye(2)[k : k + 1] * sign
             push = jb.basins.minimal_fatal_shock(
-                labels_at(labelling), gait, scales=np.ones(2), farthest=farthest,
+                labels_at(labelling), gait, scales=np.ones(2), max_distance=max_distance,
                 tolerance=1e-6, directions=ray, steps=2000, improved=0,
             )  # fmt: skip
             found[f"{name} {way}"] = {

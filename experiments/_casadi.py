@@ -8,7 +8,7 @@ import numpy as np
 
 
 def sensitivities(duration: float, rtol: float) -> Callable[[], tuple[np.ndarray, np.ndarray]]:
-    """A compiled solve: final state (8,) and its derivatives by log K, log c and log ξ (8, 3)."""
+    """A compiled solve: final state (8,) and its derivatives in log K, log c and log ξ (8, 3)."""
     import casadi
 
     y, logs = casadi.SX.sym("y", 8), casadi.SX.sym("logs", 3)

@@ -7,13 +7,11 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
 import numpy as np
 
 import jaxbiped as jb
-from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._program import Program
-from jaxbiped.variational._differentiable_solve import Setting, compiled_solve
+from jaxbiped.compiler import LANES, Program, Request
+from jaxbiped.simulate._by_lanes import lane_request
 
 _WATCH = ("fall", "stop", "stumble")
 _CHAINS, _LENGTH = 24, 2000
@@ -21,7 +19,7 @@ _FLOPS = {"fadd": 1, "fsub": 1, "fmul": 1, "fdiv": 1, "sqrt": 1, "fma": 2}
 
 
 def final_slopes(duration: float, rtol: float) -> Callable[[], tuple[np.ndarray, np.ndarray]]:
-    """Final state (8,) and its derivatives by log K, log c and log ξ (8, 3), by lanes."""
+    """Final state (8,) and its derivatives in log K, log c and log ξ (8, 3), by lanes."""
     scene, state = jb.seed_scene(), jb.seed_state()
 
     def final(logs: Any) -> Any:
@@ -52,28 +50,26 @@ def peak_flops() -> float:
 
         return (jax.lax.fori_loop(0, _LENGTH, once, chains), count + 1.0), count >= 20.0
 
-    program = CompiledProgram(
-        Program(
-            start=lambda x: (tuple(x + 0.1 * k for k in range(_CHAINS)), jnp.zeros(())),
-            attempt=attempt,
-            finish=lambda x, carried: sum(carried[0]),
-        ),
-        jax.ShapeDtypeStruct((), jnp.float64),
+    program = Program(
+        start=lambda x: (tuple(x + 0.1 * k for k in range(_CHAINS)), jnp.zeros(())),
+        attempt=attempt,
+        finish=lambda x, carried: sum(carried[0]),
     )
-    inputs = np.full(512, 0.999)
-    program.run(inputs)
+    request = Request(program, np.full(512, 0.999), batch=True)
+    LANES.run(request)
     seconds = []
     for _ in range(5):
         began = time.perf_counter()
-        program.run(inputs)
+        LANES.run(request)
         seconds.append(time.perf_counter() - began)
-    return 2.0 * _CHAINS * _LENGTH * 21 * len(inputs) / min(seconds)
+    return 2.0 * _CHAINS * _LENGTH * 21 * len(request.inputs) / min(seconds)
 
 
-def _compiled(scene: jb.Scene) -> CompiledProgram:
+def _compiled(scene: jb.Scene) -> Any:
     """The very program that `simulate` runs, so that it is traced once."""
-    setting = Setting(jb.solvers.Rodas4(), _WATCH, counting=False, quick=True)
-    return compiled_solve(setting, jtu.tree_structure(scene))
+    options: dict[str, Any] = dict(save="end", engine="lanes", watch=_WATCH)
+    run = jb.Simulation.prepare(scene, jb.seed_state(), duration=1.0, **options)
+    return LANES.compile(lane_request(run))
 
 
 def flops_per_step() -> int:

@@ -77,10 +77,10 @@ def _walked(scene: Any, starts: Any, footsteps: int, rtol: float) -> Any:
         walk = jb.simulate(
             scene,
             start,
-            steps=footsteps + 1,
+            footsteps=footsteps + 1,
             rtol=rtol,
             save=jb.MidStance(),
-            most_arrivals=footsteps,
+            max_arrivals=footsteps,
             max_solver_steps=1_000_000,
             engine="lanes",
         )
@@ -92,7 +92,7 @@ def _walked(scene: Any, starts: Any, footsteps: int, rtol: float) -> Any:
         return walk.t, last._replace(hip_x=0.0 * last.hip_x), walk.arrivals
 
     def rigid(start: Any) -> Any:
-        walk = jb.rigid_walk(scene, start, steps=footsteps, rtol=1e-11, most_arrivals=footsteps)
+        walk = jb.rigid_walk(scene, start, footsteps=footsteps, rtol=1e-11, max_arrivals=footsteps)
         last = jax.tree.map(lambda leaf: leaf[-1], walk.strikes[1])
         return walk.strikes[0], last._replace(hip_x=0.0 * last.hip_x), walk.footsteps
 

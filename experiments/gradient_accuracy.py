@@ -138,7 +138,7 @@ def laws(quick: bool) -> dict[str, jb.Scene]:
 def footstep(
     scene: jb.Scene, start: jb.State, lands: bool, precision: Precision
 ) -> LinearisedReturn:
-    """One footstep from mid-stance, with derivatives by the state and by log K.
+    """One footstep from mid-stance, with derivatives with respect to the state and log K.
 
     Landing and tolerances are traced: all of them share one compiled program.
     """
@@ -146,7 +146,7 @@ def footstep(
         system=Stepped(),
         section=Stance(),
         solver=jb.solvers.Rodas4(),
-        time_limit=jnp.asarray(10.0),
+        max_time=jnp.asarray(10.0),
         steps=1,
         max_solver_steps=MOST_STEPS,
         engine="xla",

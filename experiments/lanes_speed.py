@@ -178,7 +178,7 @@ def gaits(rounds: int, engines: tuple[str, ...]) -> tuple[dict[str, float], dict
 
 
 def derivatives(rounds: int, tolerances: tuple[float, ...]) -> list[dict[str, Any]]:
-    """The final state and its derivatives by log K, log c and log ξ."""
+    """The final state and its derivatives in log K, log c and log ξ."""
     exact = _lane_work.final_slopes(DURATION, 1e-9)()[1]
     work = {("lanes", rtol): _lane_work.final_slopes(DURATION, rtol) for rtol in tolerances}
     if _casadi.is_installed():

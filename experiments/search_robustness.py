@@ -129,7 +129,7 @@ def _compass(degrees: float) -> jb.RigidScene:
 def searched(scene: Any, period: int = 1) -> tuple[jb.Gait, float]:
     """The gait from no guess, and how long its search took [s]."""
     began = time.perf_counter()
-    gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False, period=period)
+    gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False, footsteps=period)
     gait.measures.period.block_until_ready()
     return gait, time.perf_counter() - began
 

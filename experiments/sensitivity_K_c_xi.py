@@ -32,7 +32,7 @@ DECADES = 1.0
 class Point(NamedTuple):
     """A gait with one parameter at `value`; NaN in all numbers of a gait where none was found.
 
-    `elasticities` and their estimated `errors`: by K, c and xi, in this order, for each measure.
+    `elasticities` and their estimated `errors`, for each measure with respect to K, c and xi.
     """
 
     value: float
@@ -71,7 +71,7 @@ def point(name: str, value: float, gait: Any) -> Point:
 
 
 def own(name: str, points: list[Point], key: str, kind: str = "elasticities") -> np.ndarray:
-    """Elasticities of a measure, or their errors, by the very parameter that is swept."""
+    """Elasticities of a measure, or their errors, in the very parameter that is swept."""
     place = list(SEED).index(name)
     return np.asarray([getattr(p, kind)[key][place] for p in points])
 
@@ -96,7 +96,7 @@ def picture(options: Options, found: dict[str, list[Point]], keys: list[str]) ->
     for column, (name, points) in enumerate(found.items()):
         for row, key in enumerate(keys):
             panel(grid[row, column], name, points, key)
-        grid[0, column].set_title(f"by {name}", fontsize=10)
+        grid[0, column].set_title(f"with respect to {name}", fontsize=10)
         grid[-1, column].set_xlabel(f"{name} [{UNITS[name]}]")
     for row, key in enumerate(keys):
         grid[row, 0].set_ylabel(f"elasticity of\n{MEASURES[key]}")

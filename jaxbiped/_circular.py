@@ -44,10 +44,10 @@ def sine_cosine(angle: Scalar) -> tuple[Scalar, Scalar]:
     for coefficient in _SINE[1:]:
         series = series * square + coefficient
     sine = rest + rest * square * series
-    bend = jnp.full_like(rest, _COSINE[0])
+    polynomial = jnp.full_like(rest, _COSINE[0])
     for coefficient in _COSINE[1:]:
-        bend = bend * square + coefficient
-    cosine = 1.0 - (0.5 * square - square * square * bend)
+        polynomial = polynomial * square + coefficient
+    cosine = 1.0 - (0.5 * square - square * square * polynomial)
     number = quadrant.astype(jnp.int32)
     odd = (number & 1) != 0
     back = (number & 2) != 0

@@ -82,6 +82,10 @@ def parameter(
     Example:
         class Sticky(jaxbiped.laws.AbstractFrictionLaw):
             grip: float = jaxbiped.laws.parameter("grip", "$G$", "s/m", minimum=0.0)
+
+    Returns:
+        The field, for the body of an `equinox.Module`; it makes floating-point arrays of what it is
+        given.
     """
     one = _optional_float if default is None else as_float
     info = ParameterInfo(Quantity(words, symbol, unit), positive, minimum, size_below)

@@ -1,9 +1,9 @@
 """The seed's gait found a second time: footsteps, a search and differences, all written anew.
 
 Nothing here is shared with the package. `tests/collocation.py` solves the motion; SciPy's Radau,
-which knows nothing of branches, checks it. Derivatives by parameters are central differences of
-converged gaits; a turn's derivative, for Newton's method and the multipliers, is the variational
-equation's, solved by the same steps.
+which knows nothing of branches, checks it. Derivatives with respect to parameters are central
+differences of converged gaits; a cycle's derivative, for Newton's method and the multipliers, is
+the variational equation's, solved by the same steps.
 """
 
 import functools

@@ -201,7 +201,7 @@ def test_nothing_is_left_when_caches_are_cleared_and_results_stay():
 
     def walk():
         end = jb.simulate(scene, jb.seed_state(), duration=0.2, save="end", engine="lanes")
-        return end.state, jb.rigid_walk(rigid, default_guess(rigid), steps=2).state
+        return end.state, jb.rigid_walk(rigid, default_guess(rigid), footsteps=2).state
 
     first = walk()
     assert sum(info.size for info in jb.cache_info().values()) > 3

@@ -1,61 +1,38 @@
 """The house rules that a program can check."""
 
 import ast
-from pathlib import Path
 
 import jax.numpy as jnp
 import pytest
 
 import jaxbiped as jb
+from tests.import_graph import LAYERS, PACKAGE, drawn, import_graph, imports_of, layer_of
 
-PACKAGE = Path(jb.__file__).parent
-LAYERS = [
-    "linalg",
-    "constraints",
-    "scene",
-    "dynamics",
-    "compiler",
-    "solve",
-    "variational",
-    "simulate",
-    "measure",
-    "gait",
-    "basins",
-    "sweep",
-    "plot",
-    "cli",
-]
-"""Packages from the bottom up: each may import those before it."""
 MODULES = sorted(PACKAGE.rglob("*.py"))
-
-
-def _imports(path):
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.module:
-            yield node.module
-        elif isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-
-
-def _layer(module):
-    """The package of a module's dotted name, None outside of the packages."""
-    parts = module.split(".")
-    return parts[1] if parts[0] == "jaxbiped" and len(parts) > 1 and parts[1] in LAYERS else None
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_modules_are_short_and_arrows_point_one_way(path):
     assert len(path.read_text().splitlines()) < 300
-    own = _layer("jaxbiped." + path.relative_to(PACKAGE).parts[0])
+    own = layer_of("jaxbiped." + path.relative_to(PACKAGE).parts[0])
     if own is None:
         return
-    for module in _imports(path):
-        layer = _layer(module)
+    for module in imports_of(path):
+        layer = layer_of(module)
         assert layer is None or LAYERS.index(layer) <= LAYERS.index(own), module
         if own == "compiler":
             assert layer in (None, "compiler"), f"the compiler knows no walker: {module}"
         elif layer == "compiler":
             assert module == "jaxbiped.compiler", f"past the compiler's front door: {module}"
+
+
+def test_every_package_has_a_layer():
+    assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} == set(LAYERS)
+
+
+def test_the_import_graph_of_the_architecture_is_up_to_date():
+    page = (PACKAGE.parent / "ARCHITECTURE.md").read_text()
+    assert drawn(import_graph()) in page, "paste what `python -m tests.import_graph` prints"
 
 
 def test_the_top_level_is_small():

@@ -17,7 +17,7 @@ class Dimension(NamedTuple):
 
     Attributes:
         estimate: the dimension.
-        error: standard error of the fit's slope; it knows nothing of a bend in the counts.
+        error: standard error of the fit's slope; it says nothing of a curvature of the counts.
         sizes: sides of the boxes, shape (k,), in cells of the finest grid.
         counts: how many boxes of each size hold a boundary, shape (k,).
     """
@@ -44,6 +44,9 @@ def boundary_dimension(
         sides: sides of the boxes on a label grid [grid spacings]; unless given powers of two, up
             to a quarter of the shortest axis. The far ends of a grid that does not hold a whole
             number of the largest boxes are left out.
+
+    Returns:
+        The dimension with its standard error, and the boxes counted at each side.
 
     Raises:
         ArgumentError: no boundary at three sizes, sides with a refined boundary, a side larger

@@ -12,7 +12,13 @@ from jaxbiped.basins._label import Label
 
 @dataclasses.dataclass(frozen=True)
 class Fraction:
-    """A fraction of the starts, with the ends of its confidence interval and its count."""
+    """A fraction of the starts, and its confidence interval.
+
+    Attributes:
+        estimate: count over all that were counted [–].
+        low, high: ends of the confidence interval [–].
+        count: how many starts have the label.
+    """
 
     estimate: float
     low: float
@@ -40,6 +46,12 @@ def wilson_interval(
     Raises:
         ArgumentError: a count below 0 or above its total, shapes that do not broadcast, or a
             confidence not between 0 and 1.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> low, high = jb.basins.wilson_interval(30, 100)
+        >>> round(float(low), 4), round(float(high), 4)
+        (0.2189, 0.3958)
     """
     from scipy.special import ndtri
 
@@ -71,8 +83,17 @@ def fractions(labels: npt.ArrayLike, *, confidence: float = 0.95) -> dict[str, F
             where all are, no fraction is known and the result is empty.
         confidence: that of the intervals, see `wilson_interval`.
 
+    Returns:
+        A `Fraction` by the name of each label that occurs.
+
     Raises:
         ArgumentError: no entry, an unknown code, or a confidence not between 0 and 1.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> found = jb.basins.fractions([0, 0, 0, 1])
+        >>> {name: (float(each.estimate), each.count) for name, each in found.items()}
+        {'walking': (0.75, 3), 'fell forward': (0.25, 1)}
     """
     check_confidence(confidence)
     names = _names(np.asarray(labels))

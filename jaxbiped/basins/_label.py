@@ -39,11 +39,43 @@ class Label(enum.IntEnum):
 
 
 def label_name(label: int, period: int = 0) -> str:
-    """A label in words, with the period [footsteps] of the gait where it walks."""
+    """A label in words, with the period [footsteps] of the gait where it walks.
+
+    Args:
+        label: code of a `Label`.
+        period: footsteps in the cycle of the gait.
+
+    Returns:
+        The name.
+
+    Raises:
+        ValueError: a code that no `Label` has.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> jb.basins.label_name(0, 2), jb.basins.label_name(1)
+        ('walking period-2', 'fell forward')
+    """
     walks = label == Label.WALKING
     return WALKING_NAME.format(period=period) if walks else str(Label(label))
 
 
 def label_names(label: npt.ArrayLike, period: npt.ArrayLike) -> np.ndarray:
-    """`label_name` of every entry; arrays of one shape."""
+    """`label_name` of every entry; arrays of one shape.
+
+    Args:
+        label: codes of `Label`, any shape.
+        period: footsteps in the cycle of each gait, a shape that broadcasts with it.
+
+    Returns:
+        Names, of the broadcast shape.
+
+    Raises:
+        ValueError: a code that no `Label` has.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> jb.basins.label_names([0, 7], [1, 0]).tolist()
+        ['walking period-1', 'slid']
+    """
     return np.asarray(np.vectorize(label_name, otypes=[object])(label, period))

@@ -49,7 +49,7 @@ class FatalShock(NamedTuple):
 
     @property
     def found(self) -> bool:
-        """Whether any start within `farthest` has another label than the gait."""
+        """Whether any start within `max_distance` has another label than the gait."""
         return bool(np.isfinite(self.distance))
 
 
@@ -58,7 +58,7 @@ def minimal_fatal_shock(
     origin: npt.ArrayLike,
     *,
     scales: npt.ArrayLike,
-    farthest: float,
+    max_distance: float,
     tolerance: float,
     directions: int | npt.ArrayLike | None = None,
     steps: int = 32,
@@ -68,7 +68,7 @@ def minimal_fatal_shock(
 ) -> FatalShock:
     """Distance from a gait to the nearest start with another label, in scaled coordinates.
 
-    All rays march outward together, farthest / steps at a time, until half as far again as the
+    All rays march outward together, max_distance / steps at a time, until half as far again as the
     first of them that meets another label; those steps are bisected. A tongue of another basin
     thinner than a step may be stepped over, and one between the rays is missed: the distance is
     that of a start that was seen to fail, to within the tolerance along its ray, and a nearer one
@@ -84,7 +84,7 @@ def minimal_fatal_shock(
             where a difference should not count.
         origin: coordinates of the gait, shape (d,).
         scales: what counts as one unit of distance along each coordinate, shape (d,).
-        farthest: scaled distance up to which rays march.
+        max_distance: scaled distance up to which rays march.
         tolerance: scaled distance to which the boundary is bisected.
         directions: how many rays (both ways along every axis first, so at least 2 d, then evenly
             over the sphere; d = 1 has two), 32 d unless given; or scaled directions of shape
@@ -96,20 +96,24 @@ def minimal_fatal_shock(
         improved: how many rays are turned, the nearest ones at least 0.5 rad apart.
         batch: the most points in a call.
 
+    Returns:
+        The push to the nearest start that was found to fail, its scaled distance, and the boundary
+        there.
+
     Raises:
         ArgumentError: an argument that is not allowed, or labels or normals of a wrong shape.
     """
     around = _surroundings(LabelOracle(label_of, batch), origin, scales)
     ways = _directions(directions, around.origin.size)
-    check_positive("farthest", farthest)
+    check_positive("max_distance", max_distance)
     check_positive("tolerance", tolerance)
-    if not 1e-12 * farthest <= tolerance < farthest:
+    if not 1e-12 * max_distance <= tolerance < max_distance:
         raise ArgumentError(
-            f"tolerance = {tolerance:g} is not allowed: it must be at least 1e-12 farthest = "
-            f"{1e-12 * farthest:g} and below farthest = {farthest:g}."
+            f"tolerance = {tolerance:g} is not allowed: it must be at least 1e-12 max_distance = "
+            f"{1e-12 * max_distance:g} and below max_distance = {max_distance:g}."
         )
     check_whole("improved", improved, 0)
-    marks = np.linspace(0.0, farthest, check_whole("steps", steps, 1) + 1)[1:]
+    marks = np.linspace(0.0, max_distance, check_whole("steps", steps, 1) + 1)[1:]
 
     rays = first_exits(around, ways, marks)
     rays = rays.take(np.isfinite(rays.outside))

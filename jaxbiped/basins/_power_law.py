@@ -18,7 +18,7 @@ def fit_exponent(x: np.ndarray, y: np.ndarray, what: str) -> Exponent:
     """Exponent p of y ~ x^p: the slope of log y against log x, of shape (n,), by least squares.
 
     The standard error is that of a slope whose scatter is seen in the residuals (n − 2 of them
-    count); it knows nothing of a slow bend.
+    count); it says nothing of a slow curvature.
 
     Raises:
         ArgumentError: fewer than three of the y are above zero: two points show no scatter.

@@ -105,7 +105,7 @@ def _split(around: Surroundings, rays: Brackets) -> Brackets:
 
 
 def nearest_of(
-    around: Surroundings, candidates: np.ndarray, farthest: np.ndarray, tolerance: float
+    around: Surroundings, candidates: np.ndarray, max_distance: np.ndarray, tolerance: float
 ) -> Brackets:
     """Of each group of directions the one that meets another label first; one ray a group.
 
@@ -115,14 +115,14 @@ def nearest_of(
     Args:
         around: the starts around the gait.
         candidates: directions, the preferred ones first, shape (n, c, d).
-        farthest: distances within which a change is looked for, shape (n,).
+        max_distance: distances within which a change is looked for, shape (n,).
         tolerance: largest width of a bracket.
 
     Returns:
-        Infinite `outside` where no direction of a group fails at its `farthest`.
+        Infinite `outside` where no direction of a group fails at its `max_distance`.
     """
     n, c, _ = candidates.shape
-    inside, outside = np.zeros(n), farthest.copy()
+    inside, outside = np.zeros(n), max_distance.copy()
     labels = around.labels(candidates, np.broadcast_to(outside[:, None], (n, c)))
     alive = labels != around.label
     found = alive.any(axis=1)

@@ -120,6 +120,9 @@ def refine_boundary(
             the neighbour, at the same level. Costs further calls of few points.
         batch: the most points in a call. Without `follow` a level is one call where it fits.
 
+    Returns:
+        All points labelled, and the boundary cells of every level.
+
     Raises:
         ArgumentError: an argument that is not allowed, or labels of a wrong shape.
     """

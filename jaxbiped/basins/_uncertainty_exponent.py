@@ -45,6 +45,10 @@ def uncertainty_exponent(
         distances: ε [grid spacings]; unless given powers of two, up to an eighth of the shortest
             axis. Only points at least the largest from the grid's ends are counted.
 
+    Returns:
+        The exponent with its standard error, the boundary's dimension, and the fractions at each of
+        the k distances.
+
     Raises:
         ArgumentError: no boundary at three distances, a distance that leaves no point to count,
             or labels that are not allowed.
@@ -95,6 +99,10 @@ def sampled_uncertainty(
         distances: ε, as parts of the box's sides, shape (k,), each below 0.5.
         samples: how many starts.
         batch: the most points in a call.
+
+    Returns:
+        The exponent with its standard error, the boundary's dimension, and the fractions at each of
+        the k distances.
 
     Raises:
         ArgumentError: an argument that is not allowed, or uncertain starts at fewer than three

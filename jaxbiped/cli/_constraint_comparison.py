@@ -110,6 +110,10 @@ def compare_constraints(
         methods: some of `CONSTRAINT_METHODS`.
         repeats: runs of which the fastest counts.
         progress: whether to show a bar on stderr.
+
+    Returns:
+        A `ConstraintRun` for every pair of method and integrator, the integrators of one method
+        together.
     """
     with stage("simulating the minimal formulation to compare with"):
         truth = final_truth(scene, state, duration)

@@ -51,7 +51,7 @@ class FindGait:
     )
     accuracy: str = "balanced"
     """How accurately to solve: balanced or tight."""
-    period: int = 1
+    footsteps: int = 1
     """Footsteps in a cycle."""
     section: str | None = None
     """Where a cycle begins: mid-stance (the usual one) or heel-strike (a rigid walker's)."""
@@ -66,13 +66,13 @@ class FindGait:
         state = self.start.state(scene) if self.start.given else None
         if self.section is not None:
             check_choice("section", self.section, _SECTIONS)
-        check_count("period", self.period)
+        check_count("footsteps", self.footsteps)
         self.output.check()
         section = None if self.section is None else _SECTIONS[self.section]()
         gait = find_gait(
             scene,
             state,
-            period=self.period,
+            footsteps=self.footsteps,
             section=section,
             accuracy=self.accuracy,
             engine=self.engine,

@@ -43,7 +43,7 @@ def run_rigid_walk(
         duration=solve.duration,
         rtol=solve.rtol,
         engine=solve.engine,
-        most_arrivals=_MOST_STRIKES,
+        max_arrivals=_MOST_STRIKES,
         max_solver_steps=solve.most_steps(),
     )
     with stage("compiling the simulation (first time for this kind of scene)"):

@@ -31,31 +31,31 @@ class Constraints(NamedTuple):
 
 
 class Point(NamedTuple):
-    """A point of a body: its place, derivatives by the coordinates, and its bend ∂²/∂t² at q̈ = 0.
+    """A point of a body, with derivatives with respect to the coordinates and ∂²/∂t² at q̈ = 0.
 
     Attributes:
         x, z: place in the plane [m].
-        row_x, row_z: derivatives by the linkage's coordinates.
-        bend_x, bend_z: acceleration of the point with the coordinates' rates constant [m/s²].
+        row_x, row_z: derivatives with respect to the linkage's coordinates.
+        convective_x, convective_z: its acceleration at constant rates of the coordinates [m/s²].
     """
 
     x: Scalar
     z: Scalar
     row_x: Row
     row_z: Row
-    bend_x: Scalar
-    bend_z: Scalar
+    convective_x: Scalar
+    convective_z: Scalar
 
 
 class Heading(NamedTuple):
-    """Sine and cosine of a body's orientation, their derivatives and their bends."""
+    """Sine and cosine of a body's orientation, their derivatives and ∂²/∂t² at q̈ = 0."""
 
     sine: Scalar
     cosine: Scalar
     sine_row: Row
     cosine_row: Row
-    sine_bend: Scalar
-    cosine_bend: Scalar
+    sine_convective: Scalar
+    cosine_convective: Scalar
 
 
 def point_of(
@@ -75,8 +75,8 @@ def point_of(
         | {c: heading.cosine_row[c] * x - heading.sine_row[c] * z for c in heading.sine_row},
         row_z={first + 1: jnp.ones_like(q[first])}
         | {c: heading.sine_row[c] * x + heading.cosine_row[c] * z for c in heading.sine_row},
-        bend_x=heading.cosine_bend * x - heading.sine_bend * z,
-        bend_z=heading.sine_bend * x + heading.cosine_bend * z,
+        convective_x=heading.cosine_convective * x - heading.sine_convective * z,
+        convective_z=heading.sine_convective * x + heading.cosine_convective * z,
     )
 
 
@@ -116,12 +116,12 @@ def constraints_of(
             x, z = joint.point_2
             violation += [one.x - x, one.z - z]
             rows += [one.row_x, one.row_z]
-            bias += [-one.bend_x, -one.bend_z]
+            bias += [-one.convective_x, -one.convective_z]
             continue
         other = point_of(linkage, q, headings, joint.body_2, joint.point_2)
         violation += [one.x - other.x, one.z - other.z]
         rows += [one.row_x | _subtract(other.row_x), one.row_z | _subtract(other.row_z)]
-        bias += [other.bend_x - one.bend_x, other.bend_z - one.bend_z]
+        bias += [other.convective_x - one.convective_x, other.convective_z - one.convective_z]
     if linkage.orientation == "euler":
         for body in range(len(linkage.bodies)):
             c, s = 4 * body + 2, 4 * body + 3
@@ -169,8 +169,8 @@ def _by_euler(first: int, own: Sequence[Scalar], rates: Sequence[Scalar]) -> Hea
         cosine=c * c - s * s,
         sine_row={first: 2.0 * s, first + 1: 2.0 * c},
         cosine_row={first: 2.0 * c, first + 1: -2.0 * s},
-        sine_bend=4.0 * c_rate * s_rate,
-        cosine_bend=2.0 * (c_rate * c_rate - s_rate * s_rate),
+        sine_convective=4.0 * c_rate * s_rate,
+        cosine_convective=2.0 * (c_rate * c_rate - s_rate * s_rate),
     )
 
 

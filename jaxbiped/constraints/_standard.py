@@ -14,7 +14,7 @@ class Standard(AbstractConstraintMethod):
     """[M Jᵀ; J 0] [q̈; λ] = [Q; γ]: the constraints hold at the level of accelerations only.
 
     Whatever error the integrator makes in positions and velocities stays, and an error of the
-    velocities makes the positions drift on and on.
+    velocities makes the positions drift without bound.
 
     Source: the seed paper, section 4, "standard".
     """

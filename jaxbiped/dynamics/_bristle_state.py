@@ -15,7 +15,7 @@ class BristleState(NamedTuple):
     """A `State` with the bristles of both feet: ten scalar leaves.
 
     Attributes:
-        hip_x … omega_2: as in `State`.
+        hip_x, hip_z, theta_1, theta_2, hip_vx, hip_vz, omega_1, omega_2: as in `State`.
         bristle_1, bristle_2: see `AbstractBristleLaw` [–].
     """
 

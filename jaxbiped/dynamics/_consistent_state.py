@@ -48,6 +48,13 @@ class Consistent(NamedTuple):
 def project(scene: RedundantScene, state: Any) -> Any:
     """The state as the scene's method corrects it after each step; differentiable.
 
+    Args:
+        scene: whose constraint method projects.
+        state: redundant, leaves of any common shape, SI units.
+
+    Returns:
+        A state of the same kind and shape.
+
     Raises:
         ArgumentError: a method that does not project.
     """
@@ -61,14 +68,14 @@ def project(scene: RedundantScene, state: Any) -> Any:
 
 
 def consistent_state(
-    scene: RedundantScene, state: Any, *, furthest: Violation = FURTHEST
+    scene: RedundantScene, state: Any, *, max_violation: Violation = FURTHEST
 ) -> Consistent:
     """The consistent state nearest to a start, least in the mass metric.
 
     Args:
         scene: whose legs are joined.
         state: start; a `State` is made a redundant one, and needs no correction.
-        furthest: a start that violates its constraints by more is refused.
+        max_violation: a start that violates its constraints by more is refused.
 
     Returns:
         The state, and how much was corrected; leaves shaped as the state's.
@@ -81,7 +88,7 @@ def consistent_state(
     off = violation(scene, state)
     units = {"position": "m", "rate": "m/s", "normalisation": "(no unit)"}
     for name, unit in units.items():
-        value, bound = getattr(off, name), getattr(furthest, name)
+        value, bound = getattr(off, name), getattr(max_violation, name)
         if holds_somewhere(value > bound):
             raise ArgumentError(
                 f"state violates its constraints by {float(jnp.max(value)):.3g} {unit} "

@@ -48,7 +48,15 @@ class Powers(NamedTuple):
 
 
 def energies(scene: Scene, state: State) -> Energies:
-    """Kinetic, gravitational and elastic energy; leaves shaped as the state's."""
+    """Kinetic, gravitational and elastic energy; leaves shaped as the state's.
+
+    Args:
+        scene: the walker on its ground.
+        state: leaves of any common shape, SI units.
+
+    Returns:
+        The three energies [J], leaves shaped as the state's.
+    """
     walker, ground = scene.walker, scene.ground
     hip = minimal_state(scene, state)
     kinetic = 0.5 * walker.hip_mass * (hip.hip_vx**2 + hip.hip_vz**2)
@@ -67,7 +75,15 @@ def energies(scene: Scene, state: State) -> Energies:
 
 
 def powers(scene: Scene, state: State) -> Powers:
-    """Power of gravity and the contact's powers; leaves shaped as the state's."""
+    """Power of gravity and the contact's powers; leaves shaped as the state's.
+
+    Args:
+        scene: the walker on its ground.
+        state: leaves of any common shape, SI units.
+
+    Returns:
+        The four powers [W], leaves shaped as the state's.
+    """
     walker, ground = scene.walker, scene.ground
     hip = minimal_state(scene, state)
     momentum_x = walker.total_mass * hip.hip_vx

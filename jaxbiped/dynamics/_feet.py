@@ -35,7 +35,11 @@ class Foot(NamedTuple):
 
 
 class Feet(NamedTuple):
-    """One entry for each leg."""
+    """Kinematics of both feet.
+
+    Attributes:
+        foot_1, foot_2: of each leg's foot, leaves shaped as the state's.
+    """
 
     foot_1: Foot
     foot_2: Foot
@@ -45,6 +49,14 @@ def feet(scene: Any, state: Any) -> Feet:
     """Both feet's kinematics (model: foot centre O = S + (l − r)(sin θ, −cos θ)).
 
     In redundant coordinates S is where the foot's own leg has the hip.
+
+    Args:
+        scene: the walker, in minimal or redundant coordinates.
+        state: leaves of any common shape, SI units.
+
+    Returns:
+        Positions [m], velocities [m/s] and penetrations [m] of both feet, leaves shaped as the
+        state's.
     """
     return feet_of(scene, legs_of(scene, state))
 
@@ -75,7 +87,14 @@ def _foot(scene: Any, number: int, leg: Leg) -> Foot:
 
 
 def touches(foot: Foot) -> Scalar:
-    """Whether the foot is in contact (boolean): indented and admitted by the clearance rule."""
+    """Whether the foot is in contact (boolean): indented and admitted by the clearance rule.
+
+    Args:
+        foot: kinematics of one foot, see `feet`.
+
+    Returns:
+        Booleans shaped as the state's leaves.
+    """
     below = foot.penetration > 0.0
     return below if foot.admitted is None else below & foot.admitted
 
@@ -102,6 +121,15 @@ def standing_foot(both: Feet) -> Scalar:
 def standing_height(
     scene: Scene, stance_angle: Scalar, penetration: Scalar | float = 0.0
 ) -> Scalar:
-    """Hip height [m] over a leg at `stance_angle` [rad] that indents the ground [m]."""
+    """Height of the hip over a leg that stands on its foot.
+
+    Args:
+        scene: the walker on its ground.
+        stance_angle: of that leg from the slope's normal [rad].
+        penetration: how deep its foot indents the ground [m].
+
+    Returns:
+        The hip's height above the slope [m], of the broadcast shape.
+    """
     walker = scene.walker
     return walker.r - penetration + walker.hip_to_foot * jnp.cos(stance_angle)

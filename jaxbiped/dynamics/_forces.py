@@ -44,13 +44,28 @@ def foot_force(scene: Any, foot: Foot) -> FootForce:
 
 
 class FootForces(NamedTuple):
-    """One entry for each leg."""
+    """Forces of the ground on both feet.
+
+    Attributes:
+        foot_1, foot_2: on each leg's foot, leaves shaped as the state's [N].
+    """
 
     foot_1: FootForce
     foot_2: FootForce
 
 
 def foot_forces(scene: Any, state: Any) -> FootForces:
-    """Forces on both feet at a state; leaves shaped as the state's."""
+    """Forces on both feet at a state; leaves shaped as the state's.
+
+    Args:
+        scene: the walker, in minimal or redundant coordinates.
+        state: leaves of any common shape, SI units.
+
+    Returns:
+        Normal and tangential force on each foot [N], leaves shaped as the state's.
+
+    Raises:
+        ArgumentError: a state without the bristles that the scene's friction needs.
+    """
     both = feet(scene, state)
     return FootForces(foot_force(scene, both.foot_1), foot_force(scene, both.foot_2))

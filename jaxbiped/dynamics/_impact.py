@@ -31,6 +31,14 @@ def impact(scene: RigidScene, state: RigidState) -> Impact:
     The impulse acts where the new foot touches, so motions that roll about that point do not feel
     it: the momenta of the new support's two rates are kept. They are the angular momenta of the
     whole walker about the new point of contact and of the leg that leaves about the hip.
+
+    Args:
+        scene: the rigid walker.
+        state: just before the impact, leg 2 standing, SI units.
+
+    Returns:
+        The state just after it, legs exchanged, and the impulse [N·s], leaves shaped as the
+        state's.
     """
     walker = scene.walker
     m, d = walker.m, walker.d

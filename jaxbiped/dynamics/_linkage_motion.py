@@ -60,7 +60,15 @@ def motion_under(
 
 
 def linkage_motion(scene: LinkageScene, state: LinkageState) -> LinkageMotion:
-    """Accelerations and joint forces of a linkage in gravity; leaves shaped as the state's."""
+    """Accelerations and joint forces of a linkage in gravity; leaves shaped as the state's.
+
+    Args:
+        scene: linkage, constraint method and gravity.
+        state: coordinates and rates of the linkage, SI units.
+
+    Returns:
+        Accelerations [m/s², rad/s²] and joint forces [N].
+    """
     linkage = scene.linkage
     applied: list[Scalar] = []
     for body in linkage.bodies:
@@ -70,5 +78,14 @@ def linkage_motion(scene: LinkageScene, state: LinkageState) -> LinkageMotion:
 
 
 def linkage_field(t: Any, state: LinkageState, scene: LinkageScene) -> LinkageState:
-    """Time derivative of a linkage's state, in the form that `diffrax.ODETerm` takes."""
+    """Time derivative of a linkage's state, in the form that `diffrax.ODETerm` takes.
+
+    Args:
+        t: time [s]; the field does not depend on it.
+        state: coordinates and rates of the linkage, SI units.
+        scene: linkage, constraint method and gravity.
+
+    Returns:
+        The rates of change, a `LinkageState` shaped as the state.
+    """
     return LinkageState(state.v, tuple(linkage_motion(scene, state).accelerations))

@@ -15,7 +15,12 @@ from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 
 class Accelerations(NamedTuple):
-    """Second derivatives of the coordinates: hip [m/s²] and legs [rad/s²]."""
+    """Second derivatives of the coordinates, leaves shaped as the state's.
+
+    Attributes:
+        hip_ax, hip_az: of the hip in the slope's frame [m/s²].
+        alpha_1, alpha_2: of the legs [rad/s²].
+    """
 
     hip_ax: Scalar
     hip_az: Scalar
@@ -72,6 +77,13 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
 
     The legs' accelerations are eliminated from the 4 × 4 mass matrix, and the 2 × 2 system that
     is left for the hip is solved in closed form.
+
+    Args:
+        scene: the walker on its ground.
+        state: leaves of any common shape, SI units.
+
+    Returns:
+        Hip [m/s²] and legs [rad/s²], leaves shaped as the state's.
     """
     both = feet(scene, state)
     legs = (
@@ -110,7 +122,16 @@ def bristle_rates(law: AbstractBristleLaw, scene: Any, state: Any) -> dict[str, 
 
 
 def vector_field(t: Any, state: State, scene: Scene) -> State:
-    """Time derivative of the state, in the form that `diffrax.ODETerm` takes."""
+    """Time derivative of the state, in the form that `diffrax.ODETerm` takes.
+
+    Args:
+        t: time [s]; the field does not depend on it.
+        state: leaves of any common shape, SI units.
+        scene: the walker on its ground.
+
+    Returns:
+        The rates of change [SI units per second], a state of the same kind and shape.
+    """
     second = accelerations(scene, state)
     memory = {}
     if isinstance(scene.friction, AbstractBristleLaw):

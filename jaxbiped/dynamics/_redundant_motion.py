@@ -79,7 +79,15 @@ def with_coordinates(state: Any, q: list[Scalar], v: list[Scalar]) -> Any:
 
 
 def redundant_motion(scene: RedundantScene, state: Any) -> RedundantMotion:
-    """Accelerations and the hip's reaction by the scene's method."""
+    """Accelerations and the hip's reaction by the scene's method.
+
+    Args:
+        scene: the walker and its constraint method.
+        state: redundant, leaves of any common shape, SI units.
+
+    Returns:
+        Accelerations [m/s², rad/s²] and the hip's force on leg 1 [N], leaves shaped as the state's.
+    """
     q, v = coordinates_of(scene, state)
     moved = _linkage_motion(scene, state)
     minimal, hip = _minimal_accelerations(scene, q, v, moved.accelerations)
@@ -90,7 +98,16 @@ def redundant_motion(scene: RedundantScene, state: Any) -> RedundantMotion:
 
 
 def redundant_field(t: Any, state: Any, scene: RedundantScene) -> Any:
-    """Time derivative of a redundant state, in the form that `diffrax.ODETerm` takes."""
+    """Time derivative of a redundant state, in the form that `diffrax.ODETerm` takes.
+
+    Args:
+        t: time [s]; the field does not depend on it.
+        state: redundant, leaves of any common shape, SI units.
+        scene: the walker and its constraint method.
+
+    Returns:
+        The rates of change [SI units per second], a state of the same kind and shape.
+    """
     _, v = coordinates_of(scene, state)
     moved = _linkage_motion(scene, state)
     memory = {}
@@ -105,7 +122,15 @@ def _(scene: RedundantScene) -> Any:
 
 
 def violation(scene: RedundantScene, state: Any) -> Violation:
-    """How far apart the two legs' hips are, and how fast they part."""
+    """How far apart the two legs' hips are, and how fast they part.
+
+    Args:
+        scene: the walker and its constraint method.
+        state: redundant, leaves of any common shape, SI units.
+
+    Returns:
+        Distance [m], relative speed [m/s] and normalisation [–], leaves shaped as the state's.
+    """
     at = constraints_of(scene.linkage, *coordinates_of(scene, state))
     off = jnp.zeros_like(at.violation[0])
     for value in at.violation[2:]:
@@ -118,6 +143,13 @@ def hip_force(scene: Scene | RedundantScene, state: Any) -> HipForce:
 
     In minimal coordinates it does no work and is in no equation: it is what Newton's law for leg 1
     leaves open, m (a − g) less the ground's force.
+
+    Args:
+        scene: the walker, in minimal or redundant coordinates.
+        state: of the scene's kind, leaves of any common shape, SI units.
+
+    Returns:
+        The force [N], leaves shaped as the state's.
     """
     if isinstance(scene, RedundantScene):
         return redundant_motion(scene, state).hip_force
@@ -180,8 +212,8 @@ def _minimal_accelerations(
     hips, turning = [], []
     for k in range(2):
         hip = point_of(linkage, q, headings, k, joint.point_1)
-        ax = sum((entry * second[c] for c, entry in hip.row_x.items()), hip.bend_x)
-        az = sum((entry * second[c] for c, entry in hip.row_z.items()), hip.bend_z)
+        ax = sum((entry * second[c] for c, entry in hip.row_x.items()), hip.convective_x)
+        az = sum((entry * second[c] for c, entry in hip.row_z.items()), hip.convective_z)
         hips.append((ax, az))
         own = slice(linkage.coordinates * k + 2, linkage.coordinates * (k + 1))
         if linkage.orientation == "angle":

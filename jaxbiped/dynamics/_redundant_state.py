@@ -172,6 +172,10 @@ def minimal_state(scene: Any, state: Any) -> Any:
 
     A minimal state is returned as it is.
 
+    Args:
+        scene: says how orientations are written.
+        state: redundant or minimal, leaves of any common shape, SI units.
+
     Returns:
         A `State`, or a `BristleState` where there are bristles.
     """

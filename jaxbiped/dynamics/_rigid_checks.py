@@ -60,6 +60,9 @@ def rigid_checks(scene: RigidScene, states: RigidState) -> RigidChecks:
         states: leaves of n states in order, of any shape that has n entries; those that are not
             finite are left out. The last is taken for the moment of the impact.
 
+    Returns:
+        What the footstep asks of the ground, leaves of shape (n,), and of its impact, scalars.
+
     Raises:
         ArgumentError: an argument of the wrong type.
     """

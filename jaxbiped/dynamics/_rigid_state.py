@@ -35,7 +35,15 @@ def _(scene: RigidScene) -> type[RigidState]:
 
 
 def whole_state(scene: RigidScene, state: RigidState) -> State:
-    """The same motion in the compliant walker's coordinates, its stance foot just touching."""
+    """The same motion in the compliant walker's coordinates, its stance foot just touching.
+
+    Args:
+        scene: the rigid walker.
+        state: leaves of any common shape, SI units.
+
+    Returns:
+        A `State`, leaves shaped as the state's.
+    """
     walker = scene.walker
     sine, cosine = jnp.sin(state.theta_2), jnp.cos(state.theta_2)
     return State(
@@ -51,5 +59,12 @@ def whole_state(scene: RigidScene, state: RigidState) -> State:
 
 
 def rigid_state(state: State) -> RigidState:
-    """The part of a compliant walker's state that the rigid one keeps, leg 2 standing."""
+    """The part of a compliant walker's state that the rigid one keeps, leg 2 standing.
+
+    Args:
+        state: leg 2 standing, leaves of any common shape, SI units.
+
+    Returns:
+        Hip place, angles and rates, leaves shaped as the state's.
+    """
     return RigidState(state.hip_x, state.theta_1, state.theta_2, state.omega_1, state.omega_2)

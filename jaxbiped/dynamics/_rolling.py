@@ -133,6 +133,14 @@ def rolling(scene: RigidScene, state: RigidState) -> RollingMotion:
     """Accelerations and the ground's reaction at a state; leaves shaped as the state's.
 
     The reaction is what the accelerations of hip and centres of mass leave of the weight.
+
+    Args:
+        scene: the rigid walker.
+        state: leaves of any common shape, SI units.
+
+    Returns:
+        Leg accelerations [rad/s²] and the force on the stance foot [N], leaves shaped as the
+        state's.
     """
     walker, ground = scene.walker, scene.ground
     alpha_1, alpha_2 = rolling_rates(scene, state)
@@ -157,7 +165,16 @@ def rolling(scene: RigidScene, state: RigidState) -> RollingMotion:
 
 
 def rolling_field(t: Any, state: RigidState, scene: RigidScene) -> RigidState:
-    """Time derivative of the state, in the form that `diffrax.ODETerm` takes."""
+    """Time derivative of the state, in the form that `diffrax.ODETerm` takes.
+
+    Args:
+        t: time [s]; the field does not depend on it.
+        state: leg 2 standing, leaves of any common shape, SI units.
+        scene: the rigid walker.
+
+    Returns:
+        The rates of change [SI units per second], leaves shaped as the state's.
+    """
     motion = rolling_rates(scene, state)
     _, cosine = sine_cosine(state.theta_2)
     walker = scene.walker

@@ -38,6 +38,9 @@ def seed_state() -> State:
     Leg 2 stands, leg 1 swings and is momentarily all but at rest. The paper prints the legs'
     velocities with the labels swapped and one sign flipped; undoing that gives one hip velocity
     from both legs, to 1e-5 m/s.
+
+    Returns:
+        Scalar leaves, 64-bit floats.
     """
     return State(
         hip_x=jnp.asarray(0.0, dtype=float),
@@ -52,7 +55,14 @@ def seed_state() -> State:
 
 
 def exchange_legs(state: Any) -> Any:
-    """The same motion with the names of the two legs exchanged; of a state of any kind."""
+    """The same motion with the names of the two legs exchanged; of a state of any kind.
+
+    Args:
+        state: leaves of any common shape.
+
+    Returns:
+        A state of the same kind.
+    """
     swapped = {}
     for name in state._fields:
         twin = name[:-1] + {"1": "2", "2": "1"}.get(name[-1], name[-1])

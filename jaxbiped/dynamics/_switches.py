@@ -1,4 +1,7 @@
-"""Switches: surfaces where the vector field or a derivative of it jumps."""
+"""Switches: surfaces where the vector field or a derivative of it jumps.
+
+No step may straddle one: derivatives taken through it would be wrong.
+"""
 
 from typing import Any, NamedTuple
 
@@ -27,6 +30,13 @@ def switches(scene: Any, state: Any) -> tuple[Switch, ...]:
     """Every switch of a scene: touchdown, reaction leaving zero, slip at ±v0 and 0, clearance rule.
 
     Source: the seed paper, section 2.2, whose laws have these corners.
+
+    Args:
+        scene: the walker, in minimal or redundant coordinates.
+        state: scalar leaves, SI units.
+
+    Returns:
+        The switches of foot 1, then those of foot 2; as many at every state of a scene.
     """
     both = feet(scene, state)
     rates = (state.omega_1, state.omega_2)

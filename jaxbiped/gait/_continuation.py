@@ -101,10 +101,10 @@ def follow_branch(
         most_steps: steps allowed.
     """
     sizes = np.append(scales, 1.0)
-    known = change(start, 0.0)
-    if known.code != 0:
-        return Branch(start[None], np.zeros(1), BranchEnd.NO_BEGINNING, known.code)
-    here, tangent = np.append(start, 0.0) / sizes, _tangent(known, sizes, None)
+    change_here = change(start, 0.0)
+    if change_here.code != 0:
+        return Branch(start[None], np.zeros(1), BranchEnd.NO_BEGINNING, change_here.code)
+    here, tangent = np.append(start, 0.0) / sizes, _tangent(change_here, sizes, None)
     path, step, code, since_fold, folded = [here], _FIRST, 0, 0, False
     for _ in range(most_steps):
         length = step
@@ -114,8 +114,8 @@ def follow_branch(
         border = np.eye(len(here))[-1] if length < step else tangent
         found, quick, failure = _correct(change, here + length * tangent, border, sizes)
         if found is not None:
-            there, known = found
-            ahead = _tangent(known, sizes, tangent)
+            there, change_here = found
+            ahead = _tangent(change_here, sizes, tangent)
             if ahead @ tangent < _LEAST_COSINE and step > 50.0 * _SMALLEST:
                 found = None
         if found is None:
@@ -160,9 +160,9 @@ def _fold(
         found, *_ = _correct(change, guess, tangents[0], sizes)
         if found is None:
             return []
-        point, known = found
+        point, change_here = found
         points.append(point)
-        rises.append(_tangent(known, sizes, tangents[0])[-1])
+        rises.append(_tangent(change_here, sizes, tangents[0])[-1])
     return points[-1:]
 
 
@@ -181,11 +181,11 @@ def _correct(
     did the code of the walk that did not return."""
     point, last = guess, np.inf
     for k in range(_MOST_CORRECTIONS):
-        known = change(point[:-1] * sizes[:-1], float(point[-1]))
-        if known.code != 0:
-            return None, False, known.code
-        matrix = np.vstack([_slopes(known, sizes), border])
-        right = np.append(-known.value / sizes[:-1], 0.0)
+        change_here = change(point[:-1] * sizes[:-1], float(point[-1]))
+        if change_here.code != 0:
+            return None, False, change_here.code
+        matrix = np.vstack([_slopes(change_here, sizes), border])
+        right = np.append(-change_here.value / sizes[:-1], 0.0)
         try:
             move = np.linalg.solve(matrix, right)
         except np.linalg.LinAlgError:
@@ -194,19 +194,19 @@ def _correct(
         if not size <= max(_CONTRACTION * last, _CONVERGED):
             return None, False, 0
         if size <= _CONVERGED:
-            return (point + move, known), k <= 2, 0
+            return (point + move, change_here), k <= 2, 0
         point, last = point + move, size
     return None, False, 0
 
 
-def _slopes(known: Change, sizes: np.ndarray) -> np.ndarray:
+def _slopes(change_here: Change, sizes: np.ndarray) -> np.ndarray:
     """Derivatives of the scaled change with respect to the scaled point and s, (m, m + 1)."""
-    both = np.column_stack([known.by_point, known.by_s])
+    both = np.column_stack([change_here.by_point, change_here.by_s])
     return both * sizes / sizes[:-1, None]
 
 
-def _tangent(known: Change, sizes: np.ndarray, before: np.ndarray | None) -> np.ndarray:
+def _tangent(change_here: Change, sizes: np.ndarray, before: np.ndarray | None) -> np.ndarray:
     """Unit tangent of the branch, on from `before`, or towards larger s."""
-    *_, rows = np.linalg.svd(_slopes(known, sizes))
+    *_, rows = np.linalg.svd(_slopes(change_here, sizes))
     forward = rows[-1][-1] if before is None else rows[-1] @ before
     return rows[-1] if forward >= 0.0 else -rows[-1]

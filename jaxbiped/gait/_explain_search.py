@@ -18,6 +18,9 @@ def explain_search(scene: Any, gait: Gait) -> str:
     Args:
         scene: the scene that was searched, whole numbers and all; not a batch.
         gait: what `find_gait` returned for it.
+
+    Returns:
+        One sentence, without a full stop.
     """
     if gait.outcome is not Search.FOUND:
         return f"no gait found: {_search_sentence(gait)}{_branch(scene, gait)}"
@@ -83,7 +86,7 @@ _HOW = {
 def _differing_parameters(scene: Any, nearest: Any) -> str:
     """The parameters of `nearest` that are not those of `scene`."""
     asked, there = parameter_values(scene), parameter_values(nearest)
-    moved = [name for name in asked if float(asked[name]) != float(there[name])]
-    named = ", ".join(f"{name} = {float(there[name]):.6g}" for name in moved[:_MOST_NAMED])
-    more = len(moved) - _MOST_NAMED
+    different = [name for name in asked if float(asked[name]) != float(there[name])]
+    named = ", ".join(f"{name} = {float(there[name]):.6g}" for name in different[:_MOST_NAMED])
+    more = len(different) - _MOST_NAMED
     return named + (f" and {more} more" if more > 0 else "")

@@ -52,7 +52,7 @@ def find_gait(
     scene: Scene | RigidScene | RedundantScene,
     guess: Any = None,
     *,
-    period: int = 1,
+    footsteps: int = 1,
     section: AbstractSection | None = None,
     parameters: tuple[str, ...] | None = None,
     accuracy: str = "balanced",
@@ -70,7 +70,7 @@ def find_gait(
     a switch. Works under `jit` and `vmap`, over scenes and over guesses.
 
     Args:
-        scene: the walker, compliant or rigid. In redundant coordinates every passage starts on the
+        scene: the walker, compliant or rigid. In redundant coordinates every solve starts on the
             constraints, and returns, multipliers and sensitivities are told in minimal ones: the
             constraint directions are left out. Second derivatives (the spectral radius's) take the
             minimal equations along the redundant motion: on the constraints these are the method's
@@ -82,11 +82,11 @@ def find_gait(
             the seed scene's gait to this one; Newton's method from scattered starts. The gait is
             then the stable one, or where none was seen the one of smallest spectral radius. Under
             `jit` and `vmap` there are two stages, the first and the continuation.
-        period: footsteps in a cycle.
+        footsteps: how many a cycle has.
         section: where the cycle begins, `MidStance()` unless given. A rigid walker's cycles begin
             just after its impact, at `HeelStrike()`.
-        parameters: names of the parameters to differentiate by (see `parameter_names`); all of
-            them unless given, none for ().
+        parameters: names of the parameters to differentiate with respect to (see
+            `parameter_names`); all of them unless given, none for ().
         accuracy: "balanced" or "tight".
         method: "newton", or "optax" to minimise the squared residual by gradient.
         optimiser: for "optax"; Adam with a rate of 1e-2 unless given.
@@ -104,11 +104,17 @@ def find_gait(
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> gait = jb.find_gait(jb.ladder()["rigid"], parameters=(), radius_sensitivities=False)
+        >>> str(gait.outcome), round(float(gait.measures.period), 4)
+        ('found', 0.4438)
     """
     check_type("scene", scene, Scene, RigidScene, RedundantScene)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_choice("method", method, ("newton", "optax"))
-    check_count("period", period)
+    check_count("footsteps", footsteps)
     check_unbatched("scene", scene)
     start = _check_start(scene, default_guess(scene) if guess is None else guess)
     check_unbatched("guess", start, "one state")
@@ -121,7 +127,7 @@ def find_gait(
     precision = precision_of(accuracy, scene)
     method_of_steps = orbit_solver(solver, rigid=not scene.compliant)
     section = section_of(scene, section)
-    chosen = orbit_engine(
+    runs_on = orbit_engine(
         engine,
         solver=method_of_steps,
         section=section,
@@ -129,7 +135,12 @@ def find_gait(
         redundant=scene.redundant,
     )
     spec = _return_map_spec(
-        scene, section, method_of_steps, chosen, steps=int(period), most=MOST_SOLVER_STEPS[accuracy]
+        scene,
+        section,
+        method_of_steps,
+        runs_on,
+        steps=int(footsteps),
+        most=MOST_SOLVER_STEPS[accuracy],
     )
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
@@ -165,7 +176,7 @@ def _return_map_spec(
         system=system_of(scene),
         section=section,
         solver=solver,
-        time_limit=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
+        max_time=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
         steps=steps,
         max_solver_steps=most,
         engine=engine,
@@ -234,14 +245,14 @@ def _compilation_of(kind: Any) -> Once[None]:
 def _compile(searching: tuple, describing: tuple, origin: Origin) -> None:
     """Compiles both programs, and what lanes run for them, at the same time."""
     spec, scene, _, start, *_ = searching
-    nothing = _empty_arrays(eqx.filter_eval_shape(_search, *searching))
+    no_result = _empty_arrays(eqx.filter_eval_shape(_search, *searching))
     first: Any = _search
     second: Any = summarise_gait
     told = stage("compiling the search (first time for this kind of scene)")
     with told, ThreadPoolExecutor() as meanwhile:
         with deferred_checks() as programs:
             # What takes lanes longest begins first.
-            lowered = second.lower(spec, scene, start, nothing, *describing, origin)
+            lowered = second.lower(spec, scene, start, no_result, *describing, origin)
             ready = [meanwhile.submit(lowered.compile)]
             ready.append(meanwhile.submit(first.lower(*searching).compile))
         for program in programs:

@@ -43,13 +43,16 @@ class Gaits(NamedTuple):
 def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options: Any) -> Gaits:
     """Searches a periodic gait from each of many starts, all at once, and tells them apart.
 
-    For a look around: without derivatives by parameters. Give `find_gait` the state of the gait
-    that you want them of as its guess.
+    For a look around: without derivatives with respect to parameters. For these give `find_gait`
+    the state of a gait found here as its guess.
 
     Args:
         scene: the walker.
         starts: leaves of shape (n,), see `rolling_starts`.
         options: those of `find_gait`, but for parameters and radius_sensitivities.
+
+    Returns:
+        The distinct gaits, and which of the n searches came to which.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.

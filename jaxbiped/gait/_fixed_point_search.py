@@ -38,7 +38,7 @@ class Search(enum.IntEnum):
     """How a search ended. `str(search)` is its name in words.
 
     - found: the orbit returns to within the residual asked for.
-    - no return: the first return already ended in a misfortune (its `Ending` tells which).
+    - no return: the first return already ended in a failure (its `Ending` tells which).
     - not converged: no step reduced the residual any more, or the evaluations allowed were used up.
     - no walk: an orbit returns, but with a foot deep underground or a step uphill, and no other
       was found. A search from a guess does not tell.
@@ -109,8 +109,8 @@ def search(
     off = jnp.abs(spec.section.value(args, guess))
     run = _runner(spec, args, active, guess, precision)
     shape: LinearisedReturn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
-    nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
-    begin = initial_progress(first, off, method, nothing)
+    empty_return = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
+    begin = initial_progress(first, off, method, empty_return)
     stage = jnp.where(wanted, begin.stage, int(Stage.STUCK))
     end = _iterate(run, begin._replace(stage=stage), method)
     ending = jnp.where(
@@ -132,7 +132,7 @@ def search(
 
 def _with_soundness(spec: ReturnMapSpec, args: PyTree, guess: PyTree, end: Progress) -> Scalar:
     state, last = state_with(spec.system, guess, end.base), end.base_return
-    # Not every system has a component that drifts.
+    # Not every system has a cyclic coordinate.
     return is_sound(args, state, jnp.sum(last.advance), last.period)
 
 
@@ -143,7 +143,7 @@ def _runner(
     guess: PyTree,
     precision: Precision,
 ) -> Run:
-    """Turns with derivatives by the state, and once it is near by the `active` parameters."""
+    """Returns, with derivatives with respect to the state and, near a gait, the parameters."""
     seeds, _ = seed_directions(args, active, len(recurring_components(spec.system, guess)))
     coarse = Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
 
@@ -155,7 +155,8 @@ def _runner(
             )
         )
         start = state_with(spec.system, guess, trial)
-        return linearised_return(spec, seeds, start, wanted, idle, steered=stage >= Stage.COARSE)
+        near = stage >= Stage.COARSE
+        return linearised_return(spec, seeds, start, wanted, idle, carries_parameters=near)
 
     return run
 

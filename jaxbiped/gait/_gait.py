@@ -64,13 +64,13 @@ class Gait(eqx.Module):
         multiplier_errors: their estimated errors, shape (m − 1,).
         directions: their eigenvectors in the space of the state without hip_x, shape (m, m − 1).
         monodromy: derivative of a cycle at a fixed time, shape (m, m).
-        return_jacobian: derivatives on the section by the state: of the state that returns, the
-            period and the step length; shape (m + 2, m).
+        return_jacobian: derivatives on the section with respect to the state: of the state that
+            returns, the period and the step length; shape (m + 2, m).
         unit_multiplier_error: distance from 1 of the multiplier that must be exactly 1.
         bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
-        sensitivities: derivatives of the measures by each parameter, leaves of shape (p,). By
-            lanes NaN where the search never came near a gait: until then only the state is
-            differentiated by.
+        sensitivities: derivatives of the measures with respect to each parameter, leaves of shape
+            (p,). By lanes NaN where the search never came near a gait: until then derivatives are
+            taken with respect to the state alone.
         sensitivity_errors: their estimated errors: what a ten times looser solve changes.
         elasticities: d log |measure| / d log parameter, leaves of shape (p,); zero for a parameter
             that is zero, NaN for a measure that is.
@@ -223,7 +223,7 @@ def _path(last: LinearisedReturn, like: Any) -> tuple[Scalar, Any]:
 
 
 def _by_parameter(orbit: Orbit, measures: Measures, slopes: Any, radius: Scalar) -> Measures:
-    """Derivatives of the measures by the parameters' own sizes, leaves of shape (p,)."""
+    """Derivatives of the measures with respect to parameters in their own sizes, shape (p,)."""
     length, period = slopes.advance[0], slopes.period
     speed = (length - measures.speed * period) / measures.period
     state = type(measures.state)(jnp.zeros_like(period), *slopes.recurring)

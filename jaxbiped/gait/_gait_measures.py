@@ -30,23 +30,26 @@ def gait_measures(
     guess: Any = None,
     *,
     gradient: AbstractGradient | None = None,
-    period: int = 1,
+    footsteps: int = 1,
     section: AbstractSection | None = None,
     accuracy: str = "balanced",
     engine: str = "auto",
 ) -> Measures:
-    """Measures of the gait that `find_gait` finds, differentiable by the scene.
+    """Measures of the gait that `find_gait` finds, differentiable with respect to the scene.
 
     - `Implicit()` (the default): both modes, all measures, one search.
     - `Forward()`, `Reverse()`: the gait is searched without derivatives, and one differentiable
       Newton correction of it carries them; no peak force and no spectral radius (None).
 
     NaN where no gait is found. How a redundant scene's hip is held makes no difference to its gait:
-    by `Implicit()` the derivatives by a method's constants are zero.
+    through `Implicit()` the derivatives with respect to a method's constants are zero.
 
     Args:
-        scene, guess, period, section, accuracy, engine: as for `find_gait`.
+        scene, guess, footsteps, section, accuracy, engine: as for `find_gait`.
         gradient: how to differentiate.
+
+    Returns:
+        The gait's measures, scalars in SI units.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
@@ -63,7 +66,7 @@ def gait_measures(
     gait = find_gait(
         jax.lax.stop_gradient(scene),
         None if guess is None else jax.lax.stop_gradient(guess),
-        period=period,
+        footsteps=footsteps,
         section=section,
         parameters=None if implicit else (),
         accuracy=accuracy,
@@ -78,7 +81,7 @@ def gait_measures(
             scene,
             state,
             section=section,
-            steps=period,
+            footsteps=footsteps,
             gradient=gradient,
             accuracy=accuracy,
             engine=engine,
@@ -106,10 +109,10 @@ def _attach_derivatives(values: Measures, slopes: Measures, parameters: Scalar) 
 @_attach_derivatives.def_jvp
 def _attach_derivatives_jvp(primals: tuple, tangents: tuple) -> tuple[Measures, Measures]:
     values, slopes, _ = primals
-    moved = tangents[2]
+    state_dot = tangents[2]
     # A second derivative would need slopes that are themselves differentiated.
     slopes, _ = eqxi.nondifferentiable((slopes, primals[2]), name=_SECOND)
-    return values, jtu.tree_map(lambda slope: slope @ moved, slopes)
+    return values, jtu.tree_map(lambda slope: slope @ state_dot, slopes)
 
 
 _SECOND = "gait_measures by Implicit(), which has first derivatives only; a second"
@@ -123,10 +126,10 @@ def _by_correction(gait: Gait, once_from: Callable[[Any], Return]) -> Measures:
     change = jnp.stack([getattr(once.state, n) - getattr(state, n) for n in recurring])
     size = len(recurring)
     step = solution(jnp.eye(size) - gait.return_jacobian[:size], change)
-    moved = {n: getattr(state, n) + step[i] for i, n in enumerate(recurring)}
+    corrected = {n: getattr(state, n) + step[i] for i, n in enumerate(recurring)}
     by_period, by_length = gait.return_jacobian[size:]
     time, length = once.time + by_period @ step, once.state.hip_x + by_length @ step
-    measures = Measures(time, length, length / time, None, None, state._replace(**moved))
+    measures = Measures(time, length, length / time, None, None, state._replace(**corrected))
     return _nan_unless_found(gait, measures)
 
 

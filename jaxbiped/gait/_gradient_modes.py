@@ -39,9 +39,9 @@ class Reverse(AbstractGradient):
     """Reverse mode, for many parameters.
 
     Through XLA it goes back over the solver's steps, with checkpoints; they are chosen so that the
-    derivatives by the whole state keep the derivatives' tolerance, and reverse mode is those
-    derivatives' transpose. By lanes the derivatives by all that is differentiated are carried
-    along the motion, as `Forward` does, and transposed.
+    derivatives with respect to the whole state keep the derivatives' tolerance, and reverse mode
+    is those derivatives' transpose. By lanes the derivatives with respect to every input are
+    carried along the motion, as `Forward` does, and transposed.
     """
 
     anywhere: ClassVar[bool] = True

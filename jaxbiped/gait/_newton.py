@@ -88,11 +88,11 @@ class Progress(NamedTuple):
 
 
 def initial_progress(
-    first: Scalar, off: Scalar, method: Method, nothing: LinearisedReturn
+    first: Scalar, off: Scalar, method: Method, no_return: LinearisedReturn
 ) -> Progress:
     """Before the first return, from components that are `off` the section by so much.
 
-    `nothing` is in the place of a return.
+    `no_return` is in the place of a return.
     """
     on_section = off < 1e-9
     stage = jnp.where(on_section, int(Stage.ROUGH), int(Stage.APPROACH))
@@ -103,9 +103,9 @@ def initial_progress(
         base_residual=jnp.asarray(jnp.inf),
         slope=jnp.eye(len(first)),
         step=jnp.zeros_like(first),
-        base_return=nothing,
+        base_return=no_return,
         damping=jnp.asarray(1.0),
-        coarse=nothing,
+        coarse=no_return,
         optimiser=None if method.optimiser is None else method.optimiser.init(first),
         code=jnp.asarray(0),
         evaluations=jnp.asarray(0),

@@ -20,7 +20,7 @@ CLOSENESS = 1e-3
 
 
 class Slopes(NamedTuple):
-    """Derivatives of an orbit by p parameters, each moved by its own size (or by 1 where zero).
+    """Derivatives of an orbit with respect to p parameters in units of their sizes (1 where zero).
 
     Attributes:
         recurring: of the m recurring components on the section, shape (m, p).
@@ -36,13 +36,13 @@ class Slopes(NamedTuple):
 
 
 class Orbit(NamedTuple):
-    """A periodic orbit of a system with m recurring components and d drifting ones.
+    """A periodic orbit of a system with m recurring components and d cyclic coordinates.
 
     Attributes:
         found: how the search went, and the last return.
-        state: the state on the section, its drifting components zero.
+        state: the state on the section, its cyclic coordinates zero.
         stability: its Floquet multipliers.
-        slopes: its derivatives by the parameters; `slope_errors` their estimated errors.
+        slopes: its derivatives with respect to the parameters; `slope_errors` their errors.
         radius_slopes: derivatives of the spectral radius, shape (p,); NaN where not asked for.
         radius_errors: their estimated errors.
         sizes: by how much each parameter moved, shape (p,).
@@ -123,11 +123,11 @@ def _radius_slopes(
     value = left @ (jacobian.astype(vector.dtype) @ vector)
     # d|λ| is the real part of dλ in the direction of λ.
     weight = jnp.conj(value) * left
-    turned = jnp.stack([vector.real, vector.imag])
+    leading = jnp.stack([vector.real, vector.imag])
     weights = jnp.stack([weight.real, -weight.imag]) / jnp.abs(value)
     family = slopes_of(last).recurring
     seeds, sizes = seed_directions(args, active, m)
-    slopes = second_variation(spec, seeds, like, last, turned, weights, family, sizes)
+    slopes = second_variation(spec, seeds, like, last, leading, weights, family, sizes)
     # Second derivatives across a jump of the force itself would need more than its Jacobians'.
     return jnp.where(last.jumps > 0, jnp.nan, slopes)
 

@@ -72,10 +72,10 @@ class Origin(NamedTuple):
 
 def single_stage_origin(scene: Any, start: Any, found_by: FoundBy) -> Origin:
     """Of a search that had but one stage."""
-    nothing: Any = np.full(MOST_OTHERS, np.nan)
+    missing: Any = np.full(MOST_OTHERS, np.nan)
     return Origin(
         found_by=code_array(found_by),
-        others=OtherGait(nothing, nothing, nothing, jtu.tree_map(lambda _: nothing, start)),
+        others=OtherGait(missing, missing, missing, jtu.tree_map(lambda _: missing, start)),
         branch_end=code_array(BranchEnd.NOT_FOLLOWED),
         branch_walk_ending=code_array(0),
         nearest=jtu.tree_map(lambda leaf: np.full(np.shape(leaf), np.nan), scene),

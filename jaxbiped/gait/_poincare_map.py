@@ -1,4 +1,7 @@
-"""Poincaré map: one return to the section, with its Jacobian."""
+"""Poincaré map: one return to the section, with its Jacobian.
+
+Newton's method, multipliers and sensitivities all read this one evaluation.
+"""
 
 from typing import Any, NamedTuple
 
@@ -25,9 +28,10 @@ from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
 
 STATE_FLOOR = 0.1
-"""Size below which errors of derivatives by the state are absolute, in the scene's units."""
+"""Size below which errors of derivatives with respect to the state are absolute, in the scene's
+units."""
 PARAMETER_FLOOR = 1e-4
-"""The same by the logarithm of a parameter: small sensitivities are wanted to digits as well."""
+"""The same with respect to a parameter's logarithm: small sensitivities are wanted, too."""
 
 
 class LinearisedReturn(NamedTuple):
@@ -44,7 +48,7 @@ class LinearisedReturn(NamedTuple):
         code: 0 or that of an `Ending`.
         attempted: solver steps attempted.
         jumps: crossings where the vector field itself jumped; `missed` of them had no correction.
-        nodes: the ends of the steps of each passage, leaves (steps, …), where saved.
+        nodes: the ends of the steps of each solve to the section, leaves (steps, …), where saved.
     """
 
     recurring: Scalar
@@ -76,7 +80,7 @@ def recurring_components(system: AbstractSystem, y: PyTree) -> Scalar:
 
 
 def state_with(system: AbstractSystem, like: PyTree, recurring: Scalar) -> PyTree:
-    """A state with these recurring components, and zero for the drifting ones."""
+    """A state with these recurring components, and zero for the cyclic coordinates."""
     leaves, structure = jtu.tree_flatten(like)
     places = recurring_indices(system, like)
     zero = jnp.zeros_like(recurring[0])
@@ -106,17 +110,18 @@ def linearised_return(
     precision: Precision,
     idle: Any,
     *,
-    steered: Any = True,
+    carries_parameters: Any = True,
 ) -> LinearisedReturn:
     """Follows the orbit from `y` for one cycle, with derivatives; nothing where `idle`.
 
-    Where not `steered`, derivatives by parameters choose no steps, and lanes do without them.
+    Unless it `carries_parameters`, derivatives with respect to parameters choose no steps, and
+    lanes do without them.
     """
     places = recurring_indices(spec.system, y)
     count, n = len(jtu.tree_leaves(y)), args.seeds.shape[1]
     start = jnp.zeros((count, n)).at[jnp.asarray(places), jnp.arange(len(places))].set(1.0)
     watch = _watch_for(spec, args.args, y)
-    limit = jnp.where(idle, 0.0, spec.time_limit)
+    limit = jnp.where(idle, 0.0, spec.max_time)
 
     def one(
         before: tuple[Tangents, Scalar], _: None
@@ -124,11 +129,11 @@ def linearised_return(
         y0, failed = before
         y0 = _entry_coordinates(spec, y0, args)
         within = jnp.where(failed != 0, 0.0, limit)
-        found = _next_passage(spec, watch, y0, args, precision, within, steered)
+        found = _next_arrival(spec, watch, y0, args, precision, within, carries_parameters)
         found = _exit_coordinates(spec, found, args)
         state, moved = along_columns(lambda s, a: spec.system.reset_map(a, s), found.y, args)
         on_section = as_columns(moved)
-        # At a fixed time the renewal comes earlier or later, and the motion after it with it.
+        # At a fixed time the reset comes earlier or later, and the motion after it with it.
         rates = spec.system.vector_field(jnp.zeros(()), state, args.args)
         velocity = jnp.stack(jtu.tree_leaves(rates))
         columns = on_section - velocity[:, None] * found.time_columns
@@ -141,12 +146,12 @@ def linearised_return(
         every = jax.tree.map(lambda leaf: leaf[None], last)
     else:
         (end, code), every = jax.lax.scan(one, begin, length=spec.steps)
-    passages, on_section, velocity = every
-    return _chain_passages(spec, y, end, code, passages, on_section[-1], velocity[-1])
+    arrivals, on_section, velocity = every
+    return _chain_arrivals(spec, y, end, code, arrivals, on_section[-1], velocity[-1])
 
 
 def _watch_for(spec: ReturnMapSpec, args: PyTree, y: PyTree) -> Watch:
-    """What the passages of a cycle land on."""
+    """What the solves of a cycle end on."""
     if spec.within is None:
         return spec.watch(args, y)
     inside = eqx.filter_eval_shape(redundant_state, args, y)
@@ -154,7 +159,7 @@ def _watch_for(spec: ReturnMapSpec, args: PyTree, y: PyTree) -> Watch:
 
 
 def _entry_coordinates(spec: ReturnMapSpec, y: Tangents, args: Seeded) -> Tangents:
-    """The start of a passage in the coordinates that it is solved in."""
+    """The start of a solve in the coordinates that it is done in."""
     if spec.within is None:
         return y
     state, columns = along_columns(lambda s, a: redundant_state(a, s), y, args)
@@ -162,7 +167,7 @@ def _entry_coordinates(spec: ReturnMapSpec, y: Tangents, args: Seeded) -> Tangen
 
 
 def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) -> SectionArrival:
-    """A passage told in its own coordinates."""
+    """A solve's arrival in the cycle's own coordinates."""
     if spec.within is None:
         return found
     state, columns = along_columns(lambda s, a: minimal_state(a, s), found.y, args)
@@ -179,20 +184,20 @@ def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) 
     return found._replace(y=Tangents(state, as_columns(columns)), nodes=nodes)
 
 
-def _next_passage(
+def _next_arrival(
     spec: ReturnMapSpec,
     watch: Watch,
     y0: Tangents,
     args: Seeded,
     precision: Precision,
     limit: Scalar,
-    steered: Any,
+    carries_parameters: Any,
 ) -> SectionArrival:
-    """The next passage, by the engine that is asked for."""
+    """The next arrival, by the engine that is asked for."""
     most = spec.max_solver_steps
     m = args.seeds.shape[1] - len(args.active)
     if spec.engine == "xla":
-        deaf = (jnp.arange(len(args.floors)) >= m) & ~jnp.asarray(steered)
+        deaf = (jnp.arange(len(args.floors)) >= m) & ~jnp.asarray(carries_parameters)
         floors = jnp.where(deaf, jnp.inf, args.floors)
         args = Seeded(args.args, args.seeds, floors, args.active)
         return solve_to_section(
@@ -201,7 +206,7 @@ def _next_passage(
             y0,
             args,
             precision=precision,
-            time_limit=limit,
+            max_time=limit,
             max_solver_steps=most,
             save_nodes=True,
         )
@@ -213,39 +218,39 @@ def _next_passage(
         args,
         sizes,
         precision=precision,
-        time_limit=limit,
+        max_time=limit,
         max_solver_steps=most,
-        steered=steered,
+        carries_parameters=carries_parameters,
     )
 
 
-def _chain_passages(
+def _chain_arrivals(
     spec: ReturnMapSpec,
     y: PyTree,
     end: Tangents,
     code: Scalar,
-    passages: SectionArrival,
+    arrivals: SectionArrival,
     on_section: Scalar,
     velocity: Scalar,
 ) -> LinearisedReturn:
     places = jnp.asarray(recurring_indices(spec.system, y))
     cyclic_coordinates = jnp.asarray(spec.system.cyclic_coordinates, dtype=int)
     before, after = jnp.stack(jtu.tree_leaves(y)), jnp.stack(jtu.tree_leaves(end.state))
-    highest = jnp.argmax(passages.peak)
+    highest = jnp.argmax(arrivals.peak)
     return LinearisedReturn(
         recurring=after[places],
         jacobian=on_section[places],
         monodromy=end.columns[places],
         velocity=velocity[places],
-        period=jnp.sum(passages.time),
-        period_row=passages.time_columns[-1],
+        period=jnp.sum(arrivals.time),
+        period_row=arrivals.time_columns[-1],
         advance=(after - before)[cyclic_coordinates],
         advance_rows=on_section[cyclic_coordinates],
-        peak=passages.peak[highest],
-        peak_row=passages.peak_columns[highest],
+        peak=arrivals.peak[highest],
+        peak_row=arrivals.peak_columns[highest],
         code=code,
-        attempted=jnp.sum(passages.attempted),
-        jumps=jnp.sum(passages.jumps),
-        missed=jnp.sum(passages.missed),
-        nodes=passages.nodes,
+        attempted=jnp.sum(arrivals.attempted),
+        jumps=jnp.sum(arrivals.jumps),
+        missed=jnp.sum(arrivals.missed),
+        nodes=arrivals.nodes,
     )

@@ -33,13 +33,13 @@ def forward_by_lanes(
 def _forward_by_lanes_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
     spec, precision, args, state = primals
     _, _, args_dot, state_dot = tangents
-    moved, steered = _leaves_with_none(state_dot, state), _leaves_with_none(args_dot, args)
-    places = tuple(i for i, dot in enumerate(moved) if dot is not None)
-    active = tuple(i for i, dot in enumerate(steered) if dot is not None)
+    state_dots, args_dots = _leaves_with_none(state_dot, state), _leaves_with_none(args_dot, args)
+    places = tuple(i for i, dot in enumerate(state_dots) if dot is not None)
+    active = tuple(i for i, dot in enumerate(args_dots) if dot is not None)
     found = _solve(spec, precision, args, state, places, active)
     sizes = _sizes(args, active)
-    dots = [moved[i] for i in places]
-    dots += [steered[i] / size for i, size in zip(active, sizes, strict=True)]
+    dots = [state_dots[i] for i in places]
+    dots += [args_dots[i] / size for i, size in zip(active, sizes, strict=True)]
     along = jnp.stack(dots) if dots else jnp.zeros(0)
     arrived = jtu.tree_unflatten(jtu.tree_structure(state), list(along @ found.columns))
 
@@ -139,7 +139,7 @@ def _solve(
         Seeded(args, jnp.zeros((p, m + p)), floors, active),
         jnp.stack(_sizes(args, active)) if active else jnp.zeros(0),
         precision=precision,
-        time_limit=spec.time_limit,
+        max_time=spec.max_time,
         max_solver_steps=spec.max_solver_steps,
     )
     return found

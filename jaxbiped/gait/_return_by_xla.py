@@ -34,7 +34,7 @@ def forward_by_xla(
         state,
         args,
         precision=precision,
-        time_limit=spec.time_limit,
+        max_time=spec.max_time,
         max_solver_steps=spec.max_solver_steps,
     )
     return reset_on_arrival(spec, args, found.y, found.time, found.code)
@@ -69,7 +69,7 @@ def _by_xla_forward_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
         Tangents(state, column),
         seeded,
         precision=precision,
-        time_limit=spec.time_limit,
+        max_time=spec.max_time,
         max_solver_steps=spec.max_solver_steps,
     )
     structure = jtu.tree_structure(state)
@@ -92,17 +92,17 @@ def reverse_by_xla(
 ) -> tuple[PyTree, Scalar, Scalar]:
     inverse = jnp.stack(jtu.tree_leaves(units_of(args, state).inverse))
     count = len(inverse)
-    steering = Tangents(state, jnp.eye(count))
+    start = Tangents(state, jnp.eye(count))
     seeded = Seeded(args, jnp.zeros((0, count)), STATE_FLOOR * inverse, ())
     found = solve_to_section(
         spec.watch(args, state, peak=False),
         spec.solver,
-        steering,
+        start,
         seeded,
         precision=precision,
-        time_limit=spec.time_limit,
+        max_time=spec.max_time,
         max_solver_steps=spec.max_solver_steps,
-        columns_only_steer=True,
+        columns_only_choose_steps=True,
     )
     return reset_on_arrival(spec, args, found.y.state, found.time, found.code)
 

@@ -34,7 +34,8 @@ class Return(NamedTuple):
     """Where the return map leads.
 
     Attributes:
-        state: on the section, renewed (legs exchanged); drifting components go on from the start's.
+        state: on the section, after the reset (legs exchanged); cyclic coordinates go on from the
+            start's.
         time: duration [s].
         code: 0 for a return, else that of the `Ending` that came instead; state and time are then
             where it ended.
@@ -50,12 +51,12 @@ def return_map(
     state: PyTree,
     *,
     section: AbstractSection | None = None,
-    steps: int = 1,
+    footsteps: int = 1,
     gradient: AbstractGradient | None = None,
     accuracy: str = "balanced",
     system: AbstractSystem | None = None,
     solver: str | diffrax.AbstractSolver | None = None,
-    time_limit: Any = 10.0,
+    max_time: Any = 10.0,
     engine: str = "auto",
 ) -> Return:
     """Follows a motion to its next arrival at a section, differentiably.
@@ -67,15 +68,19 @@ def return_map(
         state: start, on the section or not; for a redundant scene a minimal state too, which then
             comes back as one.
         section: `MidStance()` unless given, `HeelStrike()` for a rigid walker.
-        steps: how many arrivals to follow.
+        footsteps: how many arrivals to follow.
         gradient: `Forward()` (the default) or `Reverse()`.
         accuracy: "balanced" or "tight".
         system: the walker unless given.
         solver: a name (see `SOLVERS`) or any diffrax solver that estimates its errors; unless
             given "rodas4", for a rigid walker "rodas5p".
-        time_limit: longest time to an arrival [s].
+        max_time: longest time to an arrival [s].
         engine: "xla", "lanes" or "auto" (see `ENGINES`), which here is "xla" for a system of your
             own. By lanes all directions of a derivative share one solve.
+
+    Returns:
+        State at the arrival, time that it took [s], and the code of what ended the motion before
+        it, leaves shaped as the start's.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
@@ -85,7 +90,7 @@ def return_map(
     gradient = Forward() if gradient is None else gradient
     check_anywhere(gradient, "a return map")
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
-    check_positive("steps", steps)
+    check_positive("footsteps", footsteps)
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
     redundant = isinstance(args, RedundantScene) and system is None
     enters = redundant and not is_redundant(state)
@@ -108,7 +113,7 @@ def return_map(
         system=system_of(args) if system is None else system,
         section=section,
         solver=method,
-        time_limit=time_limit,
+        max_time=max_time,
         steps=1,
         max_solver_steps=MOST_SOLVER_STEPS[accuracy],
         engine=by,
@@ -116,7 +121,7 @@ def return_map(
     follow = _FOLLOW[by, type(gradient)]
     precision = precision_of(accuracy, args)
     time, code = jnp.zeros(()), jnp.asarray(0)
-    for _ in range(int(steps)):
+    for _ in range(int(footsteps)):
         arrived, lasted, came = follow(spec, precision, args, state)
         state = select(code == 0, arrived, state)
         time = time + jnp.where(code == 0, lasted, 0.0)

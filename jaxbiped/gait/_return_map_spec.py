@@ -19,17 +19,17 @@ class ReturnMapSpec(eqx.Module):
         system, section: whose return map.
         solver: one-step solver.
         steps: arrivals that make one cycle.
-        time_limit: longest time to the next arrival [s].
+        max_time: longest time to the next arrival [s].
         max_solver_steps: cap on the attempted steps to the next arrival.
         engine: "xla" or "lanes".
-        within: the system that is solved, where its coordinates are redundant: every passage
+        within: the system that is solved, where its coordinates are redundant: every solve
             enters them and leaves them again, so that a cycle knows nothing of constraints.
     """
 
     system: AbstractSystem
     section: AbstractSection
     solver: Any
-    time_limit: Any
+    max_time: Any
     steps: int = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)
@@ -43,7 +43,7 @@ class ReturnMapSpec(eqx.Module):
         peak: bool = True,
         of: AbstractSystem | None = None,
     ) -> Watch:
-        """What the solves land on: a section is looked at after the arrival's renewal."""
+        """What the solves end on: a section is looked at after the arrival's reset."""
         system = self.system if of is None else of
         loaded = eqx.filter_eval_shape(system.load, args, y) is not None
         return Watch(
@@ -56,11 +56,11 @@ class ReturnMapSpec(eqx.Module):
 
 
 class _Arrival(eqx.Module):
-    """The section's value and whether a crossing counts, looked at after the renewal."""
+    """The section's value and whether a crossing counts, looked at after the reset."""
 
     system: AbstractSystem
     section: AbstractSection
 
     def __call__(self, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
-        renewed = minimal_state(args, self.system.reset_map(args, y))
-        return self.section.value(args, renewed), self.section.counts(args, renewed)
+        after_reset = minimal_state(args, self.system.reset_map(args, y))
+        return self.section.value(args, after_reset), self.section.counts(args, after_reset)

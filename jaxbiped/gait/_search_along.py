@@ -37,8 +37,8 @@ class _Way(NamedTuple):
         s: of the next search; negative for the search from the fitted start, at the end of the
             line.
         step: from the last gait that was found on the line.
-        known, before: points of the last gait found on the line and of the one before it, with
-            their places `at`, shape (2,).
+        latest_point, before: points of the last gait found on the line and of the one before it,
+            with their places `at`, shape (2,).
         ahead: the point that the next search begins from.
         best: the gait to be returned, `radius` its spectral radius, infinite where there is none.
         origin: what will be told.
@@ -48,7 +48,7 @@ class _Way(NamedTuple):
 
     s: Scalar
     step: Scalar
-    known: Scalar
+    latest_point: Scalar
     before: Scalar
     at: Scalar
     ahead: Scalar
@@ -82,15 +82,15 @@ def search_along(
     shape = jax.eval_shape(
         lambda: search(spec, scene, active, start, precision, method, jnp.asarray(True))
     )
-    nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
+    no_return = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
     begin = _Way(
         s=jnp.asarray(-1.0),
         step=jnp.asarray(_FIRST),
-        known=fitted,
+        latest_point=fitted,
         before=fitted,
         at=jnp.zeros(2),
         ahead=fitted,
-        best=nothing,
+        best=no_return,
         radius=jnp.asarray(jnp.inf),
         origin=jax.tree.map(jnp.asarray, origin),
         searches=jnp.asarray(0),
@@ -118,8 +118,10 @@ def _after(way: _Way, latest: Found, line: Homotopy, first: Scalar) -> _Way:
     on_line = found & ~from_start
     at = jnp.where(on_line, jnp.stack([jnp.where(from_seed, 0.0, way.at[1]), way.s]), way.at)
     # The first gait on the line has none before it.
-    before = jnp.where(on_line, jnp.where(from_seed, latest.recurring, way.known), way.before)
-    known = jnp.where(on_line, latest.recurring, way.known)
+    before = jnp.where(
+        on_line, jnp.where(from_seed, latest.recurring, way.latest_point), way.before
+    )
+    latest_point = jnp.where(on_line, latest.recurring, way.latest_point)
     grown = jnp.minimum(jnp.where(from_seed, way.step, 1.5 * way.step), _LARGEST)
     step = jnp.where(from_start, way.step, jnp.where(found, grown, 0.4 * way.step))
     lost = ~found & ~from_start
@@ -132,7 +134,7 @@ def _after(way: _Way, latest: Found, line: Homotopy, first: Scalar) -> _Way:
     followed = over & ~from_start
     s = jnp.where(from_start, 0.0, jnp.minimum(at[1] + step, 1.0))
     share = (s - at[1]) / jnp.where(at[1] > at[0], at[1] - at[0], 1.0)
-    ahead = jnp.where(from_start, first, known + share * (known - before))
+    ahead = jnp.where(from_start, first, latest_point + share * (latest_point - before))
     origin = way.origin._replace(
         found_by=jnp.where(better & ~from_start, int(FoundBy.CONTINUATION), way.origin.found_by),
         branch_end=jnp.where(followed, end, way.origin.branch_end),
@@ -142,7 +144,7 @@ def _after(way: _Way, latest: Found, line: Homotopy, first: Scalar) -> _Way:
     return _Way(
         s=s,
         step=step,
-        known=known,
+        latest_point=latest_point,
         before=before,
         at=at,
         ahead=ahead,
@@ -158,9 +160,9 @@ def _is_ahead(way: _Way, point: Scalar) -> Scalar:
     """Whether a point lies where those before it on the line point to."""
 
     def distance(a: Scalar, b: Scalar) -> Scalar:
-        return jnp.max(jnp.abs(a - b) / (_FLOOR + jnp.abs(way.known)))
+        return jnp.max(jnp.abs(a - b) / (_FLOOR + jnp.abs(way.latest_point)))
 
-    aside, length = distance(point, way.ahead), distance(point, way.known)
+    aside, length = distance(point, way.ahead), distance(point, way.latest_point)
     return jnp.where(way.at[1] > way.at[0], aside < _ASIDE * length + 0.01, length < _JUMP)
 
 

@@ -1,4 +1,8 @@
-"""Second variation of the return map at a periodic orbit."""
+"""Second variation of the return map at a periodic orbit.
+
+The spectral radius is a function of the return map's Jacobian, so its sensitivities are second
+derivatives of the map.
+"""
 
 import jax
 import jax.numpy as jnp
@@ -21,7 +25,7 @@ def second_variation(
     args: Seeded,
     like: PyTree,
     last: LinearisedReturn,
-    turned: Scalar,
+    leading: Scalar,
     weights: Scalar,
     tangents: Scalar,
     sizes: Scalar,
@@ -33,7 +37,8 @@ def second_variation(
         args: parameters.
         like: a state, for its structure.
         last: the return, with its nodes.
-        turned: v directions of the m recurring components, which move no parameter; (v, m).
+        leading: v directions of the m recurring components, those of the leading eigenpair, which
+            move no parameter; (v, m).
         weights: of the recurring components of each one's second derivatives, (v, m).
         tangents: p other directions, each of which moves one active parameter, shape (m, p).
         sizes: by how much, shape (p,).
@@ -44,9 +49,9 @@ def second_variation(
     flow = _flow(spec, args, like)
     places = jnp.asarray(recurring_indices(spec.system, like))
     if spec.engine == "lanes":
-        adjoints = _pull_back(spec, flow, places, last, turned, weights)
+        adjoints = _pull_back(spec, flow, places, last, leading, weights)
         return adjoints.family[places] @ tangents + adjoints.parameters * sizes
-    second = _all_second_derivatives(spec, flow, places, last, turned, tangents, sizes)
+    second = _all_second_derivatives(spec, flow, places, last, leading, tangents, sizes)
     return jnp.einsum("vm,mpv->p", weights, second[places])
 
 
@@ -55,35 +60,35 @@ def _pull_back(
     flow: Flow,
     places: Scalar,
     last: LinearisedReturn,
-    turned: Scalar,
+    leading: Scalar,
     weights: Scalar,
 ) -> Adjoints:
-    """Derivatives of the weighted sum by what is at the start of the cycle."""
+    """Derivatives of the weighted sum with respect to what the cycle starts from."""
     c, p = flow.structure.num_leaves, len(flow.args.active)
     parameters = jnp.stack([jnp.asarray(leaf) for leaf in active_leaves(flow.args)])
-    along, known = jnp.zeros((len(turned), c)).at[:, places].set(turned), []
+    along, carried = jnp.zeros((len(leading), c)).at[:, places].set(leading), []
     for k in range(spec.steps):
         nodes = jax.tree.map(lambda leaf, k=k: leaf[k], last.nodes)
         arrived, steps = carry_tangents(flow, nodes, along)
-        known.append((nodes, arrived, steps))
+        carried.append((nodes, arrived, steps))
         if k + 1 < spec.steps:
             before = flow.earlier(nodes.arrival, parameters)[1:]
-            along = _after_arrival(flow, before, parameters, arrived.turned)
+            along = _after_arrival(flow, before, parameters, arrived.leading)
     second = jnp.zeros((len(weights), c)).at[:, places].set(weights)
     adjoints = Adjoints(second, jnp.zeros(c), jnp.zeros(p))
-    for k, (nodes, arrived, steps) in reversed(list(enumerate(known))):
+    for k, (nodes, arrived, steps) in reversed(list(enumerate(carried))):
         final = k + 1 == spec.steps
         adjoints = pull_back(flow, nodes, arrived, steps, adjoints, final=final)
     return adjoints
 
 
-def _after_arrival(flow: Flow, state: Scalar, parameters: Scalar, turned: Scalar) -> Scalar:
-    """Turned tangents (v, c) behind the renewal of an arrival at a fixed time."""
+def _after_arrival(flow: Flow, state: Scalar, parameters: Scalar, leading: Scalar) -> Scalar:
+    """Leading tangents (v, c) behind the reset of an arrival at a fixed time."""
 
     def reset(state: Scalar) -> Scalar:
         return flow.reset(jnp.concatenate([state, parameters]))
 
-    return jax.vmap(lambda tangent: jax.jvp(reset_jet, (state,), (tangent,))[1])(turned)
+    return jax.vmap(lambda tangent: jax.jvp(reset, (state,), (tangent,))[1])(leading)
 
 
 def _all_second_derivatives(
@@ -91,15 +96,15 @@ def _all_second_derivatives(
     flow: Flow,
     places: Scalar,
     last: LinearisedReturn,
-    turned: Scalar,
+    leading: Scalar,
     tangents: Scalar,
     sizes: Scalar,
 ) -> Scalar:
     """All second derivatives of the components on the section, shape (c, p, v)."""
-    c, count = flow.structure.num_leaves, len(turned)
+    c, count = flow.structure.num_leaves, len(leading)
     seeds = jnp.concatenate([jnp.zeros((len(sizes), count)), jnp.diag(sizes)], axis=1)
     parameters = jnp.stack([jnp.asarray(leaf) for leaf in active_leaves(flow.args)])
-    along = jnp.concatenate([turned.T, tangents], axis=1)
+    along = jnp.concatenate([leading.T, tangents], axis=1)
     first = jnp.zeros((c, seeds.shape[1])).at[places].set(along)
     jet = Jet(first, jnp.zeros((c, len(sizes), count)))
     assert last.nodes is not None

@@ -73,10 +73,10 @@ def _arrivals(scene: Scene, starts: Any) -> tuple[Any, Any]:
         walk = simulate(
             scene,
             start,
-            steps=_FOOTSTEPS + 1,
+            footsteps=_FOOTSTEPS + 1,
             accuracy="fast",
             save=MidStance(),
-            most_arrivals=_FOOTSTEPS,
+            max_arrivals=_FOOTSTEPS,
             engine="lanes",
         )
         last = jtu.tree_map(lambda leaf: leaf[-1 - _DEPTH :], walk.state)
@@ -92,7 +92,7 @@ def _rigid_arrivals(scene: RigidScene, starts: Any) -> tuple[Scalar, Any]:
     """Heel strikes of each walk, and the states just after the last ones."""
 
     def one(start: Any) -> tuple[Scalar, Any]:
-        walk = rigid_walk(scene, start, steps=_FOOTSTEPS, most_arrivals=_FOOTSTEPS)
+        walk = rigid_walk(scene, start, footsteps=_FOOTSTEPS, max_arrivals=_FOOTSTEPS)
         return walk.footsteps, jtu.tree_map(lambda leaf: leaf[-1 - _DEPTH :], walk.strikes[1])
 
     return jax.vmap(one)(starts)

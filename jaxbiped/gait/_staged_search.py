@@ -245,7 +245,7 @@ def _scene_along(
     seeds, sizes = seed_directions(scene, tuple(range(len(jtu.tree_leaves(scene)))), m)
     start = state_with(scout.system, like, point)
     once = linearised_return(
-        scout, seeds, start, ROUGH, jnp.asarray(False), steered=jnp.asarray(True)
+        scout, seeds, start, ROUGH, jnp.asarray(False), carries_parameters=jnp.asarray(True)
     )
     by_s = once.jacobian[:, m:] @ (line.slopes(s) / sizes)
     return once.recurring - point, once.jacobian[:, :m] - jnp.eye(m), by_s, once.code

@@ -28,6 +28,13 @@ def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset"
     `parameter_units` (JSON). Write it with `to_netcdf` (or
     `to_zarr`, with zarr installed).
 
+    Args:
+        scene: what was simulated.
+        trajectory: the motion; only one, not a batch.
+
+    Returns:
+        The dataset, one entry along `time` for each time saved.
+
     Raises:
         ValueError: a batch of trajectories.
     """

@@ -35,13 +35,30 @@ class EnergyLedger(NamedTuple):
 def energy_ledger(
     scene: Scene, trajectory: Trajectory, times: np.ndarray | None = None
 ) -> EnergyLedger:
-    """Ledger between consecutive `times` [s], or (shape (1,)) over the whole trajectory.
+    """The energy ledger of a trajectory: gravity's work and where it went, between times.
 
     Energies are functions of the state; the works of the contact are integrals of its powers
     over the continuous solution.
 
+    Args:
+        scene: what was simulated.
+        trajectory: the motion, saved step by step.
+        times: between which the books are closed, increasing [s], shape (n + 1,); the trajectory's
+            first and last unless given.
+
+    Returns:
+        The ledger of every interval [J], leaves of shape (n,); n = 1 unless `times` are given.
+
     Raises:
         ValueError: a trajectory without its continuous solution, or a batch of them.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> scene = jb.seed_scene()
+        >>> walk = jb.simulate(scene, jb.seed_state(), footsteps=2, accuracy="fast", engine="lanes")
+        >>> books = jb.energy_ledger(scene, walk)
+        >>> books.gravity_work.round(3), books.damper_loss.round(3)
+        (array([0.195]), array([0.071]))
     """
     trajectory.require_dense()
     ends = np.asarray(trajectory.t)[[0, -1]] if times is None else np.asarray(times)

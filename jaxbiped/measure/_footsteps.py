@@ -54,6 +54,13 @@ class Footsteps(NamedTuple):
 def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
     """Heel strikes: the foot ahead comes to touch, the other one having struck before.
 
+    Args:
+        scene: what was simulated.
+        trajectory: the motion, saved step by step.
+
+    Returns:
+        Time [s] and foot of all n heel strikes, leaves of shape (n,).
+
     Raises:
         ValueError: a trajectory without its continuous solution, or a batch of them.
     """
@@ -83,8 +90,22 @@ def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
 def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     """Every footstep that a trajectory completes; none gives leaves of shape (0,).
 
+    Args:
+        scene: what was simulated.
+        trajectory: the motion, saved step by step.
+
+    Returns:
+        The measures of all n footsteps (SI units, named in the fields), leaves of shape (n,).
+
     Raises:
         ValueError: a trajectory without its continuous solution, or a batch of them.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> scene = jb.seed_scene()
+        >>> walk = jb.simulate(scene, jb.seed_state(), footsteps=2, accuracy="fast", engine="lanes")
+        >>> jb.footsteps(scene, walk).length_m.round(3)
+        array([0.18])
     """
     strikes = heel_strikes(scene, trajectory)
     count = max(len(strikes.time_s) - 1, 0)

@@ -12,6 +12,12 @@ def operation_counts(scene: Scene | RigidScene) -> dict[str, int]:
     Counted after equal operations are shared, constants folded, and all that depends on the scene
     alone is left out: what the lane engine computes for each stage of a step. An elementary
     function counts as the arithmetic that it is made of.
+
+    Args:
+        scene: the walker, compliant or rigid.
+
+    Returns:
+        How many times each operation is done, by its name.
     """
     kind, field = state_type(scene), field_of(scene)
     state = kind(*[0.0] * len(kind._fields))

@@ -37,6 +37,9 @@ def animate(
         frames_per_second: of the picture [1/s]; a GIF rounds the time of a frame to 10 ms.
         slow_down: seconds of the picture for a second of the motion.
 
+    Returns:
+        The animation, of matplotlib.
+
     Raises:
         ValueError: the trajectory was not saved step by step, or a number not above 0.
     """
@@ -57,13 +60,28 @@ def animate(
 
 
 def save_animation(animation: FuncAnimation, path: str | Path) -> Path:
-    """Writes what `animate` returned as a GIF that repeats, and returns its path."""
+    """Writes what `animate` returned as a GIF that repeats, and returns its path.
+
+    Args:
+        animation: from `animate`.
+        path: of the file to write.
+
+    Returns:
+        The path.
+    """
     animation.save(str(path), writer="pillow")
     return Path(path)
 
 
 def animation_html(animation: FuncAnimation) -> str:
-    """What `animate` returned as HTML with controls, for `IPython.display.HTML`."""
+    """What `animate` returned as HTML with controls, for `IPython.display.HTML`.
+
+    Args:
+        animation: from `animate`.
+
+    Returns:
+        HTML, the frames within it.
+    """
     return animation.to_jshtml()
 
 

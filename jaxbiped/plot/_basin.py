@@ -53,6 +53,9 @@ def basin(
         title: above the axes.
         ax: axes to draw into; a new figure unless given.
 
+    Returns:
+        The figure that holds `ax`, or the new one.
+
     Raises:
         ArgumentError: shapes that do not fit, an empty grid, coordinates that do not increase.
     """

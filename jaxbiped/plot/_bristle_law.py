@@ -36,6 +36,9 @@ def bristle_law(
         slip_speed: of the slide [m/s].
         ax: axes to draw into; a new figure unless given.
 
+    Returns:
+        The figure that holds `ax`, or the new one.
+
     Raises:
         ArgumentError: no law with bristles, or a slip speed not above 0.
     """

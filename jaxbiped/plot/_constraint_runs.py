@@ -32,6 +32,9 @@ def constraint_runs(runs: Sequence[Mapping[str, Any]]) -> Figure:
         runs: as `jaxbiped constraints --json` writes them: `method`, `integrator`, `rtol_or_dt`
             (a step [s] where `fixed`), `ending`, `max_violation_m`, `state_error`, `wall_s_run`.
 
+    Returns:
+        A new figure.
+
     Raises:
         ArgumentError: no runs.
     """

@@ -48,6 +48,9 @@ def contact_forces(
         strike: which heel strike to enlarge, counted from 0, or from the last: -1. A motion
             without a heel strike has no right-hand column.
 
+    Returns:
+        The figure given, or the new one.
+
     Raises:
         ValueError: the trajectory was not saved step by step, or has fewer heel strikes.
     """

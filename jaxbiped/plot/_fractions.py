@@ -42,6 +42,9 @@ def basin_fractions(
         log: whether the parameter's axis is logarithmic.
         ax: axes to draw into; a new figure unless given.
 
+    Returns:
+        The figure that holds `ax`, or the new one.
+
     Raises:
         ArgumentError: no value, as many values as fractions are not there, values that do not
             increase or are not above 0 on a logarithmic axis, one value to stack, or nothing

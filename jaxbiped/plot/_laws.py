@@ -60,6 +60,9 @@ def normal_law(
         approach_speed: rate of penetration as it touches [m/s].
         figure: empty figure or subfigure to draw into; a new one unless given.
 
+    Returns:
+        The figure given, or the new one.
+
     Raises:
         ArgumentError: no normal law, or a depth, mass or approach_speed not above 0.
     """
@@ -93,6 +96,9 @@ def friction_law(
             law's own speed, at most 1 m/s.
         load: normal force [N]; it matters only to a law that is not proportional to it.
         ax: axes to draw into; a new figure unless given.
+
+    Returns:
+        The figure that holds `ax`, or the new one.
 
     Raises:
         ArgumentError: no law of friction, or a load or fastest slip not above 0.

@@ -28,6 +28,9 @@ def leg_angles(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None) 
         trajectory: the motion, saved step by step.
         ax: axes to draw into; a new figure unless given.
 
+    Returns:
+        The figure that holds `ax`, or the new one.
+
     Raises:
         ValueError: the trajectory was not saved step by step.
     """

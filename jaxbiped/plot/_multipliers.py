@@ -35,6 +35,9 @@ def multipliers(gait: Gait, *, ax: Axes | None = None) -> Figure:
         gait: a gait that was found.
         ax: axes to draw into; a new figure unless given.
 
+    Returns:
+        The figure that holds `ax`, or the new one.
+
     Raises:
         ValueError: no gait was found, or this is a batch.
     """

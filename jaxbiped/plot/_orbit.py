@@ -30,6 +30,9 @@ def gait_orbit(gait: Gait, *, ax: Axes | None = None) -> Figure:
         gait: a gait that was found.
         ax: axes to draw into; a new figure unless given.
 
+    Returns:
+        The figure that holds `ax`, or the new one.
+
     Raises:
         ValueError: no gait was found, or this is a batch.
     """

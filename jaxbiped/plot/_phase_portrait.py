@@ -48,6 +48,9 @@ def phase_portrait(
         ax: axes to draw into; a new figure unless given.
         legs: which legs to draw: (1,), (2,) or (1, 2).
 
+    Returns:
+        The figure that holds `ax`, or the new one.
+
     Raises:
         ValueError: the trajectory was not saved step by step, or a leg of another number.
     """

@@ -44,6 +44,9 @@ def refined_basin(
         title: above the axes; how many labels were asked for unless given.
         ax: axes to draw into; a new figure unless given.
 
+    Returns:
+        The figure that holds `ax`, or the new one.
+
     Raises:
         ArgumentError: not a refined boundary of two dimensions, or a code without a name.
     """

@@ -28,6 +28,9 @@ def rigid_leg_angles(
         duration: how long to draw [s].
         ax: axes to draw into; a new figure unless given.
 
+    Returns:
+        The figure that holds `ax`, or the new one.
+
     Raises:
         ArgumentError: a duration not above 0.
     """

@@ -61,6 +61,9 @@ def gait_strobe(
             paper's walk, after the start unless given, and never after the motion's own.
         count: number of poses; unless given, one about every 0.1 s.
 
+    Returns:
+        The figure that holds `ax`, or the new one.
+
     Raises:
         ValueError: the trajectory was not saved step by step, or does not reach the start.
     """

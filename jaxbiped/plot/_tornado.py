@@ -45,6 +45,9 @@ def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -
         measure: one or several of "period", "step_length", "speed", "peak_normal" and
             "spectral_radius", a panel each; all of them unless given.
 
+    Returns:
+        A new figure.
+
     Raises:
         ValueError: no gait was found, this is a batch, a measure that is not one of those, or
             a gait without parameters.

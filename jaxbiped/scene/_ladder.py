@@ -26,8 +26,19 @@ def ladder(scene: Scene | None = None) -> dict[str, Scene | RigidScene]:
     - stribeck: the scene itself, the seed's unless given.
     - bristles: friction that bends by 0.01 mm before it slips.
 
+    Args:
+        scene: the walker with its friction, the seed's unless given.
+
+    Returns:
+        The scenes by the names "rigid", "creep", "stribeck" and "bristles", in this order.
+
     Raises:
         ArgumentError: a scene whose friction is not `BengisuAkay`, from which the others follow.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> list(jb.ladder())
+        ['rigid', 'creep', 'stribeck', 'bristles']
     """
     scene = seed_scene() if scene is None else scene
     check_type("scene", scene, Scene)

@@ -22,6 +22,17 @@ def parameter_names(scene: AbstractScene) -> tuple[str, ...]:
 
     A name is the parameter's own, `K`; where two parts have one of that name, `normal.K`. Those of
     a redundant scene are those of what it models.
+
+    Args:
+        scene: of any kind.
+
+    Returns:
+        The names, one for each numeric leaf of the scene.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> jb.parameter_names(jb.seed_scene())[:5]
+        ('K', 'c', 'xi', 'm', 'J')
     """
     names = _names_by_leaf(scene)
     first = [name for name in _FIRST if name in names]
@@ -29,7 +40,19 @@ def parameter_names(scene: AbstractScene) -> tuple[str, ...]:
 
 
 def parameter_values(scene: AbstractScene) -> dict[str, Any]:
-    """A scene's parameters by name (see `parameter_names`), their own leaves."""
+    """A scene's parameters by name (see `parameter_names`), their own leaves.
+
+    Args:
+        scene: of any kind.
+
+    Returns:
+        Values by name, SI units, in the order of `parameter_names`.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> float(jb.parameter_values(jb.seed_scene())["K"])
+        1000000.0
+    """
     by_leaf = dict(zip(_names_by_leaf(scene), jtu.tree_leaves(scene.minimal), strict=True))
     return {name: by_leaf[name] for name in parameter_names(scene)}
 
@@ -38,6 +61,12 @@ def parameter_quantities(scene: AbstractScene) -> dict[str, Quantity]:
     """What each of a scene's parameters is, with its unit, by name (see `parameter_names`).
 
     Of a law's field that is no `jaxbiped.laws.parameter` no more is known than its name.
+
+    Args:
+        scene: of any kind.
+
+    Returns:
+        A `Quantity` (words, symbol and SI unit) by each name.
     """
     paths = [path for path, _ in jtu.tree_flatten_with_path(scene.minimal)[0]]
     by_leaf = dict(zip(_names_by_leaf(scene), paths, strict=True))
@@ -73,8 +102,22 @@ def select_parameters(
 def with_parameters(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
     """The scene with other values of these parameters (see `parameter_names`), checked anew.
 
+    Args:
+        scene: of any kind.
+        values: new values by name, SI units; arrays of shape (n,) make a batch of scenes for
+            `vmap`.
+
+    Returns:
+        A new scene of the same kind; the one given is not changed.
+
     Raises:
         ArgumentError: a name that the scene does not have, or a value that is not allowed.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> scene = jb.with_parameters(jb.seed_scene(), {"slope": 0.01, "K": 2e6})
+        >>> float(scene.ground.slope), float(scene.normal.K)
+        (0.01, 2000000.0)
     """
     names, changed = _names_by_leaf(scene), scene.minimal
     paths = [path for path, _ in jtu.tree_flatten_with_path(changed)[0]]

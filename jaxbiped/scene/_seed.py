@@ -31,8 +31,33 @@ def seed_scene(
     Units: `slope` rad, `g` m/s², `m` and `hip_mass` kg, `J` kg·m², `l`, `d`, `r` m, `K` N/mⁿ,
     `c` N·s/m², `v0` m/s, `xi` s/m. The paper prints slopes as "0,20 rad"; 0.02 is meant.
 
+    Args:
+        slope: inclination of the ground [rad].
+        g: gravitational acceleration [m/s²].
+        m: mass of a leg [kg].
+        J: inertia of a leg about its centre of mass [kg·m²].
+        l: length of a leg, hip to sole [m].
+        d: distance of a leg's centre of mass from the hip [m].
+        r: radius of a foot [m].
+        hip_mass: mass at the hip [kg].
+        n: exponent of the normal force [–].
+        K: contact stiffness [N/mⁿ].
+        c: contact damping [N·s/m²].
+        mu_static, mu_kinetic: static and kinetic friction coefficients [–].
+        v0: slip speed at which friction peaks [m/s].
+        xi: rate at which friction falls beyond it [s/m].
+
+    Returns:
+        The scene: `Walker`, `Ground`, `RistowSchafer` and `BengisuAkay`, and the paper's rule of
+        clearance.
+
     Raises:
         ArgumentError: a value that is not allowed; the message names it.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> float(jb.seed_scene(slope=0.03).ground.slope)
+        0.03
     """
     return Scene(
         walker=Walker(m=m, J=J, l=l, d=d, r=r, hip_mass=hip_mass),

@@ -27,6 +27,9 @@ def walker_linkage(walker: Walker, orientation: str = "angle") -> Linkage:
         walker: masses and lengths.
         orientation: one of `ORIENTATIONS`.
 
+    Returns:
+        Two bodies and one joint, SI units.
+
     Raises:
         ArgumentError: an unknown orientation.
     """

@@ -11,6 +11,7 @@ from jaxtyping import Array
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
+from jaxbiped.compiler import LANES, Request
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._recorded_steps import recorded_steps
@@ -22,8 +23,7 @@ from jaxbiped.solve.controllers._footstep_limit import PATIENCE
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._differentiable_solve import (
     Setting,
-    compiled_solve,
-    is_expressible,
+    request_of,
     solve_and_save,
     solve_scene,
     solve_step_by_step,
@@ -51,7 +51,7 @@ def by_lanes(run: "Simulation") -> Trajectory:
         state = jtu.tree_map(lambda leaf: jnp.reshape(leaf, (1,)), ended.state)
     else:
         times = None if run.times is None else np.asarray(run.times)
-        room = 0 if run.section is None else run.most_arrivals
+        room = 0 if run.section is None else run.max_arrivals
         ended, recorded = solve_and_save(_solve(run), setting, times=times, room=room)
         assert recorded is not None
         # As diffrax has it: infinite where the solve ended before.
@@ -75,7 +75,12 @@ def by_lanes(run: "Simulation") -> Trajectory:
 
 def can_by_lanes(run: "Simulation") -> bool:
     """Whether lanes have all operations that a request needs."""
-    return is_expressible(_setting(run), jtu.tree_structure(run.scene))
+    return LANES.can(lane_request(run)) is None
+
+
+def lane_request(run: "Simulation") -> Request:
+    """What a request asks of lanes."""
+    return request_of(_solve(run), _setting(run))
 
 
 def prepare_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
@@ -84,7 +89,7 @@ def prepare_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
     Where only the end is asked for, what JAX does around it is compiled as well.
     """
     setting = _setting(run)
-    compiled_solve(setting, jtu.tree_structure(run.scene)).code(1)
+    LANES.compile(lane_request(run)).code(1)
     return by_lanes if setting.saved.within else _compiled
 
 
@@ -108,7 +113,7 @@ def _setting(run: "Simulation") -> Setting:
         section=run.section,
         extremes=run.extremes,
     )
-    return Setting(run.solver, run.watch, run.steps is not None, quick, saved)
+    return Setting(run.solver, run.watch, run.footsteps is not None, quick, saved)
 
 
 def _solve(run: "Simulation") -> Solve:
@@ -116,7 +121,7 @@ def _solve(run: "Simulation") -> Solve:
         return jnp.asarray(value, dtype=jnp.float64)
 
     assert isinstance(run.scene, Scene)
-    footsteps = 0 if run.steps is None else run.steps
+    footsteps = 0 if run.footsteps is None else run.footsteps
     return Solve(
         scene=run.scene,
         state=run.state,
@@ -127,5 +132,5 @@ def _solve(run: "Simulation") -> Solve:
         units=run.units,
         footsteps=number(footsteps),
         patience=number(PATIENCE * footsteps),
-        most_attempts=number(run.max_solver_steps),
+        max_attempts=number(run.max_solver_steps),
     )

@@ -3,7 +3,10 @@
 from typing import TYPE_CHECKING, Any
 
 import diffrax
+import equinox as eqx
+import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
 from jaxtyping import Array
 
 from jaxbiped._caches import cached_jit
@@ -27,8 +30,8 @@ def by_xla(run: "Simulation") -> Trajectory:
     controller: Any = step_control(run.rtol, run.atol, rms_norm, run.units)
     if run.dt is not None:
         controller = diffrax.ConstantStepSize()
-    if run.steps is not None:
-        controller = FootstepLimit(controller, run.steps)
+    if run.footsteps is not None:
+        controller = FootstepLimit(controller, run.footsteps)
     if run.extremes is not None:
         controller = Extremes(controller, run.extremes)
     events = ending_events(run.watch)
@@ -69,7 +72,7 @@ def by_xla(run: "Simulation") -> Trajectory:
 
 
 def _saveat(run: "Simulation") -> diffrax.SaveAt:
-    keeps = run.steps is not None or run.extremes is not None
+    keeps = run.footsteps is not None or run.extremes is not None
     if run.save_steps:
         return diffrax.SaveAt(t0=True, steps=True, dense=True, controller_state=keeps)
     if run.times is not None:
@@ -84,11 +87,23 @@ def _ending(
     out_of_steps: Any = solution.result == results.max_steps_reached
     done: Any = solution.result == results.successful
     timed_out = jnp.zeros_like(done)
-    if run.steps is not None:
+    if run.footsteps is not None:
         _, _, count = control
         # Time ran out before the footsteps came, where only footsteps were asked for.
-        timed_out = done & (count < run.steps) & (run.duration >= PATIENCE * run.steps)
+        timed_out = done & (count < run.footsteps) & (run.duration >= PATIENCE * run.footsteps)
         done = (done & ~timed_out) | (solution.result == results.event_occurred)
     masks: Any = solution.event_mask
     events = dict(zip(names, masks or [], strict=True))
     return ending_code(events, done=done, out_of_steps=out_of_steps, timed_out=timed_out)
+
+
+def trim(trajectory: Trajectory) -> Trajectory:
+    """Cuts unused room off a single trajectory; one that is being traced keeps it."""
+    if trajectory.dense is None or isinstance(trajectory.t, jax.core.Tracer):
+        return trajectory
+    length = int(trajectory.accepted) + 1
+    return eqx.tree_at(
+        lambda each: (each.t, each.state),
+        trajectory,
+        (trajectory.t[:length], jtu.tree_map(lambda leaf: leaf[:length], trajectory.state)),
+    )

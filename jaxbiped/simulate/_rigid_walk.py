@@ -1,13 +1,9 @@
 """Walks of the rigid walker."""
 
-from typing import Any
-
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
-from jaxbiped._caches import cached_jit
 from jaxbiped._checks import (
     ArgumentError,
     check_choice,
@@ -17,20 +13,16 @@ from jaxbiped._checks import (
     check_unbatched,
 )
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.compiler import LANES, XLA, Request
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import check_state
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._start import check_single_scene, in_one_precision, in_own_precision
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._engine import engine_for
-from jaxbiped.solve._rigid_program import rigid_walk_by_lanes
+from jaxbiped.solve._rigid_program import rigid_program
 from jaxbiped.solve._rigid_steps import (
-    RigidProgress,
     RigidWalk,
-    attempt_step,
-    ending_of,
-    initial_progress,
-    state_with_hip,
 )
 
 RIGID_ACCURACIES = {"fast": 1e-4, "balanced": 1e-6, "tight": 1e-11}
@@ -49,7 +41,7 @@ class RigidWalked(eqx.Module):
         footsteps: number of heel strikes.
         attempts: number of attempted steps of the integrator.
         strikes: times [s] and states just after the first heel strikes, leaves of shape
-            (most_arrivals,), infinite beyond the last.
+            (max_arrivals,), infinite beyond the last.
         engine: what computed it.
     """
 
@@ -71,11 +63,11 @@ def rigid_walk(
     scene: RigidScene,
     state: RigidState,
     *,
-    steps: int | None = None,
+    footsteps: int | None = None,
     duration: float | None = None,
     accuracy: str = "balanced",
     rtol: float | None = None,
-    most_arrivals: int = 0,
+    max_arrivals: int = 0,
     max_solver_steps: int = 65536,
     engine: str = "auto",
 ) -> RigidWalked:
@@ -88,32 +80,43 @@ def rigid_walk(
     Args:
         scene: the walker.
         state: start, leg 2 standing.
-        steps: heel strikes after which to end; with a `duration`, too, whichever comes first.
+        footsteps: heel strikes after which to end; with a `duration`, too, whichever comes first.
         duration: simulated time [s].
         accuracy: "fast" (1e-4), "balanced" (1e-6) or "tight" (1e-11): the relative tolerance; the
             absolute one (SI) is a hundredth of it.
         rtol: relative tolerance, in place of the accuracy's.
-        most_arrivals: how many heel strikes to keep.
+        max_arrivals: how many heel strikes to keep.
         max_solver_steps: cap on the attempted steps.
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
 
+    Returns:
+        Where and how the walk ended, and its first `max_arrivals` heel strikes.
+
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> scene = jb.ladder()["rigid"]
+        >>> start = jb.dynamics.rigid_state(jb.seed_state())
+        >>> walk = jb.rigid_walk(scene, start, footsteps=2, engine="lanes")
+        >>> str(walk.outcome), int(walk.footsteps)
+        ('walking', 2)
     """
     check_type("scene", scene, RigidScene)
     scene = jtu.tree_map(as_float, scene)
     state = in_one_precision(check_state(in_own_precision(state), RigidState))
     check_single_scene(scene)
     check_unbatched("state", state, "one start")
-    if duration is None and steps is None:
-        raise ArgumentError("duration = None and steps = None: say how long to walk.")
-    if steps is not None:
-        check_count("steps", steps)
+    if duration is None and footsteps is None:
+        raise ArgumentError("duration = None and footsteps = None: say how long to walk.")
+    if footsteps is not None:
+        check_count("footsteps", footsteps)
     if duration is not None:
         check_unbatched("duration", duration)
         check_positive("duration", duration, "s")
-    if most_arrivals:
-        check_count("most_arrivals", most_arrivals)
+    if max_arrivals:
+        check_count("max_arrivals", max_arrivals)
     check_count("max_solver_steps", max_solver_steps)
     check_choice("accuracy", accuracy, RIGID_ACCURACIES)
     tolerance = RIGID_ACCURACIES[accuracy] if rtol is None else rtol
@@ -122,74 +125,31 @@ def rigid_walk(
     narrow = any(jnp.result_type(leaf) != jnp.float64 for leaf in leaves)
     chosen = engine_for(engine, obstacle="it computes in 64 bits" if narrow else None)
     patience = _PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g)
-    longest = (1 if steps is None else steps) * patience if duration is None else duration
+    longest = (1 if footsteps is None else footsteps) * patience if duration is None else duration
     walk = RigidWalk(
         scene=scene,
         state=state,
         duration=as_float(longest),
-        footsteps=as_float(0 if steps is None else int(steps)),
+        footsteps=as_float(0 if footsteps is None else int(footsteps)),
         rtol=as_float(tolerance),
-        most_attempts=as_float(max_solver_steps),
+        max_attempts=as_float(max_solver_steps),
     )
     # In the precision of the start, as `simulate` has it.
     walk = jtu.tree_map(lambda leaf: leaf.astype(state.theta_1.dtype), walk)
-    run = _by_lanes if chosen == "lanes" else _by_xla
-    return run(walk, int(most_arrivals), duration is None)
-
-
-def _by_lanes(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
-    found, recorded = rigid_walk_by_lanes(walk, room=room, waits=waits)
-    times, states = _empty_walk(walk, room)
+    program = rigid_program(max_arrivals > 0, duration is None)
+    request = Request(program, walk, room=int(max_arrivals), quick=True)
+    found, recorded, _ = (LANES if chosen == "lanes" else XLA).run(request)
+    strikes = jnp.full((int(max_arrivals), 1 + len(state)), jnp.inf, state.theta_1.dtype)
     if recorded is not None:
-        reached = jnp.arange(room) < recorded.counts
-        values = jnp.where(reached[:, None], recorded.values, jnp.inf)
-        times, states = values[:, 0], RigidState(*[values[:, 1 + i] for i in range(5)])
+        reached = jnp.arange(strikes.shape[0]) < recorded.counts
+        strikes = jnp.where(reached[:, None], recorded.values, strikes)
+    states = RigidState(*[strikes[:, 1 + i] for i in range(len(state))])
     return RigidWalked(
         t=found.t,
         state=found.state,
-        ending=found.code,
+        ending=found.ending,
         footsteps=found.footsteps,
         attempts=found.attempts,
-        strikes=(times, states),
-        engine="lanes",
+        strikes=(strikes[:, 0], states),
+        engine=chosen,
     )
-
-
-def _by_xla(walk: RigidWalk, room: int, waits: bool) -> RigidWalked:
-    end, strikes = _loop(walk, room)
-    return RigidWalked(
-        t=end.t,
-        state=state_with_hip(walk, end),
-        ending=ending_of(walk, end, jnp.asarray(waits)),
-        footsteps=end.footsteps,
-        attempts=end.attempts,
-        strikes=strikes,
-        engine="xla",
-    )
-
-
-@cached_jit
-def _loop(walk: RigidWalk, room: int) -> tuple[RigidProgress, Any]:
-    def advance(
-        loop: tuple[RigidProgress, Any, Scalar],
-    ) -> tuple[RigidProgress, Any, Scalar]:
-        now, strikes, _ = loop
-        after, over = attempt_step(walk, now)
-        if room:
-            # Without a strike the place is past the end, and nothing is written.
-            place = jnp.where(after.struck, now.footsteps, room)
-            strikes = jtu.tree_map(
-                lambda kept, new: kept.at[place].set(new, mode="drop"),
-                strikes,
-                (after.t, state_with_hip(walk, after)),
-            )
-        return after, strikes, over
-
-    begin = (initial_progress(walk), _empty_walk(walk, room), jnp.asarray(False))
-    end, strikes, _ = jax.lax.while_loop(lambda loop: ~loop[2], advance, begin)
-    return end, strikes
-
-
-def _empty_walk(walk: RigidWalk, room: int) -> tuple[Scalar, RigidState]:
-    empty = jnp.full(room, jnp.inf, dtype=walk.state.theta_1.dtype)
-    return empty, RigidState(*[empty] * 5)

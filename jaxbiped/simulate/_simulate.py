@@ -27,7 +27,7 @@ from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._by_lanes import by_lanes, can_by_lanes, prepare_lanes
-from jaxbiped.simulate._by_xla import by_xla
+from jaxbiped.simulate._by_xla import by_xla, trim
 from jaxbiped.simulate._engine_choice import choose_engine
 from jaxbiped.simulate._saved_times import check_times
 from jaxbiped.simulate._start import check_steps, start_for
@@ -46,14 +46,14 @@ def simulate(
     state: Any,
     *,
     duration: float | None = None,
-    steps: int | None = None,
+    footsteps: int | None = None,
     solver: str | diffrax.AbstractSolver = "rodas4",
     accuracy: str = "balanced",
     rtol: float | None = None,
     atol: float | None = None,
     dt: float | None = None,
     save: Literal["steps", "end"] | Array | AbstractSection = "steps",
-    most_arrivals: int = 64,
+    max_arrivals: int = 64,
     extremes: Callable[..., PyTree] | None = None,
     watch: tuple[str, ...] = WATCHES,
     max_solver_steps: int = 65536,
@@ -73,7 +73,7 @@ def simulate(
             of the solve: 64 bits unless the user says otherwise. A redundant scene also takes a
             redundant state, which is put on its constraints first (see `consistent_state`).
         duration: simulated time [s].
-        steps: footsteps (heel strikes) after which to end; with a `duration`, too, the simulation
+        footsteps: how many (heel strikes) to end after; with a `duration`, too, the simulation
             ends at whichever comes first, and is "walking" either way.
         solver: a name (see `SOLVERS`) or any diffrax solver.
         accuracy: "fast", "balanced" or "tight" (see `ACCURACIES`), or finer where that would not
@@ -89,10 +89,10 @@ def simulate(
             array of increasing times [s], shape (n,), at which to save, or a section (by lanes
             only), at whose arrivals to save: `HeelStrike()` saves the footsteps. The legs take
             turns there as in `return_map`, but the states saved keep their own names.
-        most_arrivals: how many arrivals at a section there is room for.
+        max_arrivals: how many arrivals at a section there is room for.
         extremes: a function of (scene, state) whose least and largest values, number by number,
             over the ends of all steps are wanted.
-        watch: which misfortunes end the solve: any of "fall", "stop", "stumble".
+        watch: which failures end the solve: any of "fall", "stop", "stumble".
         max_solver_steps: cap on the solver's attempted steps.
         adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
             needs `diffrax.ForwardMode()`. Where a method projects after each step, only adjoints
@@ -105,19 +105,27 @@ def simulate(
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> walk = jb.simulate(
+        ...     jb.seed_scene(), jb.seed_state(), duration=0.1, save="end", engine="lanes"
+        ... )
+        >>> str(walk.outcome), float(walk.t[-1])
+        ('walking', 0.1)
     """
     run = Simulation.prepare(
         scene,
         state,
         duration=duration,
-        steps=steps,
+        footsteps=footsteps,
         solver=solver,
         accuracy=accuracy,
         rtol=rtol,
         atol=atol,
         dt=dt,
         save=save,
-        most_arrivals=most_arrivals,
+        max_arrivals=max_arrivals,
         extremes=extremes,
         watch=watch,
         max_solver_steps=max_solver_steps,
@@ -128,7 +136,18 @@ def simulate(
 
 
 class Simulation(eqx.Module):
-    """A checked request to simulate. `prepare` it, then `compile` it to run it apart from that."""
+    """A checked request to simulate. `prepare` it, then `compile` it to run it apart from that.
+
+    Attributes:
+        scene, state, duration, rtol, atol, dt, solver, adjoint, footsteps, watch,
+            max_solver_steps, section, max_arrivals, extremes: as in `simulate`, checked, all of one precision.
+        correction: how a redundant start was put on its constraints, or None.
+        times: at which to save [s], shape (n,), or None.
+        save_steps: whether every step is saved.
+        units: scale of each leaf of the state, in which `atol` is measured.
+        engine: "xla" or "lanes".
+        replaceable: whether XLA may take over from lanes.
+    """
 
     scene: Scene | RedundantScene
     state: Any
@@ -141,14 +160,14 @@ class Simulation(eqx.Module):
     dt: Scalar | None
     solver: diffrax.AbstractSolver
     adjoint: diffrax.AbstractAdjoint
-    steps: int | None = eqx.field(static=True)
+    footsteps: int | None = eqx.field(static=True)
     save_steps: bool = eqx.field(static=True)
     watch: tuple[str, ...] = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)
     replaceable: bool = eqx.field(static=True)
     section: AbstractSection | None = eqx.field(static=True)
-    most_arrivals: int = eqx.field(static=True)
+    max_arrivals: int = eqx.field(static=True)
     extremes: Callable[..., PyTree] | None = eqx.field(static=True)
 
     @staticmethod
@@ -157,14 +176,14 @@ class Simulation(eqx.Module):
         state: Any,
         *,
         duration: float | None = None,
-        steps: int | None = None,
+        footsteps: int | None = None,
         solver: str | diffrax.AbstractSolver = "rodas4",
         accuracy: str = "balanced",
         rtol: float | None = None,
         atol: float | None = None,
         dt: float | None = None,
         save: Any = "steps",
-        most_arrivals: int = 64,
+        max_arrivals: int = 64,
         extremes: Callable[..., PyTree] | None = None,
         watch: tuple[str, ...] = WATCHES,
         max_solver_steps: int = 65536,
@@ -175,11 +194,11 @@ class Simulation(eqx.Module):
         check_type("scene", scene, Scene, RedundantScene)
         given = state
         state, correction = start_for(scene, state)
-        if duration is None and steps is None:
-            raise ArgumentError("duration = None and steps = None: say how long to simulate.")
-        if steps is not None:
-            check_count("steps", steps)
-        allowed_time = PATIENCE * steps if steps is not None else 0.0
+        if duration is None and footsteps is None:
+            raise ArgumentError("duration = None and footsteps = None: say how long to simulate.")
+        if footsteps is not None:
+            check_count("footsteps", footsteps)
+        allowed_time = PATIENCE * footsteps if footsteps is not None else 0.0
         time = allowed_time if duration is None else duration
         for name, value in (("duration", time), ("rtol", rtol), ("atol", atol)):
             check_unbatched(name, value)
@@ -189,7 +208,7 @@ class Simulation(eqx.Module):
             check_choice("watch", name, WATCHES)
         if isinstance(save, str):
             check_choice("save", save, ("steps", "end"))
-        check_count("most_arrivals", most_arrivals)
+        check_count("max_arrivals", max_arrivals)
         section = save if isinstance(save, AbstractSection) else None
         timed = section is None and not isinstance(save, str)
         if timed:
@@ -238,20 +257,20 @@ class Simulation(eqx.Module):
             dt=None if dt is None else cast(dt),
             solver=method,
             adjoint=diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint,
-            steps=None if steps is None else int(steps),
+            footsteps=None if footsteps is None else int(footsteps),
             save_steps=save_steps,
             watch=tuple(watch),
             max_solver_steps=int(max_solver_steps),
             engine=chosen,
             replaceable=engine == "auto" and section is None,
             section=section,
-            most_arrivals=int(most_arrivals),
+            max_arrivals=int(max_arrivals),
             extremes=extremes,
         )
 
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
-        return by_lanes(self) if self._lanes_can() else _trim(by_xla(self))
+        return by_lanes(self) if self._lanes_can() else trim(by_xla(self))
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
@@ -274,16 +293,4 @@ class CompiledSimulation:
 
     def __call__(self) -> Trajectory:
         """Runs the solve and waits for it."""
-        return _trim(jax.block_until_ready(self._program(self._request)))
-
-
-def _trim(trajectory: Trajectory) -> Trajectory:
-    """Cuts unused room off a single trajectory; one that is being traced keeps it."""
-    if trajectory.dense is None or isinstance(trajectory.t, jax.core.Tracer):
-        return trajectory
-    length = int(trajectory.accepted) + 1
-    return eqx.tree_at(
-        lambda each: (each.t, each.state),
-        trajectory,
-        (trajectory.t[:length], jtu.tree_map(lambda leaf: leaf[:length], trajectory.state)),
-    )
+        return trim(jax.block_until_ready(self._program(self._request)))

@@ -66,6 +66,9 @@ def swing(
         times: when to save, increasing from 0 on [s], shape (n,); the last one ends the solve.
         solver, accuracy, rtol, atol, dt, max_solver_steps, adjoint: as in `simulate`.
 
+    Returns:
+        States at the `times`, and how far each is off its constraints [m], leaves of shape (n,).
+
     Raises:
         ArgumentError: an argument that is not allowed, or constraints that the method cannot hold,
             before anything is compiled.

@@ -67,7 +67,14 @@ def resolve_slip_speed(rtol: float, scene: Any) -> Any:
 
 
 def rms_norm(error: PyTree) -> Scalar:
-    """Root mean square over all leaves, without gluing them into one array first."""
+    """Root mean square over all leaves, without gluing them into one array first.
+
+    Args:
+        error: numbers of any shapes, scaled by their tolerances [–].
+
+    Returns:
+        The norm [–], a scalar.
+    """
     leaves = jtu.tree_leaves(error)
     size = sum(jnp.size(leaf) for leaf in leaves)
     total = sum(jnp.sum(leaf * leaf) for leaf in leaves)

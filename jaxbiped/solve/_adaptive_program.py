@@ -7,14 +7,12 @@ import contextlib
 from typing import Any, NamedTuple
 
 import diffrax
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Program
-from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
@@ -41,7 +39,7 @@ class Solve(NamedTuple):
         units: of the state's leaves and of time.
         footsteps: after which to end, 0 for no limit.
         patience: time [s] that counts as waiting for footsteps in vain.
-        most_attempts: cap on the solver's steps.
+        max_attempts: cap on the solver's steps.
     """
 
     scene: Scene
@@ -53,7 +51,7 @@ class Solve(NamedTuple):
     units: Units
     footsteps: Any
     patience: Any
-    most_attempts: Any
+    max_attempts: Any
 
 
 class Solved(NamedTuple):
@@ -91,7 +89,7 @@ class AdaptiveSolve:
 
     Attributes:
         solver: its steps.
-        watch: misfortunes that end it.
+        watch: failures that end it.
         counting: whether footsteps are counted.
         saved: what is saved.
         fenced: whether XLA is to compile it, and not lanes (see `fenced`).
@@ -181,8 +179,8 @@ class AdaptiveSolve:
             last=last,
             extremes=self._extremes(solve.scene, now, keep, state),
         )
-        attempts = (after.accepted + after.rejected).astype(solve.most_attempts.dtype)
-        over = (t >= solve.duration) | (attempts >= solve.most_attempts) | ~none | counted
+        attempts = (after.accepted + after.rejected).astype(solve.max_attempts.dtype)
+        over = (t >= solve.duration) | (attempts >= solve.max_attempts) | ~none | counted
         return after, over
 
     def finish(self, solve: Solve, now: _Now) -> Solved:
@@ -235,13 +233,3 @@ class AdaptiveSolve:
 
 def _numbers(values: PyTree) -> PyTree:
     return jtu.tree_map(lambda x: jnp.asarray(x, dtype=jnp.float64), values)
-
-
-def shapes_of(scene: Scene) -> Solve:
-    """The shapes of one simulation's inputs, for a scene of these laws."""
-    number: Any = jax.ShapeDtypeStruct((), jnp.float64)
-    scene = jtu.tree_map(lambda _: number, scene)
-    kind = state_type(scene)
-    state = kind(*[number] * len(kind._fields))
-    numbers = dict.fromkeys(Solve._fields[2:], number) | {"units": Units(state, number)}
-    return Solve(scene, state, **numbers)

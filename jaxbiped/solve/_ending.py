@@ -201,7 +201,7 @@ def ending_code(
     """The code of how a solve ended.
 
     Args:
-        events: for each misfortune, whether it happened (boolean).
+        events: for each failure, whether it happened (boolean).
         done: whether the solve came to the end that was asked for.
         out_of_steps: whether it came to its cap on steps.
         timed_out: whether it waited too long for a footstep.

@@ -13,7 +13,7 @@ import jax.tree_util as jtu
 
 from jaxbiped._types import Scalar
 
-_UP = contextvars.ContextVar("fences are up", default=True)
+_UP = contextvars.ContextVar("barriers are up", default=True)
 
 
 @contextlib.contextmanager

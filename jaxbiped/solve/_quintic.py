@@ -42,7 +42,7 @@ class Quintic(NamedTuple):
         """The share of the step at which it falls through zero, roughly.
 
         Where Newton's method leaves the part that is known to hold it, that is halved: beside the
-        strike the course may have a root behind it, at which the legs opened.
+        strike the curve may have a root behind it, at which the legs opened.
         """
         end = functools.reduce(operator.add, self.coefficients)
         rise = end - self.coefficients[0]

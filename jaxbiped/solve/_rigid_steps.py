@@ -38,7 +38,7 @@ class RigidWalk(NamedTuple):
         duration: simulated time [s].
         footsteps: heel strikes after which to end, 0 for no limit.
         rtol: relative tolerance; the absolute one (SI) is a hundredth of it.
-        most_attempts: cap on the attempted steps.
+        max_attempts: cap on the attempted steps.
     """
 
     scene: RigidScene
@@ -46,7 +46,7 @@ class RigidWalk(NamedTuple):
     duration: Any
     footsteps: Any
     rtol: Any
-    most_attempts: Any
+    max_attempts: Any
 
 
 class RigidProgress(NamedTuple):
@@ -137,7 +137,7 @@ def attempt_step(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Sc
     after = after._replace(rates=rates, attempts=now.attempts + 1)
     enough = (walk.footsteps > 0.0) & (after.footsteps.astype(after.t.dtype) >= walk.footsteps)
     done = enough | ((after.landing == 0) & (after.t >= walk.duration))
-    tired = after.attempts.astype(after.t.dtype) >= walk.most_attempts
+    tired = after.attempts.astype(after.t.dtype) >= walk.max_attempts
     code = jnp.where((after.code == 0) & tired & ~done, int(Ending.OUT_OF_STEPS), after.code)
     return after._replace(code=code), done | (code != 0)
 
@@ -179,8 +179,8 @@ def _after_strike(walk: RigidWalk, trial: RigidProgress, strike: _Strike) -> Rig
     """After the strike beside a trial. Where footsteps last alike, the next one is known."""
     t = trial.t + strike.rest
     period = t - trial.strike
-    drift = jnp.abs(period - trial.period) * jnp.abs(_opening(trial.state)[1])
-    steady = drift <= 2.0 * _NEAR * jnp.sqrt(walk.rtol)
+    change_of_rest = jnp.abs(period - trial.period) * jnp.abs(_opening(trial.state)[1])
+    steady = change_of_rest <= 2.0 * _NEAR * jnp.sqrt(walk.rtol)
     due = jnp.where(steady, t + period, jnp.inf)
     return trial._replace(
         t=t,
@@ -215,7 +215,7 @@ def _after_free_step(
     """
     old, old_rate = _opening(now.state)
     new, new_rate = _opening(trial)
-    course = Quintic.of(
+    opening_curve = Quintic.of(
         now.step, (old, old_rate, now.rates[0] + now.rates[1]), (new, new_rate, rates[2] + rates[3])
     )
     passed = trial.theta_1 > trial.theta_2
@@ -223,7 +223,7 @@ def _after_free_step(
     # A step so long that the legs open and close within it is tried again at half the length.
     turn = old_rate / jnp.where(old_rate == new_rate, 1.0, old_rate - new_rate)
     bulges = (old_rate > 0.0) & (new_rate < 0.0)
-    bulges = bulges & (course.value(turn) > 0.0)
+    bulges = bulges & (opening_curve.value(turn) > 0.0)
     skips = ahead & (old <= _CLOSED) & bulges
     keep = (error <= 1.0) & ~skips
     t = jnp.where(keep, now.t + now.step, now.t)
@@ -232,7 +232,7 @@ def _after_free_step(
     factor = _SAFETY * jnp.maximum(error, 1e-10) ** (-1.0 / ORDER)
     pace = now.step * jnp.clip(factor, _MOST_SHRINK, _MOST_GROWTH)
     pace = jnp.where(skips, 0.5 * now.step, pace)
-    back = now.step * (course.root() - 1.0)
+    back = now.step * (opening_curve.root() - 1.0)
     code = jnp.where(keep & ~closes & ~struck, rigid_ending(trial), 0)
     lost = ~jnp.isfinite(pace) | (pace <= _ROUNDING * t)
     after = now._replace(

@@ -22,16 +22,16 @@ Rates = tuple[Scalar, Scalar, Scalar, Scalar]
 def rolling_step(
     scene: RigidScene,
     state: RigidState,
-    bends: tuple[Scalar, Scalar],
+    at_start: tuple[Scalar, Scalar],
     step: Scalar,
     rtol: Scalar,
 ) -> tuple[RigidState, Scalar, Rates]:
     """The state a step further, its error in units of the tolerance, and its rates, roughly.
 
-    `bends` are the angular accelerations at the start. The place along the slope stays. Of the
+    `at_start` are the angular accelerations at the start. The place along the slope stays. Of the
     error, the root mean square over the components; infinite where it is no number.
     """
-    stages: list[Rates] = [(state.omega_1, state.omega_2, *bends)]
+    stages: list[Rates] = [(state.omega_1, state.omega_2, *at_start)]
     for row in _TABLEAU.a_lower[:-1]:
         at = advance(state, step, row, stages)
         stages.append((at.omega_1, at.omega_2, *accelerations(scene, at)))

@@ -43,8 +43,19 @@ SOLVERS: dict[str, Callable[[], diffrax.AbstractSolver]] = {
 def solver_named(solver: str | diffrax.AbstractSolver) -> diffrax.AbstractSolver:
     """The solver of that name, or the solver itself where one is given.
 
+    Args:
+        solver: a name in `SOLVERS`, or a diffrax solver.
+
+    Returns:
+        A diffrax solver.
+
     Raises:
         ArgumentError: an unknown name.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> jb.solvers.solver_named("rodas4")
+        Rodas4()
     """
     if isinstance(solver, diffrax.AbstractSolver):
         return solver

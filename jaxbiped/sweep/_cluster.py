@@ -55,6 +55,12 @@ def cluster_executor(address: str, *, timeout: float = 10.0) -> tuple[Executor, 
 def local_executor(workers: int) -> ProcessPoolExecutor:
     """An executor of spawned processes, each with its share of this process's threads.
 
+    Args:
+        workers: how many processes, at least 1.
+
+    Returns:
+        The executor; `shutdown` ends the processes.
+
     Raises:
         ArgumentError: `workers` is not a whole number of at least 1.
     """

@@ -89,7 +89,7 @@ def _found(
         gait = find_gait(
             scene,
             None if guess is None else jtu.tree_map(as_float, guess),
-            period=period,
+            footsteps=period,
             parameters=(),
             radius_sensitivities=False,
         )

@@ -7,6 +7,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
+from jaxbiped.compiler import LANES, XLA, Program, Request
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._adaptive_program import Solve
@@ -15,8 +16,6 @@ from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._goals import Goals
-from jaxbiped.sweep._labelling_by_lanes import label_by_lanes
-from jaxbiped.sweep._labelling_by_xla import label_by_xla
 from jaxbiped.sweep._labelling_loop import (
     AbstractLabellingLoop,
     CompliantLabelling,
@@ -37,7 +36,7 @@ class Effort(NamedTuple):
     Attributes:
         rtol: relative tolerance; the absolute one is a hundredth of it in the scene's units.
         footsteps: after which a start that is not certain is given up.
-        most_attempts: cap on the solver's attempted steps.
+        max_attempts: cap on the solver's attempted steps.
         gap: see `arrived`.
         solver: of the compliant walker.
         engine: "lanes" or "xla".
@@ -45,7 +44,7 @@ class Effort(NamedTuple):
 
     rtol: float
     footsteps: int
-    most_attempts: int
+    max_attempts: int
     gap: float
     solver: AbstractRosenbrock
     engine: str
@@ -66,7 +65,7 @@ def follow_starts(
         duration=same(_LONGEST),
         footsteps=same(effort.footsteps),
         rtol=same(effort.rtol),
-        most_attempts=same(effort.most_attempts),
+        max_attempts=same(effort.max_attempts),
     )
     solve: Any = None
     if not scene.compliant:
@@ -78,20 +77,23 @@ def follow_starts(
         solve = Solve(**common, almost=last, atol=atol, units=units, patience=same(np.inf))
     waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
-    course = _labelling_loop(scene.compliant, effort.solver, periods, effort.engine)
     if not count:
         return _empty_outcome(len(states) - 1)
-    run = label_by_lanes if effort.engine == "lanes" else label_by_xla
-    return run(course, jtu.tree_map(np.asarray, starts))
+    program = _program(scene.compliant, effort.solver, periods, effort.engine)
+    engine = LANES if effort.engine == "lanes" else XLA
+    given = jtu.tree_map(np.asarray, starts)
+    outcome: Outcome = engine.run(Request(program, given, batch=True)).outputs
+    return outcome
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def _labelling_loop(
+def _program(
     compliant: bool, solver: AbstractRosenbrock, periods: tuple[int, ...], engine: str
-) -> AbstractLabellingLoop:
+) -> Program:
+    loop: AbstractLabellingLoop = RigidLabelling(periods)
     if compliant:
-        return CompliantLabelling(solver, periods, fenced=engine == "xla")
-    return RigidLabelling(periods)
+        loop = CompliantLabelling(solver, periods, fenced=engine == "xla")
+    return Program(loop.begin, loop.attempt, loop.finish)
 
 
 def _empty_outcome(size: int) -> Outcome:

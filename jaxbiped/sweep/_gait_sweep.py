@@ -37,7 +37,7 @@ def gait_sweep(
     over: Mapping[str, Sequence[float] | np.ndarray],
     *,
     parameters: tuple[str, ...] | None = None,
-    period: int = 1,
+    footsteps: int = 1,
     accuracy: str = "balanced",
     radius_sensitivities: bool = True,
     engine: str = "auto",
@@ -55,7 +55,7 @@ def gait_sweep(
     Args:
         scene: the walker; parameters that are not swept keep its values.
         over: values of each swept parameter by name (see `parameter_names`), shape (k,) each.
-        parameters, period, accuracy, radius_sensitivities, engine: as for `find_gait`.
+        parameters, footsteps, accuracy, radius_sensitivities, engine: as for `find_gait`.
         store: directory of a Zarr store; in memory unless given. A run that was killed continues
             where it was.
         progress: whether to show a bar on stderr.
@@ -77,7 +77,7 @@ def gait_sweep(
         check_store(Path(store))
     options = dict(
         parameters=parameters,
-        period=period,
+        footsteps=footsteps,
         accuracy=accuracy,
         radius_sensitivities=radius_sensitivities,
     )
@@ -88,13 +88,13 @@ def gait_sweep(
         "options": {**options, "parameters": None if parameters is None else list(parameters)},
     }
     shape = tuple(map(len, values.values()))
-    known: dict[tuple[int, ...], Any] = {}
+    states: dict[tuple[int, ...], Any] = {}
     order = list(_outwards(shape, _nearest(scene, values)))
 
     def search(place: tuple[int, ...], *, again: bool) -> Gait | None:
         """The gait there; none again where no neighbour has one."""
         point = {name: values[name][i] for name, i in zip(values, place, strict=True)}
-        near = [known[at] for at in _neighbours(place, shape) if known.get(at) is not None]
+        near = [states[at] for at in _neighbours(place, shape) if states.get(at) is not None]
         if again and not near:
             return None
         own = jtu.tree_map(as_float, with_parameters(scene, point))
@@ -115,7 +115,7 @@ def gait_sweep(
                     # What the first pass found out about a failure is kept.
                     if gait is not None and (not again or gait.outcome is Search.FOUND):
                         grid.write(place, gait)
-                known[place] = grid.state(place)
+                states[place] = grid.state(place)
                 bar.update(not again)
     return grid.dataset()
 

@@ -1,4 +1,7 @@
-"""Identity of models and functions: what distinguishes two of them besides numbers."""
+"""Identity of models and functions: what distinguishes two of them besides numbers.
+
+Only the model that began a store may continue it, and its laws may be a user's own code.
+"""
 
 import dataclasses
 import enum

@@ -194,7 +194,7 @@ def effort_of(
     return Effort(
         rtol=float(tolerance),
         footsteps=int(footsteps),
-        most_attempts=int(max_solver_steps),
+        max_attempts=int(max_solver_steps),
         gap=max(_GAP, _GAP_SHARE * float(tolerance)),
         solver=method,
         engine=engine_for(engine, obstacle=None),

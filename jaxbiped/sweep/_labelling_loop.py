@@ -1,4 +1,7 @@
-"""Labelling loop: a start is followed until its label is certain, by either engine."""
+"""Labelling loop: a start is followed until its label is certain, by either engine.
+
+Both engines run these same functions, so that labels do not depend on the engine.
+"""
 
 import abc
 from collections.abc import Callable
@@ -252,7 +255,7 @@ def _outcome(
     distance: Scalar,
     attempts: Scalar,
 ) -> Outcome:
-    """A misfortune is certain; all footsteps walked without a verdict are not."""
+    """A failure is certain; all footsteps walked without a verdict are not."""
     kind = trace.verdict.dtype
     spent = (code == int(Label.WALKING)) | (code == int(Label.OUT_OF_STEPS))
     plain = jnp.where(code == int(Label.WALKING), int(Label.UNRESOLVED), code).astype(kind)

@@ -27,7 +27,7 @@ def nearest_failure(
     labelling: Labelling,
     *,
     gradients: bool = True,
-    farthest: float = 1.0,
+    max_distance: float = 1.0,
     tolerance: float = 1e-5,
     **options: Any,
 ) -> FatalShock:
@@ -39,11 +39,14 @@ def nearest_failure(
 
     Args:
         labelling: one that knows a gait.
-        gradients: whether rays are turned to the boundary's normal by the simulator's derivatives,
+        gradients: whether rays are rotated to the boundary's normal by the simulator's derivatives,
             or by differences of the distances along nearby rays.
-        farthest: distance up to which to look.
+        max_distance: distance up to which to look.
         tolerance: of the distance.
         options: others of `minimal_fatal_shock`.
+
+    Returns:
+        The push to the nearest failing start, and its distance in the scales above.
 
     Raises:
         ArgumentError: no gait is known, or an argument of `minimal_fatal_shock` is not allowed.
@@ -69,7 +72,7 @@ def nearest_failure(
         fails,
         attractor.point,
         scales=family.scales[0],
-        farthest=farthest,
+        max_distance=max_distance,
         tolerance=tolerance,
         normal=boundary_normal(scene, attractor) if gradients else None,
         **options,

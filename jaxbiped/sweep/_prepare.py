@@ -50,6 +50,9 @@ def labelling(
         engine: "lanes", "xla" or "auto" (see `ENGINES`). Both give the same labels, but for starts
             nearer to a boundary than the tolerance.
 
+    Returns:
+        A `Labelling`: call it with starts, or give it to `sweep`, `label_at` or `nearest_failure`.
+
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
     """
@@ -81,6 +84,17 @@ def with_gaits_met(labelling: Labelling, starts: AbstractStarts, *, count: int =
 
     As many starts, evenly spread, are followed; where their last footsteps repeat a cycle, a gait
     is sought from there.
+
+    Args:
+        labelling: to which the gaits are added.
+        starts: a `grid`, a `sample` or `GivenStarts`.
+        count: how many of the starts are followed, at most.
+
+    Returns:
+        Another labelling, of the same scene; the one given where no other gait was found.
+
+    Raises:
+        ArgumentError: count below 1.
     """
     check_whole("count", count, 1)
     chosen = np.unique(np.linspace(0, starts.size - 1, min(count, starts.size)).astype(int))

@@ -1,4 +1,7 @@
-"""Radius of certain attraction about a gait."""
+"""Radius of certain attraction about a gait.
+
+A start that comes within it need be followed no further.
+"""
 
 from typing import Any
 

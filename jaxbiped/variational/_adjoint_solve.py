@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import CompiledProgram, Program, Recording, call, call_recording
+from jaxbiped.compiler import LANES, Program, Recording, Request
 from jaxbiped.variational._adjoint_step import Adjoints, adjoint_step
 from jaxbiped.variational._collocated_step import Rows, linearise_about
 from jaxbiped.variational._first_variation import (
@@ -28,7 +28,7 @@ from jaxbiped.variational._switch_crossings import earlier_at
 from jaxbiped.variational._tangents import Seeded
 
 COUNT = 2
-"""Turned tangents: a multiplier's eigenvector has a real and an imaginary part."""
+"""Leading tangents: a multiplier's eigenvector has a real and an imaginary part."""
 
 
 class _Given(NamedTuple):
@@ -37,13 +37,13 @@ class _Given(NamedTuple):
     Attributes:
         args: parameters.
         arrival: time and state where the motion arrives.
-        turned: what `carry_tangents` gave.
+        leading: what `carry_tangents` gave.
         after: adjoints behind the arrival, of components in their own order.
     """
 
     args: PyTree
     arrival: Any
-    turned: FirstVariation
+    leading: FirstVariation
     after: Adjoints
 
 
@@ -55,18 +55,27 @@ class _Now(NamedTuple):
     count: Any
 
 
-def carry_tangents(flow: Flow, nodes: Nodes, turned: Scalar) -> tuple[FirstVariation, Recording]:
-    """Turned tangents (v, c) carried along a motion to its arrival; and the steps of that."""
-    given = FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, turned, nodes.steps)
-    compiled = _compiled(_kind(flow), None)
-    room = nodes.ends.recorder.room
-    return call_recording(compiled, given, room=room, quick=True, tape=nodes.ends, once=True)
+def carry_tangents(flow: Flow, nodes: Nodes, leading: Scalar) -> tuple[FirstVariation, Recording]:
+    """Leading tangents (v, c) carried along a motion to its arrival; and the steps of that."""
+    given = FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, leading, nodes.steps)
+    request = Request(
+        _program(_kind(flow), None),
+        given,
+        room=nodes.ends.recorder.room,
+        stream=nodes.ends,
+        quick=True,
+        keeps_records=True,
+        reads_once=True,
+    )
+    found = LANES.run(request)
+    assert found.recording is not None
+    return found.outputs, found.recording
 
 
 def pull_back(
     flow: Flow,
     nodes: Nodes,
-    turned: FirstVariation,
+    leading: FirstVariation,
     steps: Recording,
     after: Adjoints,
     *,
@@ -77,12 +86,14 @@ def pull_back(
     Args:
         flow: what moves.
         nodes: of the motion.
-        turned, steps: from `carry_tangents` along it.
+        leading, steps: from `carry_tangents` along it.
         after: adjoints behind the arrival.
         final: whether the cycle ends there: of that arrival tangents on the section are told.
     """
-    given = _Given(flow.args.args, nodes.arrival, turned, after)
-    return call(_compiled(_kind(flow), final), given, tape=steps, quick=True)[0]
+    given = _Given(flow.args.args, nodes.arrival, leading, after)
+    request = Request(_program(_kind(flow), final), given, stream=steps, quick=True)
+    adjoints: Adjoints = LANES.run(request).outputs
+    return adjoints
 
 
 class _Kind(NamedTuple):
@@ -91,45 +102,32 @@ class _Kind(NamedTuple):
     system: AbstractSystem
     arrival: Arrival
     active: tuple[int, ...]
-    args: Any
     state: Any
 
 
 def _kind(flow: Flow) -> _Kind:
-    args = jtu.tree_structure(flow.args.args)
-    return _Kind(flow.system, flow.arrival, flow.args.active, args, flow.structure)
+    return _Kind(flow.system, flow.arrival, flow.args.active, flow.structure)
 
 
-@bounded_cache(PROGRAMS)
-def _compiled(kind: _Kind, final: bool | None) -> CompiledProgram:
-    """The program that carries turned tangents, or where `final` is given, that of adjoints."""
-
-    def numbers(*shape: int) -> Any:
-        return jax.ShapeDtypeStruct(shape, jnp.float64)
-
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
+def _program(kind: _Kind, final: bool | None) -> Program:
+    """The program that carries leading tangents, or where `final` is given, that of adjoints."""
     # Compiled by itself, the field is traced once, not at each of its many uses.
     field = jax.jit(kind.system.vector_field)
 
     def flow(given: Any) -> Flow:
-        nothing = jnp.zeros((0, 0))
-        seeded = Seeded(given.args, nothing, nothing, kind.active)
+        no_columns = jnp.zeros((0, 0))
+        seeded = Seeded(given.args, no_columns, no_columns, kind.active)
         return Flow(kind.system, kind.arrival, field, seeded, kind.state)
 
-    c, p = kind.state.num_leaves, len(kind.active)
-    args = jtu.tree_unflatten(kind.args, [numbers()] * kind.args.num_leaves)
-    row, turned = numbers(1 + c), numbers(COUNT, c)
+    c = kind.state.num_leaves
     if final is None:
-        given = FirstVariationInputs(args, row, row, turned, numbers())
-        return CompiledProgram(FirstVariationSolve(flow, 1 + c).program(), given)
-    after = Adjoints(turned, numbers(c), numbers(p))
-    program = _AdjointSolve(flow, Step.shape(c, COUNT), final).program()
-    return CompiledProgram(
-        program, _Given(args, row, FirstVariation(turned, numbers(c), numbers()), after)
-    )
+        return FirstVariationSolve(flow, 1 + c).program()
+    return _AdjointSolve(flow, Step.shape(c, COUNT), final).program()
 
 
 class _AdjointSolve:
-    """The functions of the program: its tape's rows are steps, read backwards."""
+    """The functions of the program: its input stream's rows are steps, read backwards."""
 
     def __init__(self, flow: Callable[[Any], Flow], step: Step, final: bool) -> None:
         self.flow, self.step, self.final = flow, step, final
@@ -137,7 +135,7 @@ class _AdjointSolve:
     def program(self) -> Program:
         """The program."""
         size = sum(leaf.size for leaf in jtu.tree_leaves(self.step))
-        return Program(self.start, self.attempt, self.finish, tape=size, backwards=True)
+        return Program(self.start, self.attempt, self.finish, stream=size, backwards=True)
 
     def start(self, given: _Given) -> _Now:
         """Adjoints before the arrival: all of it is linear in what is there."""
@@ -148,7 +146,7 @@ class _AdjointSolve:
         after = given.after
 
         def behind(before: Adjoints) -> tuple[Scalar, Scalar]:
-            first = jnp.concatenate([given.turned.turned, before.family[None]]).T
+            first = jnp.concatenate([given.leading.leading, before.family[None]]).T
             idle = jnp.zeros((COUNT, len(parameters)))
             seeds = jnp.concatenate([idle, before.parameters[None]]).T
             jet = Jet(first, before.second.T[:, None, :])
@@ -162,7 +160,7 @@ class _AdjointSolve:
             order.sorted(before.family),
             before.parameters + after.parameters,
         )
-        return _Now(adjoints, given.turned.state, jnp.zeros(()))
+        return _Now(adjoints, given.leading.state, jnp.zeros(()))
 
     def attempt(self, given: _Given, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
         flow = self.flow(given)
@@ -177,7 +175,7 @@ class _AdjointSolve:
             lambda: jnp.zeros(len(now.state) + len(parameters)),
         )
         before, count = adjoint_step(rows, linear, step, early, now.adjoints), now.count + 1.0
-        return _Now(before, step.before, count), count >= given.turned.steps
+        return _Now(before, step.before, count), count >= given.leading.steps
 
     def finish(self, given: _Given, now: _Now) -> Adjoints:
         order, _ = field_order(self.flow(given))

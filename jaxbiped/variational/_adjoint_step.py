@@ -16,7 +16,9 @@ from jaxbiped.variational._first_variation import Step, without_flow
 
 
 class Adjoints(NamedTuple):
-    """Derivatives of a sum by second tangents (v, c), family's tangent (c,), parameters (p,)."""
+    """Derivatives of a sum with respect to second tangents (v, c), a family's tangent (c,) and
+    parameters (p,).
+    """
 
     second: Any
     family: Any
@@ -26,9 +28,9 @@ class Adjoints(NamedTuple):
 def adjoint_step(rows: Rows, linear: Linear, step: Step, early: Any, after: Adjoints) -> Adjoints:
     """Adjoints before a step, from those behind it; `early` as from `earlier_at`."""
     order, stages = rows.order, linear.stages
-    c, d, count = len(order.every), order.direct, len(step.turned)
+    c, d, count = len(order.every), order.direct, len(step.leading)
     nowhere = jnp.zeros(c)
-    begun, lost = without_flow(step.turned, linear.velocity, step.fresh)
+    begun, lost = without_flow(step.leading, linear.velocity, step.fresh)
     at_stages = stages.carried(begun)
     ends = [stages.pulled(jnp.stack([nowhere, nowhere, each])) for each in after.second]
     second = jnp.stack([start for start, _ in ends])
@@ -60,7 +62,7 @@ def _with_flow(linear: Linear, step: Step, lost: Any, after: Adjoints) -> Adjoin
 
     flow, rate, shift = rate_of(velocity), jnp.zeros(c), -(after.family @ velocity)
     for v in range(len(lost)):
-        shift = shift + after.second[v] @ (lost[v] * flow - rate_of(step.turned[v]))
+        shift = shift + after.second[v] @ (lost[v] * flow - rate_of(step.leading[v]))
         rate = rate - lost[v] * after.second[v]
     pulled = rate[d:] @ gradient
     family = after.family + pulled[:c]

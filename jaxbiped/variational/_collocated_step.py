@@ -64,7 +64,7 @@ class Stages(NamedTuple):
     Attributes:
         order: of the components.
         weights: of the rates at the three collocation points in the changes up to each, (3, 3).
-        by_direct: Jacobian of the kept rates by the d direct components there, (3, k, d).
+        by_direct: Jacobian of the kept rates in the d direct components there, (3, k, d).
         factors: of the equations of the kept components at all points, 3 k of them.
     """
 
@@ -84,8 +84,8 @@ class Stages(NamedTuple):
             # A direct component follows its rate: the equation of a second derivative.
             once = weights[:, :, None, None] * by_direct[None]
             twice = jnp.einsum("ijka,jl->ikla", once, weights)
-            nothing = jnp.zeros((3, k, 3, k - d))
-            blocks = blocks + jnp.concatenate([twice, nothing], axis=-1)
+            no_direct = jnp.zeros((3, k, 3, k - d))
+            blocks = blocks + jnp.concatenate([twice, no_direct], axis=-1)
         matrix = jnp.eye(3 * k) - blocks.reshape(3 * k, 3 * k)
         return Stages(order, weights, by_direct, factorise(matrix, k))
 
@@ -106,7 +106,7 @@ class Stages(NamedTuple):
         return jnp.stack(every)
 
     def pulled(self, u: Any) -> tuple[Any, Any]:
-        """Derivatives of a sum of u by r, where that is one vector for all points, and by b.
+        """Derivatives of a sum of u with respect to r, one vector for all points, and to b.
 
         Args:
             u: weights in the sum, (3, c).
@@ -140,7 +140,7 @@ class Rows:
         return jnp.stack(self.field(list(y), self.parameters))
 
     def _by_state(self, y: Any) -> Any:
-        """Derivatives of the kept rates by the components, (k, c)."""
+        """Derivatives of the kept rates with respect to the components, (k, c)."""
         return self.order.sorted(jacobian(lambda z: self._kept(z, self.parameters), list(y)))
 
     def gradient(self, y: Any) -> Any:
@@ -153,7 +153,7 @@ class Rows:
         Tangents (v, c), in the components' own order, and weights (v, k).
         """
 
-        def turned(y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
+        def directional_derivative(y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
             changes = [
                 jax.jvp(lambda y: self._kept(y, q), (y,), (list(tangent),))[1] for tangent in along
             ]
@@ -164,7 +164,7 @@ class Rows:
             ]
             return [sum(parts[1:], parts[0])]
 
-        return self._by_all(turned, list(y))[0]
+        return self._by_all(directional_derivative, list(y))[0]
 
     def _kept(self, y: list[Scalar], q: list[Scalar]) -> list[Scalar]:
         every = self.field(y, q)
@@ -183,9 +183,9 @@ class Linear(NamedTuple):
         stages: the step's equations.
         points: states at the collocation points, (3, c), in the components' own order.
         by_parameter: derivatives of the kept rates there, (3, k, p).
-        at_start: of the kept rates by all where the step starts, (k, n).
+        at_start: of the kept rates with respect to all where the step starts, (k, n).
         velocity: rates there, (c,).
-        jump: of the derivatives of the kept rates by the components where the step ends, (k, c).
+        jump: of their derivatives with respect to the components where the step ends, (k, c).
     """
 
     stages: Stages

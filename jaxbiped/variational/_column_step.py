@@ -1,4 +1,8 @@
-"""Column step: the derivative of a Rosenbrock step, one direction at a time."""
+"""Column step: the derivative of a Rosenbrock step, one direction at a time.
+
+For lanes, which carry one direction after the other; `_rosenbrock_tangents` takes all at once for
+XLA.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -54,12 +58,12 @@ def differentiate_step(
     y0: PyTree,
     args: Seeded,
     *,
-    steered: Any,
+    carries_parameters: Any,
 ) -> Differentiated:
     """A step of an autonomous system of scalars, with all that its derivatives share.
 
-    Of the arguments the active leaves are differentiated by, p of them; only where `steered`, else
-    these derivatives are zero.
+    Derivatives with respect to the p active leaves of the arguments are zero unless
+    `carries_parameters`.
     """
     start, join = split(y0)
     parameters = active_leaves(args)
@@ -77,7 +81,7 @@ def differentiate_step(
             return [every[i] for i in kept_in_order(stages)]
 
         by_state, by_curvature, by_parameter = _derivatives(
-            tableau, stages, kept_rates, parameters, steered
+            tableau, stages, kept_rates, parameters, carries_parameters
         )
     return Differentiated(
         tableau=tableau,
@@ -102,7 +106,7 @@ def _derivatives(
     stages: Stages,
     kept_rates: Callable[[Components, Sequence[Scalar]], Components],
     parameters: Sequence[Scalar],
-    steered: Any,
+    carries_parameters: Any,
 ) -> tuple[Any, Any, Any]:
     """Of all stages A_i and B_i by components (stages, kept, c), A_i + B_i by parameters."""
     start, size = stages.start, len(tableau.alpha)
@@ -116,27 +120,29 @@ def _derivatives(
     def rates(z: Components) -> Components:
         return kept_rates(z[:count], z[count:])
 
-    def apart(found: Any, known: Any) -> tuple[Any, Any]:
-        """By components, and by parameters what is known and what is found."""
-        nothing = jnp.zeros((len(found), len(parameters)))
-        by_parameter = known + found[:, count:]
-        return found[:, :count], jax.lax.cond(steered, lambda: by_parameter, lambda: nothing)
+    def apart(found: Any, constant: Any) -> tuple[Any, Any]:
+        """With respect to components, and to parameters, where `constant` is added."""
+        no_parameters = jnp.zeros((len(found), len(parameters)))
+        by_parameter = constant + found[:, count:]
+        return found[:, :count], jax.lax.cond(
+            carries_parameters, lambda: by_parameter, lambda: no_parameters
+        )
 
     def at_point(point: Any) -> tuple[Any, Any]:
         return apart(jacobian(rates, [*point, *parameters]), 0.0)
 
     def at_start(both: tuple[Any, Any]) -> tuple[Any, Any]:
-        along, known = list(both[0]), both[1]
+        along, constant = list(both[0]), both[1]
 
-        def turned(z: Components) -> Components:
+        def directional_derivative(z: Components) -> Components:
             return jax.jvp(lambda y: kept_rates(y, z[count:]), (z[:count],), (along,))[1]
 
-        return apart(jacobian(turned, [*start, *parameters]), known)
+        return apart(jacobian(directional_derivative, [*start, *parameters]), constant)
 
     # Two short loops: what one keeps in registers and caches the other one need not.
     stacked = [jnp.stack([jnp.stack(each) for each in array]) for array in (points, directions)]
-    by_point, known = jax.lax.map(at_point, stacked[0])
-    by_start, by_parameter = jax.lax.map(at_start, (stacked[1], known))
+    by_point, constant = jax.lax.map(at_point, stacked[0])
+    by_start, by_parameter = jax.lax.map(at_start, (stacked[1], constant))
     return by_point, by_start, by_parameter
 
 
@@ -150,13 +156,13 @@ def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple
     tableau, stages, order = step.tableau, step.stages, step.order
     g, led = stages.step, len(stages.direct)
     start = jnp.stack([column[i] for i in order])
-    nothing = jnp.zeros_like(start)
+    zero_state = jnp.zeros_like(start)
     inverse, entries = _inverse(stages)
     increments: list[Any] = []
     for i in range(len(tableau.alpha)):
         argument = _weighted_sum(tableau.a[i - 1] if i else (), increments, start)
         coefficients = [tableau.gamma * c for c in tableau.c[i - 1]] if i else ()
-        memory = _weighted_sum(coefficients, increments, nothing)
+        memory = _weighted_sum(coefficients, increments, zero_state)
         if i == 0:
             # Its argument is the start itself: the matrices are summed once for all directions.
             right = (step.by_curvature[i] + step.by_state[i]) @ start
@@ -170,7 +176,7 @@ def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple
         increments.append(jnp.concatenate([followers, solved]))
     back = [order.index(i) for i in range(len(column))]
     end = _weighted_sum(end_weights(tableau), increments, start)
-    error = _weighted_sum(error_weights(tableau), increments, nothing)
+    error = _weighted_sum(error_weights(tableau), increments, zero_state)
     return jnp.stack([end[i] for i in back]), jnp.stack([error[i] for i in back])
 
 

@@ -67,7 +67,7 @@ def jet_along_path(
         times: shape (s + 1,), infinite beyond the motion's end.
         states: shape (s + 1, c).
         parameters: shape (p,).
-        bent: tangents at the start, V first; `count` = v of them.
+        jet: tangents at the start, V first; `count` = v of them.
         seeds: derivatives of the parameters along V and Q, shape (p, v + q).
         count: v.
     """
@@ -76,11 +76,11 @@ def jet_along_path(
     pad = [(0, room - times.shape[0])]
     times = jnp.pad(times, pad, constant_values=jnp.inf)
     states = jnp.pad(states, [*pad, (0, 0)], mode="edge")
-    known = jnp.isfinite(times)
+    real = jnp.isfinite(times)
     last_time = jax.lax.dynamic_index_in_dim(times, steps, keepdims=False)
     last_state = jax.lax.dynamic_index_in_dim(states, steps, keepdims=False)
-    times = jnp.where(known, times, last_time)
-    states = jnp.where(known[:, None], states, last_state)
+    times = jnp.where(real, times, last_time)
+    states = jnp.where(real[:, None], states, last_state)
 
     def chunk(carried: tuple[Scalar, _Reached, Jet]) -> tuple[Scalar, _Reached, Jet]:
         start, reached, now = carried
@@ -137,7 +137,7 @@ class _Linear(NamedTuple):
 
     Attributes:
         points: states at the collocation points, shape (steps, 3, c).
-        jacobians: derivatives of the rates there by components and parameters.
+        jacobians: derivatives of the rates there with respect to components and parameters.
         at_start: the same where each step starts, shape (steps, c, c + p).
         velocities: rates there, shape (steps, c).
         jump: by how much the derivatives jump where each step ends.
@@ -181,21 +181,21 @@ def _chunk(
     stages = collocation(path, linear.jacobians)
     step_map = stages.steps()
 
-    def follow(first: Scalar, known: tuple[Scalar, ...]) -> tuple[Scalar, tuple[Scalar, ...]]:
-        step, velocity, fresh = known
+    def follow(first: Scalar, each: tuple[Scalar, ...]) -> tuple[Scalar, tuple[Scalar, ...]]:
+        step, velocity, fresh = each
         shift = jnp.where(fresh, 0.0, (velocity @ first) / (velocity @ velocity))
         begun = first - velocity[:, None] * shift
         end = step @ jnp.concatenate([begun, seeds])
         return end, (first, shift, begun, end)
 
-    known = (step_map, linear.velocities, path.fresh)
-    last, (arrived, shifts, firsts, ends) = jax.lax.scan(follow, jet.first, known)
+    steps = (step_map, linear.velocities, path.fresh)
+    last, (arrived, shifts, firsts, ends) = jax.lax.scan(follow, jet.first, steps)
     at_stages = stages.within(firsts, seeds)
-    moved = with_seeds(at_stages[..., count:], seeds[:, count:])
+    seeded = with_seeds(at_stages[..., count:], seeds[:, count:])
 
-    def source(turned: Scalar, turned_seeds: Scalar) -> Scalar:
-        bend = gradients(flow, linear.points, parameters, turned, turned_seeds)
-        return stages.forced(bend @ moved)
+    def source(tangent_v: Scalar, seeds_along: Scalar) -> Scalar:
+        second_derivatives = gradients(flow, linear.points, parameters, tangent_v, seeds_along)
+        return stages.forced(second_derivatives @ seeded)
 
     by_direction = jax.vmap(source, in_axes=(-1, -1), out_axes=-1)
     sources = by_direction(at_stages[..., :count], seeds[:, :count])

@@ -1,4 +1,7 @@
-"""Differentiable solve: scenes solved by lanes, with derivatives of their own."""
+"""Differentiable solve: scenes solved by lanes, with derivatives of their own.
+
+JAX cannot differentiate machine code, so the rules of both modes are given here.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -11,11 +14,11 @@ from jax.custom_derivatives import SymbolicZero
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import CompiledProgram, Recorded, Schedule, UnknownPrimitiveError, call
+from jaxbiped.compiler import LANES, Program, Recorded, Request
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._state import State
 from jaxbiped.dynamics._switches import switches
-from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, shapes_of
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved
 from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -54,18 +57,17 @@ class Setting(NamedTuple):
 def solve_scene(solve: Solve, setting: Setting) -> Solved:
     """Solves one simulation, or under `vmap` many.
 
-    Its derivatives are those of the final state, and by the duration that of the time; at the time
-    where a simulation ended otherwise, they are at that fixed time. They come from tangent columns
-    of exactly the leaves that are differentiated, under a tolerance of their own, in a solve of
-    their own: in forward mode one for all directions, in reverse mode its transpose.
+    Its derivatives are those of the final state, and with respect to the duration that of the
+    time; where a simulation ended otherwise, they are at that fixed time. They come from tangent
+    columns of exactly the leaves that are differentiated, under a tolerance of their own, in a
+    solve of their own: in forward mode one for all directions, in reverse mode its transpose.
 
     Raises:
         UnknownPrimitiveError: the scene holds an operation that lanes do not have.
     """
     leaves, structure = jtu.tree_flatten(solve)
     if not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
-        compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
-        return call(compiled, solve, quick=setting.quick)[0]
+        return _run(solve, setting)[0]
     return Solved(*_unflatten(solve.state, _differentiable(setting, structure)(*leaves)))
 
 
@@ -77,20 +79,16 @@ def solve_and_save(
     They are made at each of `times`, or for the first `room` arrivals at a section. It has no
     derivatives.
     """
-    compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
-    schedule = None if times is None else Schedule(times)
-    return call(compiled, solve, schedule, room=room, quick=setting.quick)
+    return _run(solve, setting, times=times, room=room)
 
 
 def solve_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[Solved, np.ndarray]:
     """One simulation, not traced, and the records of its at most so many steps, (n, numbers)."""
-    compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
     one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], solve)
 
-    def run(room: int) -> tuple[Solved, Recorded]:
-        outputs, recorded = compiled.run(one, room=room, width=1, quick=setting.quick)
-        assert recorded is not None
-        return outputs, recorded
+    def run(room: int) -> tuple[Solved, Any]:
+        found = LANES.run(request_of(one, setting)._replace(room=room, batch=True))
+        return found.outputs, found.records
 
     outputs, recorded = run(min(most, _ROOM))
     if recorded.counts[0] > _ROOM:
@@ -99,24 +97,20 @@ def solve_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[So
     return jtu.tree_map(lambda leaf: leaf[0], outputs), recorded.values[0, : recorded.counts[0]]
 
 
-@bounded_cache(PROGRAMS)
-def compiled_solve(setting: Setting, scene: Any) -> CompiledProgram:
-    """The program for scenes of one structure (see `jax.tree.structure`)."""
-    body = AdaptiveSolve(
-        setting.solver, setting.watch, counting=setting.counting, saved=setting.saved
-    )
-    placeholder = jtu.tree_unflatten(scene, [0.0] * scene.num_leaves)
-    return CompiledProgram(body.program(), shapes_of(placeholder))
+def request_of(solve: Solve, setting: Setting) -> Request:
+    """What is asked of lanes; they may hold no operation that it needs (see `LaneEngine.can`)."""
+    return Request(_program(setting), solve, quick=setting.quick)
 
 
-@bounded_cache(PROGRAMS)
-def is_expressible(setting: Setting, scene: Any) -> bool:
-    """Whether lanes have all operations of scenes of this structure (see `jax.tree.structure`)."""
-    try:
-        compiled_solve(setting, scene).check()
-    except UnknownPrimitiveError:
-        return False
-    return True
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
+def _program(setting: Setting) -> Program:
+    solver, watch, counting, _, saved = setting
+    return AdaptiveSolve(solver, watch, counting=counting, saved=saved).program()
+
+
+def _run(solve: Solve, setting: Setting, **options: Any) -> tuple[Solved, Any]:
+    found = LANES.run(request_of(solve, setting)._replace(**options))
+    return found.outputs, found.records
 
 
 @bounded_cache(PROGRAMS)
@@ -124,16 +118,14 @@ def _differentiable(setting: Setting, structure: Any) -> Callable[..., list[Scal
     @jax.custom_jvp
     def run(*leaves: Scalar) -> list[Scalar]:
         solve = jtu.tree_unflatten(structure, leaves)
-        compiled = compiled_solve(setting, jtu.tree_structure(solve.scene))
-        found, _ = call(compiled, solve, quick=setting.quick)
-        return jtu.tree_leaves(found)
+        return jtu.tree_leaves(_run(solve, setting)[0])
 
     def rule(primals: Sequence[Scalar], tangents: Sequence[Any]) -> tuple[Any, Any]:
         found = run(*primals)
         solve = jtu.tree_unflatten(structure, primals)
-        moved = jtu.tree_unflatten(structure, tangents)
+        solve_dot = jtu.tree_unflatten(structure, tangents)
         t, state, *counts = _unflatten(solve.state, found)
-        t_dot, state_dot = _tangents(setting, solve, moved, t, state)
+        t_dot, state_dot = _tangents(setting, solve, solve_dot, t, state)
         none = [np.zeros(jnp.shape(count), dtype=jax.dtypes.float0) for count in counts]
         return found, [t_dot, *state_dot, *none]
 
@@ -148,21 +140,21 @@ def _unflatten(like: Any, found: Sequence[Scalar]) -> tuple[Any, ...]:
 
 
 def _tangents(
-    setting: Setting, solve: Solve, moved: Solve, t: Scalar, state: State
+    setting: Setting, solve: Solve, solve_dot: Solve, t: Scalar, state: State
 ) -> tuple[Scalar, list[Scalar]]:
     """Derivatives of the time and of the final state along the tangents, linear in them."""
-    places = [i for i, dot in enumerate(moved.state) if not _is_zero(dot)]
-    scene_dots = jtu.tree_leaves(moved.scene, is_leaf=_is_zero)
+    places = [i for i, dot in enumerate(solve_dot.state) if not _is_zero(dot)]
+    scene_dots = jtu.tree_leaves(solve_dot.scene, is_leaf=_is_zero)
     active = tuple(i for i, dot in enumerate(scene_dots) if not _is_zero(dot))
     total = [jnp.zeros_like(leaf) for leaf in state]
     if places or active:
         columns = _columns(setting, solve, places, active, t).columns
-        dots = [moved.state[i] for i in places] + [scene_dots[i] for i in active]
+        dots = [solve_dot.state[i] for i in places] + [scene_dots[i] for i in active]
         for k, dot in enumerate(dots):
             total = [sum_ + columns[k, i] * dot for i, sum_ in enumerate(total)]
     t_dot = jnp.zeros_like(t)
-    if not _is_zero(moved.duration):
-        t_dot = jnp.where(t >= solve.duration, 1.0, 0.0) * moved.duration
+    if not _is_zero(solve_dot.duration):
+        t_dot = jnp.where(t >= solve.duration, 1.0, 0.0) * solve_dot.duration
         rates = vector_field(t, state, solve.scene)
         total = [sum_ + rate * t_dot for sum_, rate in zip(total, rates, strict=True)]
     return t_dot, total
@@ -175,7 +167,7 @@ def _is_zero(tangent: Any) -> bool:
 def _columns(
     setting: Setting, solve: Solve, places: list[int], active: tuple[int, ...], t: Scalar
 ) -> VariationalSolution:
-    """The final state's derivatives by components of the start and by leaves of the scene."""
+    """Derivatives of the final state with respect to start and scene."""
     c, m, p = len(solve.state), len(places), len(active)
     start = np.zeros((c, m + p))
     start[places, range(m)] = 1.0
@@ -191,6 +183,6 @@ def _columns(
         Seeded(solve.scene, jnp.zeros((p, m + p)), floors, active),
         jnp.ones(p),
         precision=Precision(solve.rtol, _LOOSER * solve.rtol),
-        time_limit=t,
+        max_time=t,
         max_solver_steps=_MOST_ATTEMPTS,
     )[0]

@@ -1,4 +1,7 @@
-"""First variation along a known motion in two directions, and the steps it takes, by lanes."""
+"""First variation along a known motion in two directions, and the steps it takes, by lanes.
+
+The adjoint solve reads these steps backwards, with all that it needs of the motion in them.
+"""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -18,14 +21,14 @@ from jaxbiped.variational._tangents import active_leaves
 
 
 class Step(NamedTuple):
-    """A step by collocation of the motion and its v turned tangents.
+    """A step by collocation of the motion and its v tangents in the leading eigendirections.
 
     Attributes:
         before: state where it starts, (c,).
         points, share: as from `collocate_step`.
         fresh: whether it starts on a switch.
         which: the number of the switch that it ends on, as in `Crossings`.
-        turned: tangents where it starts, in order, before the flow is taken out of them, (v, c).
+        leading: these tangents where it starts, in order, with the flow still in them, (v, c).
     """
 
     before: Any
@@ -33,7 +36,7 @@ class Step(NamedTuple):
     share: Any
     fresh: Any
     which: Any
-    turned: Any
+    leading: Any
 
     def row(self) -> Scalar:
         """One number after the other."""
@@ -63,7 +66,7 @@ class Step(NamedTuple):
             share=numbers(3),
             fresh=jax.ShapeDtypeStruct((), jnp.bool_),
             which=numbers(),
-            turned=numbers(count, components),
+            leading=numbers(count, components),
         )
 
 
@@ -73,21 +76,21 @@ class FirstVariationInputs(NamedTuple):
     Attributes:
         args: parameters.
         start, arrival: time and state where the motion starts and where it arrives, (1 + c,).
-        turned: tangents at the start, (v, c).
+        leading: tangents in the leading eigendirections at the start, (v, c).
         steps: how many the motion has.
     """
 
     args: PyTree
     start: Any
     arrival: Any
-    turned: Any
+    leading: Any
     steps: Any
 
 
 class FirstVariation(NamedTuple):
     """Outputs: tangents before the arrival (v, c), the state there, and the number of steps."""
 
-    turned: Any
+    leading: Any
     state: Any
     steps: Any
 
@@ -99,7 +102,7 @@ class _Now(NamedTuple):
         node: state at the end of the last step, past a switch or not.
         t, state: time and state, on the switch where there was one: `fresh`.
         switched: time of the last switch.
-        turned: the tangents, in order.
+        leading: the tangents, in order.
         read: nodes read; `taken` of them ended a step.
         step: the last one, if the last node `ends` one.
     """
@@ -109,7 +112,7 @@ class _Now(NamedTuple):
     state: Any
     fresh: Any
     switched: Any
-    turned: Any
+    leading: Any
     read: Any
     taken: Any
     step: Step
@@ -117,7 +120,7 @@ class _Now(NamedTuple):
 
 
 class FirstVariationSolve:
-    """The functions of the program: its tape's rows are time and state at the ends of steps.
+    """The functions of the program, whose input stream is time and state at the ends of steps.
 
     The motion ends at the arrival, not at the last node, and begins and ends before its section:
     that may be a switch, as touchdown is. At every step's start that is on no switch the part of
@@ -129,14 +132,14 @@ class FirstVariationSolve:
 
     def program(self) -> Program:
         """The program."""
-        return Program(self.start, self.attempt, self.finish, record=self.record, tape=self.row)
+        return Program(self.start, self.attempt, self.finish, record=self.record, stream=self.row)
 
     def start(self, given: FirstVariationInputs) -> _Now:
         flow = self.flow(given)
         order, parameters = field_order(flow)
-        known = flow.earlier(given.start, parameters)
-        t, state = known[0], known[1:]
-        shape = Step.shape(len(state), given.turned.shape[0])
+        node_row = flow.earlier(given.start, parameters)
+        t, state = node_row[0], node_row[1:]
+        shape = Step.shape(len(state), given.leading.shape[0])
         none, zero = jnp.asarray(False), jnp.zeros(())
         return _Now(
             node=state,
@@ -144,7 +147,7 @@ class FirstVariationSolve:
             state=state,
             fresh=none,
             switched=t - LONG_AGO,
-            turned=order.sorted(given.turned),
+            leading=order.sorted(given.leading),
             read=zero,
             taken=zero,
             step=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape),
@@ -156,8 +159,8 @@ class FirstVariationSolve:
         order, parameters = field_order(flow)
         read = now.read + 1.0
         over = read >= given.steps
-        known = jnp.where(over, flow.earlier(given.arrival, parameters), row)
-        t, node = known[0], known[1:]
+        node_row = jnp.where(over, flow.earlier(given.arrival, parameters), row)
+        t, node = node_row[0], node_row[1:]
         crossing = crossing_of(flow, flow.surfaces, now.node, node, parameters)
         end = t - crossing.past
         path = Path(
@@ -171,14 +174,14 @@ class FirstVariationSolve:
         rows = Rows(flow.apart, order, list(parameters))
         points, share, velocity = collocate_step(rows, path, crossing.crossed)
         stages = Stages.of(order, share, jax.lax.map(rows.by_state, points))
-        begun, _ = without_flow(now.turned, order.sorted(velocity), now.fresh)
+        begun, _ = without_flow(now.leading, order.sorted(velocity), now.fresh)
         after = _Now(
             node=node,
             t=end,
             state=crossing.landed,
             fresh=crossing.crossed,
             switched=jnp.where(crossing.crossed, end, now.switched),
-            turned=stages.carried(begun)[:, 2],
+            leading=stages.carried(begun)[:, 2],
             read=read,
             taken=now.taken + 1.0,
             step=Step(
@@ -187,7 +190,7 @@ class FirstVariationSolve:
                 share=share,
                 fresh=now.fresh,
                 which=crossing.which.astype(float),
-                turned=now.turned,
+                leading=now.leading,
             ),
             ends=jnp.asarray(True),
         )
@@ -203,16 +206,16 @@ class FirstVariationSolve:
 
     def finish(self, given: FirstVariationInputs, now: _Now) -> FirstVariation:
         order, _ = field_order(self.flow(given))
-        return FirstVariation(order.restored(now.turned), now.state, now.taken)
+        return FirstVariation(order.restored(now.leading), now.state, now.taken)
 
 
-def without_flow(turned: Scalar, velocity: Scalar, fresh: Scalar) -> tuple[Scalar, Scalar]:
+def without_flow(leading: Scalar, velocity: Scalar, fresh: Scalar) -> tuple[Scalar, Scalar]:
     """Tangents (v, c) without what they have of the flow, and what that is, (v,).
 
     Where a step starts on a switch (`fresh`), nothing is taken out.
     """
-    lost = jnp.where(fresh, 0.0, (turned @ velocity) / (velocity @ velocity))
-    return turned - lost[:, None] * velocity, lost
+    lost = jnp.where(fresh, 0.0, (leading @ velocity) / (velocity @ velocity))
+    return leading - lost[:, None] * velocity, lost
 
 
 def field_order(flow: Flow) -> tuple[Order, Scalar]:

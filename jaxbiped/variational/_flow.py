@@ -1,4 +1,7 @@
-"""Flow of a system: rates, switches, section and reset map of components and parameters."""
+"""Flow of a system: rates, switches, section and reset map of components and parameters.
+
+The second variation differentiates with respect to both, which here are one vector.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -52,7 +55,7 @@ class Flow(eqx.Module):
         return self.system.switches(scene, state)
 
     def reset(self, z: Scalar) -> Scalar:
-        """The components after an arrival's renewal, shape (c,)."""
+        """The components after an arrival's reset, shape (c,)."""
         state, scene = self._parts(z)
         return jnp.stack(jtu.tree_leaves(self.system.reset_map(scene, state)))
 

@@ -1,4 +1,7 @@
-"""Hybrid systems: the vector field, switches, endings and reset map that a return map needs."""
+"""Hybrid systems: the vector field, switches, endings and reset map that a return map needs.
+
+The walker is only one of them: solves and searches ask this interface, so a user's own system does.
+"""
 
 import abc
 from typing import Any, ClassVar

@@ -1,4 +1,7 @@
-"""Jets: first and second tangents together, through a function and onto a surface."""
+"""Jets: first and second tangents together, through a function and onto a surface.
+
+The second variation carries both through resets and onto sections.
+"""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -49,30 +52,30 @@ def on_surface(
     seeds: Scalar,
     count: int,
 ) -> Jet:
-    """Tangents at a fixed time turned into tangents on the surface g = 0 that `z` lies on.
+    """Tangents at a fixed time made tangents on the surface g = 0 that `z` lies on.
 
     A tangent V moves the arrival by τ_V = −dg·V/ġ and becomes V + f τ_V. Differentiated once more,
     C becomes C + (J V) τ_Q + (J Q) τ_V + (J f) τ_V τ_Q + f τ_VQ, where τ_VQ keeps it
     on the surface.
     """
     c = jet.first.shape[0]
-    moved = jnp.concatenate([jet.first, seeds])
+    seeded = jnp.concatenate([jet.first, seeds])
     field = stack_rates(rates)
     rate = field(z)
     flow = jnp.concatenate([rate, jnp.zeros(seeds.shape[0])])
 
-    def turned(along: Scalar) -> Scalar:
+    def directional_derivative(along: Scalar) -> Scalar:
         return jax.jvp(field, (z,), (along,))[1]
 
     gradient = jax.grad(surface)(z)
     slope = gradient @ flow
-    times = -(gradient @ moved) / slope
-    on = moved + flow[:, None] * times
-    bends = jax.vmap(turned, in_axes=-1, out_axes=-1)(moved)
+    times = -(gradient @ seeded) / slope
+    on = seeded + flow[:, None] * times
+    rates_along = jax.vmap(directional_derivative, in_axes=-1, out_axes=-1)(seeded)
     by_v, by_q = times[:count], times[count:]
-    second = jet.second + jnp.einsum("cv,q->cqv", bends[:, :count], by_q)
-    second = second + jnp.einsum("cq,v->cqv", bends[:, count:], by_v)
-    second = second + jnp.einsum("c,q,v->cqv", turned(flow), by_q, by_v)
+    second = jet.second + jnp.einsum("cv,q->cqv", rates_along[:, :count], by_q)
+    second = second + jnp.einsum("cq,v->cqv", rates_along[:, count:], by_v)
+    second = second + jnp.einsum("c,q,v->cqv", directional_derivative(flow), by_q, by_v)
     curved = jnp.einsum("aq,ab,bv->qv", on[:, count:], jax.hessian(surface)(z), on[:, :count])
     both = -(curved + jnp.einsum("c,cqv->qv", gradient[:c], second)) / slope
     second = second + jnp.einsum("c,qv->cqv", rate, both)
@@ -83,12 +86,12 @@ def push_jet(
     function: Callable[[Scalar], Scalar], z: Scalar, jet: Jet, seeds: Scalar, count: int
 ) -> Jet:
     """Tangents of a function of components and parameters (c + p,), in place of theirs."""
-    moved = jnp.concatenate([jet.first, seeds])
+    seeded = jnp.concatenate([jet.first, seeds])
 
     def slope(z: Scalar, along: Scalar) -> Scalar:
         return jax.jvp(function, (z,), (along,))[1]
 
-    first = jax.vmap(lambda along: slope(z, along), in_axes=-1, out_axes=-1)(moved)
+    first = jax.vmap(lambda along: slope(z, along), in_axes=-1, out_axes=-1)(seeded)
 
     def mixed(along: Scalar, tangent: Scalar, second: Scalar) -> Scalar:
         idle = jnp.zeros(seeds.shape[0])
@@ -97,4 +100,4 @@ def push_jet(
 
     by_tangent = jax.vmap(mixed, in_axes=(None, -1, -1), out_axes=-1)
     by_both = jax.vmap(by_tangent, in_axes=(-1, None, -1), out_axes=-1)
-    return Jet(first, by_both(moved[:, :count], moved[:, count:], jet.second))
+    return Jet(first, by_both(seeded[:, :count], seeded[:, count:], jet.second))

@@ -58,15 +58,15 @@ class Path(NamedTuple):
     def clock(self) -> tuple[Scalar, Scalar]:
         """Of the collocation points: the part of the step before each, and its share of time.
 
-        Both of shape (steps, 3). A share is the derivative of time by the step's own variable,
+        Both of shape (steps, 3). A share is the derivative of time in the step's own variable,
         which runs evenly in the root of the time since the last switch.
         """
         since = self.start - self.switched
         first, last = jnp.sqrt(since), jnp.sqrt(since + self.span)
         width = jnp.where(self.span > 0.0, self.span / (first + last), 0.0)
         root = first[:, None] + width[:, None] * _NODES
-        moved = width[:, None] * _NODES * (root + first[:, None])
-        part = moved / jnp.where(self.span > 0.0, self.span, 1.0)[:, None]
+        elapsed = width[:, None] * _NODES * (root + first[:, None])
+        part = elapsed / jnp.where(self.span > 0.0, self.span, 1.0)[:, None]
         return part, 2.0 * root * width[:, None]
 
 
@@ -130,8 +130,8 @@ class Collocation(NamedTuple):
 
     Attributes:
         inverse: (I − A ⊗ (share_j J_j))⁻¹, shape (steps, 3 c, 3 c).
-        maps: stages by start and parameters, shape (steps, 3 c, c + p).
-        share: derivative of time by the steps' own variable, shape (steps, 3).
+        maps: derivatives of the stages in start and parameters, shape (steps, 3 c, c + p).
+        share: derivative of time in the steps' own variable, shape (steps, 3).
     """
 
     inverse: Scalar

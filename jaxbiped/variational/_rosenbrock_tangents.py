@@ -1,4 +1,7 @@
-"""Tangents of a Rosenbrock step: its exact derivative along many directions at once."""
+"""Tangents of a Rosenbrock step: its exact derivative along many directions at once.
+
+For XLA, which multiplies matrices of directions; `_column_step` takes them one by one for lanes.
+"""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -51,7 +54,7 @@ def rosenbrock_tangents(
     t = jnp.asarray(t0)
     span = jnp.asarray(t1 - t0, dtype=jnp.result_type(*start))
     stages = stages_of(tableau, lambda t, y: rates(t, y, parameters), t, start, span, span)
-    if any(drift is not None for drift in stages.lin.time_derivative()):
+    if any(rate is not None for rate in stages.lin.time_derivative()):
         return None
 
     followers, kept = list(stages.direct), kept_in_order(stages)
@@ -64,12 +67,12 @@ def rosenbrock_tangents(
     at_stages, by_curvature = _derivatives(tableau, stages, kept_rates, order, parameters)
     count = len(start)
     columns = _rows(y0.columns, order)
-    moved = jnp.concatenate([columns, args.seeds])
+    seeded = jnp.concatenate([columns, args.seeds])
 
     back = [order.index(i) for i in range(count)]
 
     def combined() -> tuple[Any, ...]:
-        constant = by_curvature @ moved + at_stages[..., count:] @ args.seeds
+        constant = by_curvature @ seeded + at_stages[..., count:] @ args.seeds
         changes = _column_stages(tableau, stages, at_stages[..., :count], constant, columns)
         end, error = end_weights(tableau), error_weights(tableau)
         return (
@@ -104,14 +107,14 @@ def _derivatives(
     increments = [stages.weighted(row) for row in np.eye(size)]
     directions = [jnp.stack(column) for column in zip(*increments, strict=True)]
 
-    def turned(y: Components, q: Sequence[Scalar], along: Components) -> Components:
+    def directional_derivative(y: Components, q: Sequence[Scalar], along: Components) -> Components:
         return jax.jvp(lambda y: kept_rates(y, q), (y,), (along,))[1]
 
     def at_point(y: Components, _: Components) -> Any:
         return jax.vjp(kept_rates, y, list(parameters))[1]
 
     def at_start(_: Components, along: Components) -> Any:
-        return jax.vjp(lambda y, q: turned(y, q, along), start, list(parameters))[1]
+        return jax.vjp(lambda y, q: directional_derivative(y, q, along), start, list(parameters))[1]
 
     unit = list(jnp.eye(len(stages.kept), dtype=points[0].dtype))
     moves = stages.step != 0.0

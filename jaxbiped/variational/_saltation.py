@@ -18,14 +18,14 @@ _BEYOND = 1e-3
 class Saltation(NamedTuple):
     """The jump of a column dy across a surface: change · (by_state · dy + by_parameter · dp).
 
-    A motion that is moved by dy meets the surface g = 0 earlier by g' dy / ġ, and is carried for
-    that long by the field f⁺ behind it in place of f⁻ before it: dy jumps by
+    A motion displaced by dy meets the surface g = 0 earlier by g' dy / ġ, and is carried for that
+    long by the field f⁺ behind it in place of f⁻ before it: dy jumps by
     (f⁺ − f⁻) (g' dy + g_p dp) / ġ⁻.
 
     Attributes:
         change: (f⁺ − f⁻)/ġ⁻, shape (c,).
-        by_state, by_parameter: derivatives of g by the state, shape (c,), and by the active
-            parameters, shape (p,).
+        by_state, by_parameter: derivatives of g with respect to the state, shape (c,), and to the
+            active parameters, shape (p,).
         which: which of the surfaces where the field jumps it is (booleans).
     """
 
@@ -46,12 +46,12 @@ def jump_surface_values(watch: Any, state: PyTree, args: PyTree) -> Scalar:
 
 
 def saltation_at(watch: Any, state: PyTree, args: Seeded, happens: Scalar) -> Saltation:
-    """The leap at a state that lies just past a surface where the field jumps.
+    """The saltation at a state that lies just past a surface where the field jumps.
 
     Of several surfaces it is the one that was passed last. Zero where it does not `happen`.
     """
     leaves, structure = jtu.tree_flatten(state)
-    moved = active_leaves(args)
+    q = active_leaves(args)
 
     def values(y: list[Scalar], p: list[Scalar]) -> list[Scalar]:
         return list(
@@ -71,9 +71,9 @@ def saltation_at(watch: Any, state: PyTree, args: Seeded, happens: Scalar) -> Sa
 
     def compute() -> Saltation:
         after = field(leaves)
-        slopes = jax.jacrev(values, argnums=(0, 1))(leaves, moved)
+        slopes = jax.jacrev(values, argnums=(0, 1))(leaves, q)
         found, nearest = None, jnp.zeros(())
-        surfaces = values(leaves, moved)
+        surfaces = values(leaves, q)
         for k, value in enumerate(surfaces):
             which = jnp.arange(len(surfaces)) == k
             normal, along = jnp.stack(slopes[k][0]), slopes[k][1]

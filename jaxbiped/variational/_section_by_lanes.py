@@ -24,11 +24,11 @@ def solve_to_section_by_lanes(
     sizes: Scalar,
     *,
     precision: Precision,
-    time_limit: Any,
+    max_time: Any,
     max_solver_steps: int,
-    steered: Any,
+    carries_parameters: Any,
 ) -> SectionArrival:
-    """`passage` for columns as `solve_variational` takes them; nodes are told as a `Recording`."""
+    """`solve_to_section` for columns as `solve_variational` takes them; nodes are a `Recording`."""
     found, recording = solve_variational(
         watch,
         solver,
@@ -36,9 +36,9 @@ def solve_to_section_by_lanes(
         args,
         sizes,
         precision=precision,
-        time_limit=time_limit,
+        max_time=max_time,
         max_solver_steps=max_solver_steps,
-        steered=steered,
+        carries_parameters=carries_parameters,
         save_nodes=True,
     )
     return SectionArrival(

@@ -69,13 +69,13 @@ class SectionArrival(NamedTuple):
     Attributes:
         y: state on the section; with its columns there, where the solve carried any: the motion
             of the arrival is taken off.
-        time: duration of the passage [s].
+        time: duration of the solve [s].
         time_columns: derivatives of the time of arrival, shape (n,).
         code: 0 for an arrival, else that of an `Ending`.
         peak: largest value of the watched quantity, 0 where there is none; `peak_columns` its
             derivatives, shape (n,), where the solve carried columns.
         jumps: steps that ended past a switch where the vector field itself jumps.
-        missed: whether the last of them was the last step at all: columns did not leap there.
+        missed: whether the last of them was the last step at all: columns did not jump there.
         attempted: number of steps attempted.
         nodes: the ends of the accepted steps, where saved.
     """
@@ -99,12 +99,12 @@ def solve_to_section(
     args: Any,
     *,
     precision: Precision,
-    time_limit: Any,
+    max_time: Any,
     max_solver_steps: int,
-    columns_only_steer: bool = False,
+    columns_only_choose_steps: bool = False,
     save_nodes: bool = False,
 ) -> SectionArrival:
-    """Solves from `y0` until the section of `watch`, a misfortune, or `time_limit` [s].
+    """Solves from `y0` until the section of `watch`, a failure, or `max_time` [s].
 
     With `y0` a `Tangents` and `args` a `Seeded` the columns are carried along under
     `precision.tangent_rtol`.
@@ -122,12 +122,12 @@ def solve_to_section(
     if carries:
         inverse = jnp.stack(jtu.tree_leaves(units.inverse))
         controller = TangentControl(controller, precision.tangent_rtol, inverse)
-        solver = TangentSolver(watch, solver, columns_only_steer)
+        solver = TangentSolver(watch, solver, columns_only_choose_steps)
         field = VariationalField(watch.field)
     end = diffrax.SubSaveAt(t1=True)
     every = diffrax.SubSaveAt(t0=True, steps=True, fn=_plain_node)
     subs = [end, every] if save_nodes else [end]
-    limit = jnp.asarray(time_limit, dtype=jnp.result_type(*jtu.tree_leaves(y0)))
+    limit = jnp.asarray(max_time, dtype=jnp.result_type(*jtu.tree_leaves(y0)))
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(field),
         solver,
@@ -149,7 +149,7 @@ def solve_to_section(
     peak, peak_columns = jnp.zeros(()), None
     if carries:
         peak, rows = peak_of(watch, landed.at_peak, args)
-        # Columns that have yet to leap do not tell how a load right behind a jump changes.
+        # Columns whose saltation is pending do not tell how a load right behind a jump changes.
         peak_columns = jnp.where(landed.peak_saltation_pending, jnp.nan, rows)
     return SectionArrival(
         y=y,
@@ -251,7 +251,7 @@ def peak_of(
     slope, slope_row = along(rate, at_peak, args)
     state = at_peak.state
     velocity = watch.field(jnp.zeros(()), state, args.args)
-    bend = jax.jvp(lambda y: rate(y, args.args), (state,), (velocity,))[1]
-    turned = bend < 0.0
-    past = jnp.where(turned, slope / jnp.where(turned, bend, 1.0), 0.0)
+    curvature = jax.jvp(lambda y: rate(y, args.args), (state,), (velocity,))[1]
+    is_maximum = curvature < 0.0
+    past = jnp.where(is_maximum, slope / jnp.where(is_maximum, curvature, 1.0), 0.0)
     return highest - 0.5 * past * slope, row - past * slope_row

@@ -142,6 +142,6 @@ def jump_of(at_sides: Scalar) -> Scalar:
 
 def jet_jump(jump: Scalar, early: Scalar, firsts: Scalar, seeds: Scalar, count: int) -> Scalar:
     """Jumps of C at the end of each step, shape (steps, c, q, v), from its `earlier_at`."""
-    moved = with_seeds(firsts, seeds)
-    times = jnp.einsum("sz,szq->sq", early, moved[..., count:])
-    return jnp.einsum("scv,sq->scqv", jump @ moved[..., :count], times)
+    seeded = with_seeds(firsts, seeds)
+    times = jnp.einsum("sz,szq->sq", early, seeded[..., count:])
+    return jnp.einsum("scv,sq->scqv", jump @ seeded[..., :count], times)

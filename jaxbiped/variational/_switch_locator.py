@@ -1,4 +1,7 @@
-"""Switch locator: a step-size controller whose steps end just past every switch."""
+"""Switch locator: a step-size controller whose steps end just past every switch.
+
+A step across a switch would ruin derivatives long before the state shows it.
+"""
 
 import functools
 from collections.abc import Callable
@@ -26,14 +29,14 @@ _ROUNDING = 1e-12
 
 
 class Watch(eqx.Module):
-    """What a solve lands on, and what ends it. All functions take (args, state).
+    """What a solve ends steps on, and what ends it. All functions take (args, state).
 
     Attributes:
         field: vector field (t, state, args).
         switches: the surfaces that no step may straddle.
         section: value and whether a crossing counts; the solve ends where the value rises through
             zero and it does. None: nothing to arrive at.
-        ending: code of a misfortune that ends the solve, 0 for none.
+        ending: code of the failure that ends the solve, 0 for none.
         peak: a quantity whose largest value is to be known.
     """
 
@@ -54,10 +57,10 @@ class SwitchLocatorState(NamedTuple):
         accepted: number of steps accepted.
         landings: number of them that ended just past a switch.
         jumps: number of them that ended past a switch where the vector field itself jumps.
-        leapt: whether the last accepted step did: columns have yet to leap there.
-        peak_leapt: whether the step with the largest value did.
+        saltation_pending: whether the last accepted step did: columns have yet to jump there.
+        peak_saltation_pending: whether the step with the largest value did.
         arrived: whether the section was reached.
-        code: that of the misfortune that ended the solve, 0 for none.
+        code: that of the failure that ended the solve, 0 for none.
         peak: largest value of the watched quantity at the ends of steps; None where none is.
         at_peak: the solve's whole state there.
     """
@@ -232,7 +235,7 @@ def plain_args(args: Any) -> PyTree:
 
 
 def _surfaces(watch: Watch, peak: Any, scene: PyTree, state: PyTree) -> list[Switch]:
-    """Every surface to land on: switches, where the peak quantity turns, and last the section."""
+    """Every surface to end steps on: switches, the peak quantity's maxima, and last the section."""
     found = list(watch.switches(scene, state))
     if watch.peak is not None:
         rate = watch.field(jnp.zeros_like(peak), state, scene)

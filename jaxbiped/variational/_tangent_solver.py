@@ -1,4 +1,7 @@
-"""Tangent solver: state and derivatives stepped together, their errors controlled together."""
+"""Tangent solver: state and derivatives stepped together, their errors controlled together.
+
+A state within its tolerance does not make its derivatives accurate: they have a norm of their own.
+"""
 
 import functools
 from collections.abc import Callable
@@ -45,13 +48,13 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
     Attributes:
         watch: with the state's own vector field, and the surfaces where it jumps.
         solver: any one-step solver that carries nothing from step to step.
-        columns_only_steer: whether the columns only choose the steps and are not themselves
+        columns_only_choose_steps: whether the columns only choose the steps and are not themselves
             differentiated: for reverse mode, whose derivatives then are these columns' transpose.
     """
 
     watch: Watch
     solver: diffrax.AbstractAdaptiveSolver
-    columns_only_steer: bool = eqx.field(static=True, default=False)
+    columns_only_choose_steps: bool = eqx.field(static=True, default=False)
     term_structure: ClassVar = diffrax.AbstractTerm
     interpolation_cls: ClassVar[Any] = diffrax.LocalLinearInterpolation
 
@@ -84,10 +87,10 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
         """One step, as `diffrax.AbstractSolver.step` describes it."""
         del terms, solver_state
         y0 = _apply_saltation(self.watch, y0, args, made_jump)
-        if self.columns_only_steer:
+        if self.columns_only_choose_steps:
             y1, error = _plain_step(self, t0, t1, y0.state, args.args)
-            steering, errors = jax.lax.stop_gradient(_tangent_step(self, t0, t1, y0, args))
-            new, error = Tangents(y1, steering.columns), Tangents(error, errors.columns)
+            choosing, errors = jax.lax.stop_gradient(_tangent_step(self, t0, t1, y0, args))
+            new, error = Tangents(y1, choosing.columns), Tangents(error, errors.columns)
         else:
             new, error = _tangent_step(self, t0, t1, y0, args)
         return new, error, dict(y0=y0, y1=new), None, diffrax.RESULTS.successful
@@ -96,7 +99,7 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
 def _apply_saltation(watch: Watch, y: Tangents, args: Seeded, made_jump: Any) -> Tangents:
     """The columns behind a jump of the field, where one has just been passed.
 
-    The state stays what it is, but JAX's own derivatives of it leap as well.
+    The state stays what it is, but JAX's own derivatives of it jump as well.
     """
     if not has_saltation(watch, y.state, args.args):
         return y
@@ -104,11 +107,11 @@ def _apply_saltation(watch: Watch, y: Tangents, args: Seeded, made_jump: Any) ->
     saltation = saltation_at(watch, still, held, jax.lax.stop_gradient(jnp.asarray(made_jump)))
     rows = saltation.by_state @ y.columns + saltation.by_parameter @ args.seeds
     leaves, structure = jtu.tree_flatten(y.state)
-    nothing = jump_surface_values(watch, y.state, args.args)
-    nothing = nothing - jax.lax.stop_gradient(nothing)
-    shift = jnp.sum(jnp.where(saltation.which, nothing, 0.0))
-    moved = [leaf + change * shift for leaf, change in zip(leaves, saltation.change, strict=True)]
-    state = jtu.tree_unflatten(structure, moved)
+    zero_values = jump_surface_values(watch, y.state, args.args)
+    zero_values = zero_values - jax.lax.stop_gradient(zero_values)
+    shift = jnp.sum(jnp.where(saltation.which, zero_values, 0.0))
+    jumped = [leaf + change * shift for leaf, change in zip(leaves, saltation.change, strict=True)]
+    state = jtu.tree_unflatten(structure, jumped)
     return Tangents(state, y.columns + jnp.outer(saltation.change, rows))
 
 
@@ -126,7 +129,7 @@ def _tangent_step(
 ) -> tuple[Tangents, Tangents]:
     inner = solver.solver
     if isinstance(inner, Projected):
-        bare = TangentSolver(solver.watch, inner.solver, solver.columns_only_steer)
+        bare = TangentSolver(solver.watch, inner.solver, solver.columns_only_choose_steps)
         stepped, errors = _tangent_step(bare, t0, t1, y0, args)
         state, columns = along_columns(lambda s, a: inner.project(a, s), stepped, args)
         return Tangents(state, as_columns(columns)), errors
@@ -177,12 +180,12 @@ class TangentControl(AbstractWrappedControl):
         floor = SHARE * jnp.max(size, axis=0) + args.floors
         # The wrapped controller divides by its absolute tolerance; nothing else is left to it.
         scaled = y_error.columns * inverse * (self.atol / (self.tangent_rtol * (size + floor)))
-        nothing = jnp.zeros_like(scaled)
+        zero_error = jnp.zeros_like(scaled)
         return self.controller.adapt_step_size(
             t0,
             t1,
-            Tangents(y0.state, nothing),
-            Tangents(y1_candidate.state, nothing),
+            Tangents(y0.state, zero_error),
+            Tangents(y1_candidate.state, zero_error),
             None,
             Tangents(y_error.state, scaled),
             error_order,

@@ -60,8 +60,8 @@ def along_columns(
     """`function(state, args)` and its derivatives along the columns, leaves of shape (n, …)."""
     state, structure = jtu.tree_flatten(y.state)
 
-    def of_leaves(state: list[Scalar], moved: list[Scalar]) -> Any:
-        return function(jtu.tree_unflatten(structure, state), with_active(args, moved))
+    def of_leaves(state: list[Scalar], parameters: list[Scalar]) -> Any:
+        return function(jtu.tree_unflatten(structure, state), with_active(args, parameters))
 
     def along(column: Scalar, seed: Scalar) -> Any:
         tangents = (list(column), list(seed))

@@ -1,4 +1,7 @@
-"""Variational solve as a program for lanes: a state with its derivatives, to a section."""
+"""Variational solve as a program for lanes: a state with its derivatives, to a section.
+
+The twin for lanes of what `_solve_to_section` does through diffrax.
+"""
 
 import dataclasses
 from collections.abc import Callable
@@ -43,7 +46,7 @@ class AdaptiveColumns:
 
     Attributes:
         solver: its steps.
-        watch: what it lands on, and what ends it.
+        watch: what its steps end on, and what ends it.
         active: positions of the p parameters among the leaves of the arguments.
         save_nodes: whether the accepted steps are recorded.
     """
@@ -70,13 +73,13 @@ class AdaptiveColumns:
         return Program(self.start, self.attempt, self.finish, record=record)
 
     def start(self, given: VariationalProblem) -> _Now:
-        zero, none = jnp.zeros_like(given.time_limit), jnp.asarray(False)
+        zero, none = jnp.zeros_like(given.max_time), jnp.asarray(False)
         next_t, landed = self._controller(given, zero).init(
             self.term,
             zero,
-            given.time_limit,
+            given.max_time,
             given.state,
-            first_step(given.time_limit, given.units.time),
+            first_step(given.max_time, given.units.time),
             given.args,
             None,
             self.solver.error_order(self.term),
@@ -95,9 +98,9 @@ class AdaptiveColumns:
             *times,
             now.state,
             self._seeded(given),
-            steered=given.steered > 0.0,
+            carries_parameters=given.carries_parameters > 0.0,
         )
-        moved, worst = self._columns(given, now, step)
+        new_columns, worst = self._columns(given, now, step)
         error = jtu.tree_map(lambda e: jnp.where(jnp.isnan(e), jnp.inf, e), step.error)
         keep, t, next_t, _, landed, result = self._controller(given, worst).adapt_step_size(
             now.t,
@@ -109,34 +112,34 @@ class AdaptiveColumns:
             self.solver.error_order(self.term),
             now.landed,
         )
-        limit = given.time_limit
+        limit = given.max_time
         t, next_t = clip_step(keep, t, next_t, limit, given.almost)
         state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), step.end, now.state)
         columns, peaks = now.columns, now.peak_columns
         if self.watch.peak is None:
-            columns = tuple(_select(keep, a, b) for a, b in zip(moved, columns, strict=True))
+            columns = tuple(_select(keep, a, b) for a, b in zip(new_columns, columns, strict=True))
             peaks = columns
         else:
             highest = keep & (landed.peak > now.landed.peak)
             both = [
                 jax.lax.map(lambda each: _row(keep, highest, *each), (new, old, peak))
-                for new, old, peak in zip(moved, columns, peaks, strict=True)
+                for new, old, peak in zip(new_columns, columns, peaks, strict=True)
             ]
             columns, peaks = (tuple(part) for part in zip(*both, strict=True))
         attempted = now.attempted + 1
         lost = jnp.asarray(result == diffrax.RESULTS.dt_min_reached)
         over = (t >= limit) | jnp.asarray(result != diffrax.RESULTS.successful)
-        over = over | (attempted.astype(limit.dtype) >= given.most_attempts)
+        over = over | (attempted.astype(limit.dtype) >= given.max_attempts)
         after = _Now(t, next_t, state, columns, landed, peaks, attempted, keep, lost)
         return after, over
 
     def finish(self, given: VariationalProblem, now: _Now) -> VariationalSolution:
-        late = now.t >= given.time_limit
+        late = now.t >= given.max_time
         ended = jnp.where(late, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
         ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), ended)
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
         by_state, by_parameter = now.columns
-        by_parameter = jnp.where(given.steered > 0.0, by_parameter, jnp.nan)
+        by_parameter = jnp.where(given.carries_parameters > 0.0, by_parameter, jnp.nan)
         seeded, columns = self._seeded(given), jnp.concatenate([by_state, by_parameter]).T
         y, t = Tangents(now.state, columns), now.t
         time_columns, peak = jnp.zeros(columns.shape[1]), jnp.zeros(())
@@ -169,15 +172,15 @@ class AdaptiveColumns:
             self.watch, now.state, self._seeded(given), now.landed.saltation_pending
         )
 
-        def moved(column: Any, forcing: Any) -> Any:
+        def step_column(column: Any, forcing: Any) -> Any:
             return column + saltation.change * (jnp.sum(saltation.by_state * column) + forcing)
 
         by_state, by_parameter = now.columns
         if by_state.shape[0]:
-            by_state = jax.lax.map(lambda column: moved(column, 0.0), by_state)
+            by_state = jax.lax.map(lambda column: step_column(column, 0.0), by_state)
         if by_parameter.shape[0]:
             by_parameter = jax.lax.map(
-                lambda each: moved(each[0], each[1] * each[2]),
+                lambda each: step_column(each[0], each[1] * each[2]),
                 (by_parameter, saltation.by_parameter, given.sizes),
             )
         return now._replace(columns=(by_state, by_parameter))
@@ -201,7 +204,7 @@ class AdaptiveColumns:
 
         inverse = jnp.stack(jtu.tree_leaves(given.units.inverse))
 
-        def moved(column: Any, floor: Scalar, forcing: Any | None) -> tuple[Any, Scalar]:
+        def step_column(column: Any, floor: Scalar, forcing: Any | None) -> tuple[Any, Scalar]:
             end, error = column_step(step, column, forcing)
             sizes = jnp.maximum(jnp.abs(column), jnp.abs(end)) * inverse
             least = SHARE * jnp.max(sizes) + floor
@@ -213,7 +216,7 @@ class AdaptiveColumns:
         by_state, by_parameter = now.columns
         if by_state.shape[0]:
             columns, squares = jax.lax.map(
-                lambda each: moved(each[0], each[1], None), (by_state, given.state_floors)
+                lambda each: step_column(each[0], each[1], None), (by_state, given.state_floors)
             )
             found.append(columns)
             norms.append(jnp.max(squares))
@@ -224,13 +227,13 @@ class AdaptiveColumns:
 
             def carried() -> tuple[Any, Scalar]:
                 columns, squares = jax.lax.map(
-                    lambda each: moved(each[0], each[1], each[2] * each[3]),
+                    lambda each: step_column(each[0], each[1], each[2] * each[3]),
                     (by_parameter, given.parameter_floors, rows, given.sizes),
                 )
                 return columns, jnp.max(squares)
 
             columns, square = jax.lax.cond(
-                given.steered > 0.0, carried, lambda: (by_parameter, jnp.zeros(()))
+                given.carries_parameters > 0.0, carried, lambda: (by_parameter, jnp.zeros(()))
             )
             found.append(columns)
             norms.append(square)
@@ -263,8 +266,8 @@ def _along_columns_in_turn(
     """`along_columns`, one column after the other."""
     state, structure = jtu.tree_flatten(y.state)
 
-    def of_leaves(state: list[Scalar], moved: list[Scalar]) -> Any:
-        return function(jtu.tree_unflatten(structure, state), with_active(args, moved))
+    def of_leaves(state: list[Scalar], parameters: list[Scalar]) -> Any:
+        return function(jtu.tree_unflatten(structure, state), with_active(args, parameters))
 
     def along(each: tuple[Any, Any]) -> Any:
         tangents = tuple([part[i] for i in range(part.shape[0])] for part in each)

@@ -1,16 +1,15 @@
-"""Variational solves by lanes, compiled and called."""
+"""Variational solves by lanes."""
 
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import CompiledProgram, Recording, call, call_recording
+from jaxbiped.compiler import LANES, Program, Recording, Request
 from jaxbiped.solve._final_step import just_before_end
-from jaxbiped.solve._units import Units, units_of
+from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import Precision
 from jaxbiped.variational._switch_locator import Watch
@@ -30,17 +29,17 @@ def solve_variational(
     sizes: Scalar,
     *,
     precision: Precision,
-    time_limit: Any,
+    max_time: Any,
     max_solver_steps: int,
-    steered: Any = True,
+    carries_parameters: Any = True,
     save_nodes: bool = False,
 ) -> tuple[VariationalSolution, Recording | None]:
-    """Solves from `y0` to the section, a misfortune or `time_limit` [s].
+    """Solves from `y0` to the section, a failure or `max_time` [s].
 
     Of the columns the last p move one parameter each, by `sizes`, shape (p,), in the order of the
-    active leaves; the columns before move none. Where not `steered`, the last p are not carried,
-    and NaN in the end. Seeds are not looked at. Records are the time and the state at the ends of
-    the accepted steps.
+    active leaves; the columns before move none. Unless `carries_parameters`, the last p are not
+    carried, and NaN in the end. Seeds are not looked at. Records are the time and the state at the
+    ends of the accepted steps.
     """
     m = y0.columns.shape[1] - len(args.active)
     inputs = VariationalProblem(
@@ -49,59 +48,33 @@ def solve_variational(
         by_state=y0.columns[:, :m].T,
         by_parameter=y0.columns[:, m:].T,
         sizes=sizes,
-        steered=_number(steered),
+        carries_parameters=_number(carries_parameters),
         state_floors=args.floors[:m],
         parameter_floors=args.floors[m:],
         rtol=_number(precision.rtol),
         tangent_rtol=_number(precision.tangent_rtol),
         units=jtu.tree_map(_number, units_of(args.args, y0.state)),
-        time_limit=_number(time_limit),
-        almost=just_before_end(_number(time_limit)),
-        most_attempts=_number(max_solver_steps),
+        max_time=_number(max_time),
+        almost=just_before_end(_number(max_time)),
+        max_attempts=_number(max_solver_steps),
     )
-    structures = (jtu.tree_structure(args.args), jtu.tree_structure(y0.state))
-    compiled = _compiled(watch, solver, args.active, m, save_nodes, *structures)
-    quick = max_solver_steps <= _QUICK
-    if save_nodes:
-        room = max_solver_steps
-        return call_recording(compiled, inputs, room=room, quick=quick)
-    return call(compiled, inputs, quick=quick)[0], None
-
-
-@bounded_cache(PROGRAMS)
-def _compiled(
-    watch: Watch,
-    solver: AbstractRosenbrock,
-    active: tuple[int, ...],
-    directions: int,
-    save_nodes: bool,
-    args: Any,
-    state: Any,
-) -> CompiledProgram:
-    """The program for arguments and states of these structures, and m directions of state."""
-    c, p = state.num_leaves, len(active)
-
-    def numbers(*shape: int) -> Any:
-        return jax.ShapeDtypeStruct(shape, jnp.float64)
-
-    shapes = VariationalProblem(
-        jtu.tree_unflatten(args, [numbers()] * args.num_leaves),
-        jtu.tree_unflatten(state, [numbers()] * c),
-        numbers(directions, c),
-        numbers(p, c),
-        numbers(p),
-        numbers(),
-        numbers(directions),
-        numbers(p),
-        rtol=numbers(),
-        tangent_rtol=numbers(),
-        units=Units(jtu.tree_unflatten(state, [numbers()] * c), numbers()),
-        time_limit=numbers(),
-        almost=numbers(),
-        most_attempts=numbers(),
+    found = LANES.run(
+        Request(
+            _program(watch, solver, args.active, save_nodes),
+            inputs,
+            room=max_solver_steps if save_nodes else 0,
+            quick=max_solver_steps <= _QUICK,
+            keeps_records=save_nodes,
+        )
     )
-    body = AdaptiveColumns(solver, watch, active, save_nodes=save_nodes)
-    return CompiledProgram(body.program(), shapes)
+    return found.outputs, found.recording
+
+
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
+def _program(
+    watch: Watch, solver: AbstractRosenbrock, active: tuple[int, ...], save_nodes: bool
+) -> Program:
+    return AdaptiveColumns(solver, watch, active, save_nodes=save_nodes).program()
 
 
 def _number(value: Any) -> Scalar:

@@ -15,12 +15,12 @@ class VariationalProblem(NamedTuple):
         by_state: columns of the first m directions, shape (m, c).
         by_parameter: of the others, shape (p, c).
         sizes: by how much these move their parameter, shape (p,).
-        steered: whether these are carried at all (0 or 1).
+        carries_parameters: whether these are carried at all (0 or 1).
         state_floors, parameter_floors: below which errors of columns are absolute, (m,) and (p,).
         rtol, tangent_rtol: tolerances of state and columns.
         units: of the state's leaves and of time.
-        time_limit: longest time to the section [s]; from `almost` on, a step there ends there.
-        most_attempts: cap on attempted steps.
+        max_time: longest time to the section [s]; from `almost` on, a step there ends there.
+        max_attempts: cap on attempted steps.
     """
 
     args: PyTree
@@ -28,19 +28,19 @@ class VariationalProblem(NamedTuple):
     by_state: Any
     by_parameter: Any
     sizes: Any
-    steered: Any
+    carries_parameters: Any
     state_floors: Any
     parameter_floors: Any
     rtol: Any
     tangent_rtol: Any
     units: Units
-    time_limit: Any
+    max_time: Any
     almost: Any
-    most_attempts: Any
+    max_attempts: Any
 
 
 class VariationalSolution(NamedTuple):
-    """What a solve found: as in `Passage`, all columns as rows of shape (m + p, …).
+    """What a solve found: as in `SectionArrival`, all columns as rows of shape (m + p, …).
 
     Attributes:
         t, state, columns, time_columns: on the section.

@@ -24,7 +24,7 @@ def _plane(d):
 
 
 def _push(label_of, origin, scales, normal=None, **options):
-    right = {"farthest": 3.0, "tolerance": TOLERANCE}
+    right = {"max_distance": 3.0, "tolerance": TOLERANCE}
     return jb.basins.minimal_fatal_shock(
         label_of, origin, scales=scales, normal=normal, **(right | options)
     )
@@ -67,7 +67,7 @@ def test_shortest_axis_of_an_ellipsoid(d, with_normal):
     A = np.diag(1.0 / np.linspace(0.7, 1.9, d)) @ axes.T
     label_of = lambda x: np.where(np.linalg.norm((x - origin) @ A.T, axis=1) < 1.0, 4, 2)
     normal = lambda x: (x - origin) @ A.T @ A
-    found = _push(label_of, origin, scales, normal if with_normal else None, farthest=20.0)
+    found = _push(label_of, origin, scales, normal if with_normal else None, max_distance=20.0)
     true = 1.0 / np.linalg.svd(A * scales, compute_uv=False)[0]
     _consistent(found, label_of, origin, scales)
     assert true <= found.distance <= true + 1.5 * TOLERANCE
@@ -133,7 +133,7 @@ def test_the_nearest_of_two_boundaries_and_its_label():
 def test_a_ray_that_enters_the_basin_again_exits_first(steps, distance):
     """Another basin from 1.0 to 1.1 and beyond 2.5: seen by short steps, stepped over by long."""
     label_of = lambda x: (((x > 1.0) & (x < 1.1)) | (x > 2.5)).any(axis=1).astype(int)
-    found = _push(label_of, [0.0], [1.0], farthest=3.9, steps=steps)
+    found = _push(label_of, [0.0], [1.0], max_distance=3.9, steps=steps)
     assert found.distance == pytest.approx(distance, abs=1.5 * TOLERANCE)
 
 
@@ -153,8 +153,8 @@ def test_nothing_found_says_so():
     assert found.label == found.origin_label == 7
     assert np.isnan([*found.push, *found.direction, *found.boundary_point, found.angle]).all()
     assert found.asked == len(label_of.points) == 1 + 32 * 8
-    farthest = np.linalg.norm(label_of.points, axis=1).max()
-    assert farthest == pytest.approx(3.0)
+    max_distance = np.linalg.norm(label_of.points, axis=1).max()
+    assert max_distance == pytest.approx(3.0)
 
 
 def test_rays_without_a_normal_are_left_as_they_are():
@@ -192,9 +192,9 @@ def test_directions_may_be_given():
         ({"origin": 0.0}, ("origin", "()", "(d,)")),
         ({"scales": [1.0]}, ("scales", "(1,)", "origin", "(2,)")),
         ({"scales": [1.0, 0.0]}, ("scales", "0", "above 0")),
-        ({"farthest": -1.0}, ("farthest", "-1", "above 0")),
+        ({"max_distance": -1.0}, ("max_distance", "-1", "above 0")),
         ({"tolerance": 0.0}, ("tolerance", "0", "above 0")),
-        ({"tolerance": 3.0}, ("tolerance", "3", "below farthest = 3")),
+        ({"tolerance": 3.0}, ("tolerance", "3", "below max_distance = 3")),
         ({"tolerance": 1e-15}, ("tolerance", "1e-15", "at least")),
         ({"directions": 0}, ("directions", "0", "at least 1")),
         ({"directions": np.ones((3, 3))}, ("directions", "(3, 3)", "(n, 2)")),

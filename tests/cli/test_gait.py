@@ -141,7 +141,7 @@ def test_a_search_that_fails_says_so(gait, tmp_path, capsys, monkeypatch):
     [
         (["--accuracy", "nonsense"], ("accuracy", "nonsense", "balanced, tight")),
         (["--K", "-1"], ("K", "-1", "above 0")),
-        (["--period", "0"], ("period", "0", "above 0")),
+        (["--footsteps", "0"], ("footsteps", "0", "above 0")),
         (["--section", "lunch"], ("section", "lunch", "mid-stance")),
         (["--json", "/no/such/folder/x.json"], ("--json", "/no/such/folder/x.json", "folder")),
     ],

@@ -48,7 +48,7 @@ def test_what_the_parser_refuses(arguments, words, capsys):
         (["walk", "--J", "0"], ("J = 0", "hip_mass = 0")),
         (["walk", "--set", "K=abc"], ("K must be a number", "'abc'")),
         (["walk", "--set", "=3"], ("set = '=3'", "name=value")),
-        (["gait", "--period", "-2"], ("period = -2", "whole number above 0")),
+        (["gait", "--footsteps", "-2"], ("footsteps = -2", "whole number above 0")),
         (["walk", "--model", "rigid", "--method", "index1"], ("method = index1", "rigid")),
         (["walk", "--method", "index1"], ("method = index1", "--formulation redundant")),
         (["walk", "--hip-z", "0.2"], ("hip_z = 0.2", "0.196 m below the ground", "0.3956")),

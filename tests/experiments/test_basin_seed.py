@@ -1,3 +1,5 @@
+"""The seed's basin, at the experiment's quick size."""
+
 import numpy as np
 import pytest
 
@@ -21,7 +23,7 @@ def test_the_seeds_basin(tmp_path):
     assert sum(part["estimate"] for part in fractions.values()) == pytest.approx(1.0)
     walking = fractions["walking period-1"]
     assert walking["low"] < numbers["refined"]["walking"] < walking["high"]
-    # Whether it walks is parted by a curve that is less folded than which misfortune comes.
+    # Whether it walks is parted by a curve that is less folded than which failure comes.
     folds = {name: each["dimension"] for name, each in numbers["boundary"].items()}
     assert 1.0 < folds["walking or not"] < folds["all labels"] < 2.0
     # What a tolerance changes, it changes beside boundaries.

@@ -1,3 +1,5 @@
+"""The simplest walker's basin, at the experiment's quick size."""
+
 import pytest
 
 from tests.drawn import assert_is_drawn

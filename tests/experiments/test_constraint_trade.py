@@ -1,3 +1,5 @@
+"""Costs and errors of constraint methods, at the experiment's quick size."""
+
 import numpy as np
 import pytest
 

@@ -1,3 +1,5 @@
+"""Accuracy of derivatives, at the experiment's quick size."""
+
 import numpy as np
 import pytest
 

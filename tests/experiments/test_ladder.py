@@ -1,3 +1,5 @@
+"""The ladder of fidelity, at the experiment's quick size."""
+
 import numpy as np
 import pytest
 

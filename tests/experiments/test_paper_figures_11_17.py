@@ -1,3 +1,5 @@
+"""The paper's figures 11 to 17, at the experiment's quick size."""
+
 import pytest
 
 from tests.drawn import assert_is_drawn, labels_of

@@ -1,3 +1,5 @@
+"""The paper's figures 4 to 8, at the experiment's quick size."""
+
 import pytest
 from PIL import Image
 

@@ -1,3 +1,5 @@
+"""Robustness of the search for gaits, at the experiment's quick size."""
+
 import numpy as np
 import pytest
 

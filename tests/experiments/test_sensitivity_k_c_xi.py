@@ -1,3 +1,5 @@
+"""Sensitivity to K, c and xi, at the experiment's quick size."""
+
 import pytest
 
 from tests.drawn import assert_is_drawn, labels_of

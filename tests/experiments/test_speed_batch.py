@@ -1,3 +1,5 @@
+"""Speed of batches, at the experiment's quick size."""
+
 import pytest
 
 from tests.drawn import assert_is_drawn, labels_of

@@ -1,3 +1,5 @@
+"""Speed of single simulations, at the experiment's quick size."""
+
 import numpy as np
 import pytest
 

@@ -1,3 +1,5 @@
+"""A killed sweep continued, at the experiment's quick size."""
+
 import pytest
 
 from tests.experiments.quick import quick_run

@@ -1,3 +1,5 @@
+"""Labelled starts a second, at the experiment's quick size."""
+
 import pytest
 
 from tests.drawn import assert_is_drawn, points_of

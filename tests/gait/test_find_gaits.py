@@ -1,3 +1,5 @@
+"""Gaits found from many starts at once, and told apart."""
+
 import jax
 import jax.numpy as jnp
 import numpy as np

@@ -1,3 +1,5 @@
+"""The seed's gait: its measures, its stability and what a search costs."""
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -27,7 +29,7 @@ def test_seed_gait(found):
     assert found.multipliers.shape == (6,)
 
 
-def test_no_turn_is_solved_twice(found, monkeypatch):
+def test_no_return_is_solved_twice(found, monkeypatch):
     """The records of two turns are read at a search's end: they waited on the host."""
     most, run_table = [], CompiledProgram.run_table
 
@@ -43,7 +45,7 @@ def test_no_turn_is_solved_twice(found, monkeypatch):
     np.testing.assert_array_equal(again.orbit[0], found.orbit[0])
 
 
-def test_far_from_a_gait_only_the_state_is_differentiated_by(found):
+def test_far_from_a_gait_derivatives_are_those_in_the_state(found):
     """By lanes: the return map's slopes are right there, of parameters nothing is claimed."""
     gait = jb.find_gait(jb.seed_scene(), max_evaluations=2)
     assert gait.outcome == jb.gait.Search.NOT_CONVERGED
@@ -95,8 +97,8 @@ def test_vmap_over_scenes_changes_nothing(found):
     ("options", "named"),
     [
         (dict(accuracy="fast"), "accuracy"),
-        (dict(period=0), "period"),
-        (dict(period=1.5), "period"),
+        (dict(footsteps=0), "footsteps"),
+        (dict(footsteps=1.5), "footsteps"),
         (dict(parameters=("K", "stiffness")), "parameters"),
         (dict(method="secant"), "method"),
         (dict(max_evaluations=0), "max_evaluations"),

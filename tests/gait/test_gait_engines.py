@@ -35,7 +35,7 @@ def test_both_find_the_same_gait_and_the_same_derivatives(gaits):
 
 def test_the_radius_of_a_cycle_of_two_is_that_of_one_squared(gaits):
     once, names = gaits["lanes"], ("K", "slope")
-    twice = jb.find_gait(jb.seed_scene(), period=2, parameters=names, engine="lanes")
+    twice = jb.find_gait(jb.seed_scene(), footsteps=2, parameters=names, engine="lanes")
     columns = jnp.array([once.parameters.index(name) for name in names])
     expected = 2.0 * once.elasticities.spectral_radius[columns]
     np.testing.assert_allclose(twice.elasticities.spectral_radius, expected, rtol=2e-3)

@@ -1,3 +1,5 @@
+"""Gait measures: all gradient modes agree."""
+
 import jax
 import jax.numpy as jnp
 import numpy as np

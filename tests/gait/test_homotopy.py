@@ -1,3 +1,5 @@
+"""The line of parameters from the seed's scene to another."""
+
 import jax
 import jax.numpy as jnp
 import numpy as np

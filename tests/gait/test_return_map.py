@@ -260,7 +260,7 @@ def test_what_does_not_return_says_so(monkeypatch):
     for most, ending in ((4096, jb.Ending.TIMED_OUT), (2, jb.Ending.OUT_OF_STEPS)):
         monkeypatch.setitem(MOST_SOLVER_STEPS, "balanced", most)
         for engine in ("lanes", "xla"):
-            options = dict(section=up, system=Ball(), time_limit=1.0, engine=engine)
+            options = dict(section=up, system=Ball(), max_time=1.0, engine=engine)
             found = jb.return_map(args, state, **options)
             assert jb.Ending(int(found.code)) is ending
 

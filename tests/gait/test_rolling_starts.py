@@ -1,3 +1,5 @@
+"""Scattered starts whose stance foot rolls."""
+
 import numpy as np
 import pytest
 

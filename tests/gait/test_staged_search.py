@@ -103,7 +103,7 @@ def test_rigid_gaits_are_found(slope):
     gait = jb.find_gait(rigid_seed(slope), **PLAIN)
     assert gait.outcome is jb.gait.Search.FOUND
     walk = jb.rigid_walk(
-        rigid_seed(slope), gait.measures.state, steps=100, accuracy="tight", most_arrivals=100
+        rigid_seed(slope), gait.measures.state, footsteps=100, accuracy="tight", max_arrivals=100
     )
     assert walk.outcome is jb.Ending.WALKING
     if bool(gait.stable):
@@ -116,7 +116,7 @@ def test_the_simplest_walker_is_found_with_its_cycles():
     one = jb.find_gait(simplest_walker(0.009), **PLAIN)
     assert bool(one.stable)
     assert not bool(jb.find_gait(simplest_walker(0.016), **PLAIN).stable)
-    two = jb.find_gait(simplest_walker(0.016), period=2, **PLAIN)
+    two = jb.find_gait(simplest_walker(0.016), footsteps=2, **PLAIN)
     assert bool(two.stable)
 
 

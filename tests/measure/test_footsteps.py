@@ -9,7 +9,7 @@ import jaxbiped as jb
 @pytest.fixture(scope="module")
 def settled():
     scene = jb.seed_scene()
-    walk = jb.simulate(scene, jb.seed_state(), steps=30)
+    walk = jb.simulate(scene, jb.seed_state(), footsteps=30)
     return scene, walk, jb.footsteps(scene, walk)
 
 
@@ -42,7 +42,7 @@ def test_legs_alternate_and_times_increase(settled):
 
 def test_a_steeper_slope():
     scene = jb.seed_scene(slope=0.03)
-    steps = jb.footsteps(scene, jb.simulate(scene, jb.seed_state(), steps=30))
+    steps = jb.footsteps(scene, jb.simulate(scene, jb.seed_state(), footsteps=30))
     assert steps.period_s[-1] == pytest.approx(0.4464, abs=1e-4)
     assert steps.length_m[-1] == pytest.approx(0.2123, abs=1e-4)
 

@@ -1,3 +1,5 @@
+"""Animations: frames, players and slow motion."""
+
 import numpy as np
 import pytest
 from PIL import Image

@@ -1,3 +1,5 @@
+"""The figure of contact forces over a walk, and of one heel strike."""
+
 import equinox as eqx
 import numpy as np
 import pytest

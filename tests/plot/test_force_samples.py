@@ -1,3 +1,5 @@
+"""Force samples for figures: peaks as a far finer sampling has them."""
+
 import dataclasses
 
 import equinox as eqx

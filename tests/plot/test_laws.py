@@ -1,3 +1,5 @@
+"""Figures of contact laws, against the laws themselves."""
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure

@@ -1,3 +1,5 @@
+"""The figure of leg angles over time."""
+
 import numpy as np
 
 from jaxbiped.plot import leg_angles

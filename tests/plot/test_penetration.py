@@ -1,3 +1,5 @@
+"""The figure of the feet's penetration over time."""
+
 import numpy as np
 import pytest
 

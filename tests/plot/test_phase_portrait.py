@@ -1,3 +1,5 @@
+"""Phase portraits of a leg."""
+
 import numpy as np
 import pytest
 

@@ -1,3 +1,5 @@
+"""Samples of a walk for figures."""
+
 import jax.numpy as jnp
 import numpy as np
 

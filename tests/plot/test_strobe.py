@@ -1,3 +1,5 @@
+"""The strobe figure of a walk: poses, feet and slope."""
+
 import math
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Words, symbols and units of what figures draw."""
+
 import dataclasses
 import re
 

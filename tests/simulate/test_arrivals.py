@@ -24,7 +24,7 @@ def _heights(scene, state):
 def test_heel_strikes_are_the_walks_footsteps(seed_walk):
     scene, whole = seed_walk
     expected = jb.heel_strikes(scene, whole).time_s
-    walk = _walk(save=jb.HeelStrike(), most_arrivals=6)
+    walk = _walk(save=jb.HeelStrike(), max_arrivals=6)
     count = int(walk.arrivals)
     assert (walk.engine, count) == ("lanes", len(expected))
     np.testing.assert_allclose(walk.t[:count], expected, atol=1e-7)
@@ -35,7 +35,7 @@ def test_heel_strikes_are_the_walks_footsteps(seed_walk):
 
 
 def test_arrivals_without_room_are_counted():
-    walk = _walk(save=jb.HeelStrike(), most_arrivals=2)
+    walk = _walk(save=jb.HeelStrike(), max_arrivals=2)
     assert walk.t.shape == (2,)
     assert int(walk.arrivals) == 4
 
@@ -43,7 +43,7 @@ def test_arrivals_without_room_are_counted():
 def test_mid_stances_are_the_return_maps():
     walk = _walk(save=jb.MidStance())
     once = jb.return_map(jb.seed_scene(), jb.seed_state(), accuracy="tight")
-    twice = jb.return_map(jb.seed_scene(), jb.seed_state(), steps=2, accuracy="tight")
+    twice = jb.return_map(jb.seed_scene(), jb.seed_state(), footsteps=2, accuracy="tight")
     np.testing.assert_allclose(walk.t[:2], [once.time, twice.time], atol=1e-7)
     # The first one names its legs the other way round, the second one as the start.
     np.testing.assert_allclose(walk.state.theta_2[0], once.state.theta_1, atol=1e-7)
@@ -112,7 +112,7 @@ def test_many_give_what_each_gives_alone():
             state,
             duration=1.0,
             save=jb.HeelStrike(),
-            most_arrivals=4,
+            max_arrivals=4,
             extremes=_heights,
         )
         return walk.t, walk.state, walk.arrivals, walk.lowest, walk.highest, walk.ending
@@ -128,7 +128,7 @@ def test_many_give_what_each_gives_alone():
     [
         (dict(save=jb.HeelStrike(), engine="xla"), "only lanes do that"),
         (dict(save=jb.HeelStrike(), solver="kvaerno3"), "Kvaerno3 is not one"),
-        (dict(save=jb.MidStance(), most_arrivals=0), "most_arrivals = 0 is not allowed"),
+        (dict(save=jb.MidStance(), max_arrivals=0), "max_arrivals = 0 is not allowed"),
         (dict(save=jb.MidStance(), engine="fast"), "choose one of auto, xla, lanes"),
     ],
 )

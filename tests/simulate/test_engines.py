@@ -77,7 +77,7 @@ def test_lanes_agree_with_an_independent_solution():
 
 def test_saved_times_and_footsteps_agree():
     times = jnp.linspace(0.0, 2.5, 6)
-    options = dict(duration=2.5, steps=3, save=times, accuracy="tight")
+    options = dict(duration=2.5, footsteps=3, save=times, accuracy="tight")
     ours, theirs = (_end(jb.seed_state(), engine, **options) for engine in ("lanes", "xla"))
     assert ours.outcome == theirs.outcome == jb.Ending.WALKING
     np.testing.assert_array_equal(ours.t, theirs.t)
@@ -142,7 +142,7 @@ def test_the_motion_between_steps_is_the_independent_solutions(solver):
 
 
 def test_every_step_ends_where_the_end_alone_does():
-    options = dict(duration=3.0, steps=2)
+    options = dict(duration=3.0, footsteps=2)
     end, steps = (_end(jb.seed_state(), "lanes", save=s, **options) for s in ("end", "steps"))
     assert end.final == steps.final
     assert end.outcome == steps.outcome == jb.Ending.WALKING

@@ -21,7 +21,7 @@ ENGINES = ["lanes", pytest.param("xla", marks=pytest.mark.slow)]
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_gait_goes_on(engine):
     walk = jb.rigid_walk(
-        rigid_seed(), GAIT, steps=5, most_arrivals=6, accuracy="tight", engine=engine
+        rigid_seed(), GAIT, footsteps=5, max_arrivals=6, accuracy="tight", engine=engine
     )
     assert walk.outcome is jb.Ending.WALKING
     assert walk.engine == engine
@@ -54,7 +54,7 @@ def test_a_walker_at_rest_waits_in_vain(engine):
     walker = jb.Walker(m=1.0, J=0.01, l=0.4, d=0.3, r=0.35)
     scene = jb.RigidScene(walker=walker, ground=jb.Ground(slope=0.0))
     state = jb.dynamics.RigidState(*map(jnp.asarray, (0.0,) * 5))
-    walk = jb.rigid_walk(scene, state, steps=1, engine=engine)
+    walk = jb.rigid_walk(scene, state, footsteps=1, engine=engine)
     assert walk.outcome is jb.Ending.TIMED_OUT
     assert int(walk.footsteps) == 0
     assert float(walk.t) == pytest.approx(50.0 * np.sqrt(0.4 / 9.8), rel=1e-12)
@@ -68,7 +68,7 @@ def test_engines_agree(moves):
         GAIT.hip_x, *[leaf + d for leaf, d in zip(GAIT[1:], moves, strict=True)]
     )
     first, second = (
-        jb.rigid_walk(rigid_seed(), state, steps=2, accuracy="tight", engine=engine)
+        jb.rigid_walk(rigid_seed(), state, footsteps=2, accuracy="tight", engine=engine)
         for engine in ("lanes", "xla")
     )
     assert first.outcome is second.outcome
@@ -78,10 +78,10 @@ def test_engines_agree(moves):
 
 
 def test_error_follows_the_tolerance():
-    exact = jb.rigid_walk(rigid_seed(), GAIT, steps=4, rtol=1e-12)
+    exact = jb.rigid_walk(rigid_seed(), GAIT, footsteps=4, rtol=1e-12)
     errors = []
     for rtol in (1e-4, 1e-6, 1e-8):
-        walk = jb.rigid_walk(rigid_seed(), GAIT, steps=4, rtol=rtol)
+        walk = jb.rigid_walk(rigid_seed(), GAIT, footsteps=4, rtol=rtol)
         errors.append(float(np.abs(np.array(walk.state) - np.array(exact.state)).max()))
     assert errors[0] < 1e-4
     assert errors[1] < 1e-6
@@ -90,9 +90,9 @@ def test_error_follows_the_tolerance():
 
 
 def test_steady_footsteps_need_no_search_for_their_strikes():
-    few, many = (jb.rigid_walk(rigid_seed(), GAIT, steps=steps, rtol=1e-4) for steps in (3, 23))
+    few, many = (jb.rigid_walk(rigid_seed(), GAIT, footsteps=steps, rtol=1e-4) for steps in (3, 23))
     assert int(many.attempts - few.attempts) / 20 <= int(few.attempts) / 3 - 0.5
-    exact = jb.rigid_walk(rigid_seed(), GAIT, steps=23, rtol=1e-12)
+    exact = jb.rigid_walk(rigid_seed(), GAIT, footsteps=23, rtol=1e-12)
     assert float(many.t) == pytest.approx(float(exact.t), rel=1e-5)
     np.testing.assert_allclose(np.array(many.state[1:]), np.array(exact.state[1:]), atol=1e-4)
 
@@ -104,14 +104,18 @@ def test_batches_and_bad_lanes():
     omega = omega.at[5].set(jnp.nan)
     walk = jax.jit(
         jax.vmap(
-            lambda w: jb.rigid_walk(rigid_seed(), GAIT._replace(omega_2=w), steps=3, engine="lanes")
+            lambda w: jb.rigid_walk(
+                rigid_seed(), GAIT._replace(omega_2=w), footsteps=3, engine="lanes"
+            )
         )
     )
     many = walk(omega)
     codes = np.asarray(many.ending)
     assert codes[5] == int(jb.Ending.SOLVER_FAILED)
     assert np.all(np.delete(codes, 5) == 0)
-    alone = jb.rigid_walk(rigid_seed(), GAIT._replace(omega_2=omega[9]), steps=3, engine="lanes")
+    alone = jb.rigid_walk(
+        rigid_seed(), GAIT._replace(omega_2=omega[9]), footsteps=3, engine="lanes"
+    )
     assert float(many.t[9]) == float(alone.t)
 
 
@@ -119,15 +123,15 @@ def test_a_strike_is_found_though_the_legs_opened_just_before_the_step():
     # A long step from just behind the scuff at mid-stance, which is the course's nearer root.
     scene, start = simplest_walker(0.004), simplest_state(0.5670886075949367, -0.6)
     for rtol in (1e-4, 1e-6, 1e-9):
-        assert str(jb.rigid_walk(scene, start, steps=30, rtol=rtol).outcome) == "fell back"
+        assert str(jb.rigid_walk(scene, start, footsteps=30, rtol=rtol).outcome) == "fell back"
 
 
 def test_the_simplest_walkers_gaits_attract_and_repel():
     scene = simplest_walker(0.009)
     near = lambda published, d: simplest_state(published[0] + d, published[1])
-    settled = jb.rigid_walk(scene, near(STABLE, 1e-3), steps=60)
+    settled = jb.rigid_walk(scene, near(STABLE, 1e-3), footsteps=60)
     assert float(settled.state.theta_2) == pytest.approx(STABLE[0], abs=1e-7)
-    left = jb.rigid_walk(scene, near(UNSTABLE, 1e-6), steps=30)
+    left = jb.rigid_walk(scene, near(UNSTABLE, 1e-6), footsteps=30)
     assert abs(float(left.state.theta_2) - UNSTABLE[0]) > 1e-3
 
 
@@ -135,12 +139,12 @@ def test_the_simplest_walkers_gaits_attract_and_repel():
     ("options", "said"),
     [
         (dict(), "say how long"),
-        (dict(steps=0), "steps = 0"),
+        (dict(footsteps=0), "footsteps = 0"),
         (dict(duration=-1.0), "duration = -1"),
-        (dict(steps=1, accuracy="best"), "accuracy = 'best'"),
-        (dict(steps=1, rtol=0.0), "rtol = 0"),
-        (dict(steps=1, engine="gpu"), "engine = 'gpu'"),
-        (dict(steps=1, max_solver_steps=0), "max_solver_steps = 0"),
+        (dict(footsteps=1, accuracy="best"), "accuracy = 'best'"),
+        (dict(footsteps=1, rtol=0.0), "rtol = 0"),
+        (dict(footsteps=1, engine="gpu"), "engine = 'gpu'"),
+        (dict(footsteps=1, max_solver_steps=0), "max_solver_steps = 0"),
     ],
 )
 def test_bad_arguments(options, said):

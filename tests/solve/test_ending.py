@@ -53,12 +53,12 @@ def test_waiting_in_vain_is_not_the_cap_on_steps(engine):
         hip_z=float(jb.dynamics.standing_height(scene, jnp.asarray(0.3), 4e-4)),
     )  # fmt: skip
     options = {"save": "end", "watch": ("fall",), "engine": engine}
-    waiting = jb.simulate(scene, start, steps=1, **options)
+    waiting = jb.simulate(scene, start, footsteps=1, **options)
     assert waiting.outcome is Ending.TIMED_OUT
     assert float(waiting.t[-1]) == 100.0
-    capped = jb.simulate(scene, start, steps=1, max_solver_steps=5, **options)
+    capped = jb.simulate(scene, start, footsteps=1, max_solver_steps=5, **options)
     assert capped.outcome is Ending.OUT_OF_STEPS
-    bounded = jb.simulate(scene, start, steps=1, duration=1.0, **options)
+    bounded = jb.simulate(scene, start, footsteps=1, duration=1.0, **options)
     assert bounded.outcome is Ending.WALKING
 
 

@@ -1,4 +1,4 @@
-"""A fence changes what the compiler sees and nothing else."""
+"""A fusion barrier changes what the compiler sees and nothing else."""
 
 import jax
 import jax.numpy as jnp

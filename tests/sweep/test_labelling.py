@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.sweep._labelling_by_xla import label_by_xla
+from jaxbiped.compiler import XLA
 from tests.basins.truth import rigid_fate, seed_fate
 from tests.rigid_walkers import FIRST_DOUBLING, STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, rows, same, simplest_grid, stacked
@@ -186,7 +186,7 @@ def test_a_lone_start_is_labelled_as_in_any_batch(seed, simplest, monkeypatch):
 
 
 def test_both_engines_give_the_same_labels(simplest, monkeypatch):
-    monkeypatch.setattr(label_by_xla, "__kwdefaults__", {"slots": 24})
+    monkeypatch.setattr(XLA, "slots", 24)
     effort = simplest.effort._replace(engine="xla")
     # More starts than slots, so that slots are filled anew.
     states = simplest_grid(simplest.scene, 7).batch(simplest, 0, 49).states

@@ -23,7 +23,7 @@ def _fails(labelling, points):
     """By a plain walk of thirty footsteps, without any labelling."""
     walks = [
         jb.rigid_walk(
-            labelling.scene, jb.dynamics.RigidState(0.0, *point), steps=30, accuracy="balanced"
+            labelling.scene, jb.dynamics.RigidState(0.0, *point), footsteps=30, accuracy="balanced"
         )
         for point in points
     ]

@@ -1,4 +1,4 @@
-"""A gait whose contact force jumps at touchdown: its derivatives leap there."""
+"""A gait whose contact force jumps at touchdown: its derivatives jump there."""
 
 import dataclasses
 

@@ -1,4 +1,8 @@
-"""Lane kernel: the loop that keeps every lane busy, as LLVM's text."""
+"""Lane kernel: the loop that keeps every lane busy, as LLVM's text.
+
+A lane whose simulation is over takes the next one at once, so that a long simulation does not hold
+up its neighbours.
+"""
 
 from collections.abc import Iterable
 

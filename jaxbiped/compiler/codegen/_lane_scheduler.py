@@ -17,16 +17,16 @@ FIELDS = (
     "record_room",
     "schedule",
     "schedule_length",
-    "tapes",
-    "tape_lengths",
-    "tape_stride",
+    "streams",
+    "stream_lengths",
+    "stream_stride",
 )
 """What a kernel's entry takes: 64-bit numbers one behind the other, addresses among them."""
-_NUMBERS = ("count", "record_room", "schedule_length", "tape_stride")
+_NUMBERS = ("count", "record_room", "schedule_length", "stream_stride")
 
 
 class Sizes(NamedTuple):
-    """How many numbers a simulation takes, gives, has in a record, and in a row of its tape."""
+    """How many numbers a simulation takes, gives, has in a record, and in a row of its stream."""
 
     inputs: int
     outputs: int
@@ -35,7 +35,7 @@ class Sizes(NamedTuple):
 
 
 class Rooms(NamedTuple):
-    """Where in memory the lanes' inputs, outputs, records, rows of the tape and next times are."""
+    """Where in memory the lanes' inputs, outputs, records, stream rows and next times are."""
 
     taken: str
     given: str
@@ -123,21 +123,23 @@ class LaneScheduler:
         t.begin(after)
 
     def read(self, lane: str) -> None:
-        """A lane reads the next row of its tape, behind the last one that one again."""
+        """A lane reads the next row of its stream, behind the last one that one again."""
         t = self.text
         at = t.address(self.bits["rows"], Kind.I64, lane)
         place = t.assign(f"load i64, ptr {at}")
         index = t.assign(f"load i64, ptr {t.address(self.bits['index'], Kind.I64, lane)}")
-        first = t.assign(f"load i64, ptr {t.address(self.field['tapes'], Kind.I64, index)}")
+        first = t.assign(f"load i64, ptr {t.address(self.field['streams'], Kind.I64, index)}")
         first = t.assign(f"inttoptr i64 {first} to ptr")
-        row = t.assign(f"mul i64 {place}, {self.field['tape_stride']}")
+        row = t.assign(f"mul i64 {place}, {self.field['stream_stride']}")
         for k in range(self.sizes.row):
             there = t.address(first, Kind.F64, t.assign(f"add i64 {row}, {k}"))
             number = t.assign(f"load double, ptr {there}")
             here = t.assign(f"add i64 {lane}, {k * self.width}")
             t.line(f"store double {number}, ptr {t.address(self.rooms.row, Kind.F64, here)}")
         following = t.assign(f"add i64 {place}, 1")
-        length = t.assign(f"load i64, ptr {t.address(self.field['tape_lengths'], Kind.I64, index)}")
+        length = t.assign(
+            f"load i64, ptr {t.address(self.field['stream_lengths'], Kind.I64, index)}"
+        )
         more = t.assign(f"icmp slt i64 {following}, {length}")
         t.line(f"store i64 {t.assign(f'select i1 {more}, i64 {following}, i64 {place}')}, ptr {at}")
 

@@ -202,8 +202,8 @@ def _quarter_turns(m: Arithmetic, x: Value) -> tuple[Value, Value, Value]:
     half = m.mul(z, 0.5)
     near = m.sub(1.0, half)
     lost = m.sub(m.sub(1.0, near), half)
-    bend = m.fma(m.mul(z, z), m.series(z, _COSINE), lost)
-    cosine = m.add(near, m.fma(m.neg(rest), low, bend))
+    curved = m.fma(m.mul(z, z), m.series(z, _COSINE), lost)
+    cosine = m.add(near, m.fma(m.neg(rest), low, curved))
     sine = m.add(rest, m.fma(low, near, cubed))
     return m.truncated(q), sine, cosine
 

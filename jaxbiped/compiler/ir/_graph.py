@@ -220,19 +220,21 @@ def _fold_float(
 def _strip_signs(block: Block, op: str, args: tuple[Any, ...]) -> Value | None:
     """Changes of sign moved out of an operation, where a sum or difference absorbs them."""
     a, b = args
-    turned = [value.op == "fneg" for value in args]
-    x, y = (value.args[0] if turn else value for value, turn in zip(args, turned, strict=True))
-    if not any(turned):
+    negated = [value.op == "fneg" for value in args]
+    x, y = (
+        value.args[0] if negative else value for value, negative in zip(args, negated, strict=True)
+    )
+    if not any(negated):
         return None
     if op in ("fmul", "fdiv"):
         found = block.add(op, x, y)
-        return found if all(turned) else block.add("fneg", found)
+        return found if all(negated) else block.add("fneg", found)
     if op == "fadd":
-        if all(turned):
+        if all(negated):
             return block.add("fneg", block.add("fadd", x, y))
-        return block.add("fsub", b, x) if turned[0] else block.add("fsub", a, y)
-    if turned[1]:
-        return block.add("fsub", y, x) if turned[0] else block.add("fadd", a, y)
+        return block.add("fsub", b, x) if negated[0] else block.add("fsub", a, y)
+    if negated[1]:
+        return block.add("fsub", y, x) if negated[0] else block.add("fadd", a, y)
     return block.add("fneg", block.add("fadd", x, b))
 
 

@@ -1,4 +1,7 @@
-"""Lowering of a jaxpr of small static shapes to a graph of scalar operations."""
+"""Lowering of a jaxpr of small static shapes to a graph of scalar operations.
+
+Arrays disappear here: each entry becomes a value of its own, which a lane can keep in a register.
+"""
 
 from collections.abc import Sequence
 from typing import Any

@@ -23,7 +23,7 @@ _PASSED_ON = ("copy", "copy_p", "convert_element_type", "optimization_barrier", 
 
 
 def jacobian(function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]) -> Scalar:
-    """Derivatives of every output by every input, shape (outputs, inputs)."""
+    """Derivatives of every output with respect to every input, shape (outputs, inputs)."""
     inputs = list(inputs)
     outputs, pushed = jax.linearize(function, inputs)
     try:
@@ -97,8 +97,8 @@ class _Graph:
         heapq.heapify(queue)
         left = set(inner)
         while queue:
-            cost, turned = heapq.heappop(queue)
-            v = -turned
+            cost, negative = heapq.heappop(queue)
+            v = -negative
             if v not in left:
                 continue
             if cost != self._cost(v):  # it was lower or higher when that was pushed

@@ -72,7 +72,7 @@ class CompiledProgram:
 
     @property
     def backwards(self) -> bool:
-        """Whether it reads tapes from the last row on."""
+        """Whether it reads streams from the last row on."""
         return self._program.backwards
 
     @functools.cached_property
@@ -157,7 +157,7 @@ class CompiledProgram:
         inputs: PyTree,
         *,
         schedule: np.ndarray | None = None,
-        tape: Sequence[np.ndarray] | None = None,
+        stream: Sequence[np.ndarray] | None = None,
         room: int = 0,
         threads: int | None = None,
         width: int | None = None,
@@ -168,7 +168,7 @@ class CompiledProgram:
         Args:
             inputs: of all simulations; 64-bit floating-point numbers, whatever they stand for.
             schedule: increasing times of the records, shape (m,), where the program has such.
-            tape: rows for each simulation, n arrays (rows, numbers), where the program reads such;
+            stream: rows for each simulation, n arrays (rows, numbers), if the program reads any;
                 from the last one on where it reads `backwards`.
             room: records that each simulation has room for.
             threads: how many to use; the environment's or the machine's choice unless given.
@@ -188,7 +188,7 @@ class CompiledProgram:
         found, recorded = self.run_table(
             table,
             schedule=schedule,
-            tape=tape,
+            stream=stream,
             room=room,
             threads=threads,
             width=width,
@@ -201,7 +201,7 @@ class CompiledProgram:
         table: np.ndarray,
         *,
         schedule: np.ndarray | None = None,
-        tape: Sequence[np.ndarray] | None = None,
+        stream: Sequence[np.ndarray] | None = None,
         room: int = 0,
         memory: BufferPool | None = None,
         threads: int | None = None,
@@ -216,7 +216,7 @@ class CompiledProgram:
         count = table.shape[1]
         outputs = np.full((len(self.graph.outputs), count), np.nan)
         times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
-        tapes = input_streams_of(tape, count, len(self.graph.row), backwards=self.backwards)
+        streams = input_streams_of(stream, count, len(self.graph.row), backwards=self.backwards)
         shape = (count, room, len(self.graph.recorded))
         records = np.zeros(shape) if memory is None else memory.array(shape)
         if schedule is not None:
@@ -232,11 +232,11 @@ class CompiledProgram:
             records=records,
             record_counts=record_counts,
             schedule=times,
-            tapes=tapes.starts,
-            tape_lengths=tapes.lengths,
+            streams=streams.starts,
+            stream_lengths=streams.lengths,
         )
         numbers = dict(
-            count=count, record_room=room, schedule_length=len(times), tape_stride=tapes.stride
+            count=count, record_room=room, schedule_length=len(times), stream_stride=streams.stride
         )
         fields = np.array(
             [arrays[n].ctypes.data if n in arrays else numbers[n] for n in FIELDS], dtype=np.int64
@@ -246,7 +246,7 @@ class CompiledProgram:
             entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(code.address)
             # What a thread runs and where it writes lives as long as the thread, even where a
             # second interrupt leaves it behind.
-            used = code, fields, arrays, tapes
+            used = code, fields, arrays, streams
 
             def work(_: Any = used) -> None:
                 entry(fields.ctypes.data)

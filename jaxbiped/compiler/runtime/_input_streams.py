@@ -23,22 +23,24 @@ class InputStreams(NamedTuple):
 
 
 def input_streams_of(
-    tape: Sequence[np.ndarray] | None, count: int, numbers: int, *, backwards: bool
+    stream: Sequence[np.ndarray] | None, count: int, numbers: int, *, backwards: bool
 ) -> InputStreams:
     """Of `count` simulations that read rows of so many numbers, of none where these are 0.
 
     Raises:
         ValueError: another number of arrays, or one without rows or with rows of another length.
     """
-    rows = [np.ascontiguousarray(each, dtype=np.float64) for each in ([] if tape is None else tape)]
+    rows = [
+        np.ascontiguousarray(each, dtype=np.float64) for each in ([] if stream is None else stream)
+    ]
     wanted = count if numbers else 0
     if len(rows) != wanted:
-        raise ValueError(f"tape has {len(rows)} arrays of rows: it must have {wanted}.")
+        raise ValueError(f"stream has {len(rows)} arrays of rows: it must have {wanted}.")
     for each in rows:
         # Machine code reads the rows unchecked.
         if each.ndim != 2 or len(each) == 0 or each.shape[1] != numbers:
             raise ValueError(
-                f"tape holds an array of shape {each.shape}: it must be (rows, {numbers}), "
+                f"stream holds an array of shape {each.shape}: it must be (rows, {numbers}), "
                 "with at least one row."
             )
     lengths = np.array([len(each) for each in rows], dtype=np.int64)

@@ -30,8 +30,8 @@ class _Part(enum.Enum):
     """Which part of what simulations give is wanted."""
 
     ALL = "outputs and records"
-    OUTPUTS = "outputs, while records are held back"
-    COLUMNS = "records that were held back"
+    OUTPUTS = "outputs, while records are kept on the host"
+    COLUMNS = "records that were kept on the host"
 
 
 @contextlib.contextmanager
@@ -80,22 +80,22 @@ def call(
     inputs: PyTree,
     schedule: Schedule | None = None,
     *,
-    tape: Any = None,
+    stream: Any = None,
     room: int = 0,
     quick: bool = False,
 ) -> tuple[PyTree, Recorded | None]:
     """Runs one simulation, or under `vmap` many at once, each in a lane.
 
-    There is room for `room` records, or for one at each time of a schedule. A `tape`, shape
+    There is room for `room` records, or for one at each time of a schedule. A `stream`, shape
     (rows, numbers) or the `Recording` of another simulation, is for programs that read one.
 
     It has no derivative of its own. Outside of `jit` it runs at once and an
     interrupt ends it; inside, it is called back from the compiled program, and an interrupt waits.
     A single simulation that is `quick` is over before a user could interrupt, and needs no thread.
     """
-    recorder, rows = None, [] if tape is None else [tape]
-    if isinstance(tape, Recording):
-        recorder, rows = tape.recorder, [tape.numbers]
+    recorder, rows = None, [] if stream is None else [stream]
+    if isinstance(stream, Recording):
+        recorder, rows = stream.recorder, [stream.numbers]
     params = _params(compiled, schedule=schedule, room=room, quick=quick, recorder=recorder)
     table, *rest = _bind([_numbers(inputs), *rows], params)
     return _outputs(compiled, table), Recorded(*rest) if rest else None
@@ -107,13 +107,13 @@ def call_recording(
     *,
     room: int,
     quick: bool,
-    tape: Recording | None = None,
+    stream: Recording | None = None,
     once: bool = False,
 ) -> tuple[PyTree, Recording]:
     """`call`, but the records stay on the host; not for longer where they are read but `once`."""
-    reads = None if tape is None else tape.recorder
+    reads = None if stream is None else stream.recorder
     recorder = Recorder(compiled, room, quick, once, reads)
-    numbers = _numbers(inputs if tape is None else (inputs, tape.numbers))
+    numbers = _numbers(inputs if stream is None else (inputs, stream.numbers))
     (table,) = _bind([numbers], _params(compiled, recorder=recorder, wants=_Part.OUTPUTS))
     return _outputs(compiled, table), Recording(numbers, recorder)
 
@@ -163,7 +163,7 @@ def _outputs(compiled: CompiledProgram, table: Any) -> PyTree:
 
 def _run(
     numbers: Any,
-    tape: Any = None,
+    stream: Any = None,
     *,
     compiled: CompiledProgram,
     schedule: Schedule | None,
@@ -172,12 +172,12 @@ def _run(
     wants: _Part,
     recorder: Recorder | None,
 ) -> list[np.ndarray]:
-    """Of inputs (n, k) and their tapes: outputs (n, o), and what was recorded."""
+    """Of inputs (n, k) and their streams: outputs (n, o), and what was recorded."""
     given = np.asarray(numbers)
     if recorder is not None and wants is _Part.OUTPUTS:
         return [recorder.outputs(given).T]
     if recorder is not None and wants is _Part.COLUMNS:
-        return recorder.columns(given, np.asarray(tape))
+        return recorder.columns(given, np.asarray(stream))
     times = None if schedule is None else schedule.times
     alone = quick and len(given) == 1
     width = compiled.width(len(given), default_threads())
@@ -186,7 +186,7 @@ def _run(
         outputs, recorded = compiled.run_table(
             given[part].T,
             schedule=times,
-            tape=rows,
+            stream=rows,
             room=room if times is None else len(times),
             quick=alone,
             width=width,
@@ -194,9 +194,9 @@ def _run(
         return [outputs.T, *(recorded or ())]
 
     if recorder is None:
-        return run(slice(None), None if tape is None else list(np.asarray(tape)))
+        return run(slice(None), None if stream is None else list(np.asarray(stream)))
     parts = [slice(k, k + BLOCK) for k in range(0, max(1, len(given)), BLOCK)]
-    found = [run(part, recorder.rows(np.asarray(tape)[part])) for part in parts]
+    found = [run(part, recorder.rows(np.asarray(stream)[part])) for part in parts]
     return [np.concatenate(each) for each in zip(*found, strict=True)]
 
 

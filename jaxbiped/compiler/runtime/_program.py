@@ -25,9 +25,9 @@ class Program(NamedTuple):
         start: what is carried at first, `start(inputs)`.
         attempt: one attempted step, `attempt(inputs, carried)`, gives what is then carried and
             whether the simulation is over (boolean).
-        tape: numbers in each row of a tape, of which every attempt reads the next row as a third
-            argument, shape (tape,); behind the last row that one again. 0: there is none.
-        backwards: whether a tape is read from its last row on.
+        stream: numbers in each row of an input stream, of which every attempt reads the next row
+            as a third argument, shape (stream,); behind the last row that one again. 0: none.
+        backwards: whether a stream is read from its last row on.
         finish: outputs, `finish(inputs, carried)`.
         record: `record(inputs, carried, next_time)` gives whether there is something to record
             (boolean) and what, a list of numbers. It is asked until it has nothing more where
@@ -40,7 +40,7 @@ class Program(NamedTuple):
     finish: Callable[[PyTree, PyTree], PyTree]
     record: Callable[[PyTree, PyTree, Scalar], tuple[Scalar, Sequence[Scalar]]] | None = None
     scheduled: bool = False
-    tape: int = 0
+    stream: int = 0
     backwards: bool = False
 
 
@@ -64,7 +64,7 @@ class Graph(NamedTuple):
         begin, body, end, notes: blocks of `start`, `attempt`, `finish` and `record`.
         inputs: what is read, `carried` what is carried, one array for each leaf.
         first: what is carried at first; `following` after an attempt.
-        row: of the tape.
+        row: of the stream.
         done: whether the simulation is over.
         outputs: 64-bit floating-point numbers, all; `constants` those that are always the same, by
             their places, which `outputs` leaves out.
@@ -119,8 +119,8 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
     shapes: tuple[Any, ...] = (inputs, carried_shape)
     arguments = [*given, *carried]
     row: list[Value] = []
-    if program.tape:
-        shape = jax.ShapeDtypeStruct((program.tape,), jnp.float64)
+    if program.stream:
+        shape = jax.ShapeDtypeStruct((program.stream,), jnp.float64)
         shapes, arguments = (*shapes, shape), [*arguments, inputs_of(body, shape)]
         row = list(arguments[-1])
     following = lower_function(body, program.attempt, shapes, arguments)

@@ -18,7 +18,7 @@ register_bytes("buffers for records", _BUFFERS)
 
 
 class Recorder(NamedTuple):
-    """How simulations were run whose records are held back. Hashable.
+    """How simulations were run whose records are kept on the host. Hashable.
 
     Their numbers are their own inputs and behind them the numbers of what they read.
 
@@ -26,7 +26,7 @@ class Recorder(NamedTuple):
         compiled: the program; `room` for how many records, at most one for each row that it reads.
         quick: see `call`.
         once: whether its records are read only once.
-        reads: what recorded its tape, if it reads one.
+        reads: what recorded its stream, if it reads one.
     """
 
     compiled: CompiledProgram
@@ -62,7 +62,7 @@ class Recorder(NamedTuple):
                 room = min(room, max(len(each) for each in rows))
             alone = self.quick and table.shape[1] == 1
             found, recorded = self.compiled.run_table(
-                own, tape=rows, room=room, memory=_BUFFERS, quick=alone, width=width
+                own, stream=rows, room=room, memory=_BUFFERS, quick=alone, width=width
             )
             assert recorded is not None
             return found, *recorded

@@ -14,10 +14,14 @@ class AbstractNormalLaw(eqx.Module):
     """Normal force of the ground on a foot as a function of penetration and its rate.
 
     Attributes:
+        name: what `NORMAL_LAWS` and the command line call it; None for a law that is not among
+            them. One that is has a classmethod `like_seed(seed, standing)`, which makes the law
+            that resembles the seed's `RistowSchafer`. A property of the class.
         jumps_at_touchdown: whether the force itself, not its derivatives alone, jumps where a
             foot that comes down begins to touch. A property of the class.
     """
 
+    name: ClassVar[str | None] = None
     jumps_at_touchdown: ClassVar[bool] = False
 
     def __check_init__(self) -> None:
@@ -51,11 +55,15 @@ class AbstractFrictionLaw(eqx.Module):
     """Tangential force of the ground on a foot as a function of normal force and slip speed.
 
     Attributes:
+        name: what `FRICTION_LAWS` and the command line call it; None for a law that is not among
+            them. One that is has a classmethod `like_seed(seed)`, which makes the law that
+            resembles the seed's `BengisuAkay`. A property of the class.
         builds_up_over: name of the parameter that is the slip speed [m/s] over which the force
             builds up from rest, which steps must resolve; None for a law without one. A property
             of the class.
     """
 
+    name: ClassVar[str | None] = None
     builds_up_over: ClassVar[str | None] = None
 
     def __check_init__(self) -> None:
@@ -67,7 +75,7 @@ class AbstractFrictionLaw(eqx.Module):
 
     @abc.abstractmethod
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
-        """Functions whose zeros are where a first or second derivative by the slip speed jumps."""
+        """Functions whose zeros are where a first or second derivative in the slip speed jumps."""
 
 
 def power(base: Scalar, exponent: Scalar | float) -> Scalar:

@@ -62,6 +62,11 @@ class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
     """Dense output of a Rosenbrock step.
 
     With θ = (t − t0)/(t1 − t0): y = (1 − θ) y0 + θ (y1 + (1 − θ)(k_1 + θ (k_2 + θ k_3 …))).
+
+    Attributes:
+        t0, t1: ends of the step [s].
+        y0, y1: the solution there.
+        coefficients: k_1, k_2, … of the polynomial, each shaped as the solution.
     """
 
     t0: Any  # type: ignore[misc]
@@ -93,6 +98,10 @@ class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):
     Works on any pytree of real arrays. Where the leaves are scalars, entries of the Jacobian
     that are zero by structure are left out, and a second-order system is reduced to the size of
     its velocities. A subclass only declares its tableau and order.
+
+    Attributes:
+        tableau: the method's coefficients.
+        term_structure, interpolation_cls: as diffrax asks of its solvers.
     """
 
     tableau: AbstractClassVar[RosenbrockTableau]
@@ -233,7 +242,7 @@ def stages_of(
     def picked(components: Components) -> Components:
         return [components[i] for i in kept]
 
-    slope, drift, jacobian = fusion_barrier(
+    slope, f_t, jacobian = fusion_barrier(
         moves,
         lambda: (picked(lin.evaluate(t, start)), picked(lin.time_derivative()), lin.jacobian()),
     )
@@ -260,7 +269,7 @@ def stages_of(
             right = _plus(right, extra)
         weight = step * (tableau.gammas[i] * span)
         if tableau.gammas[i]:
-            right = [r if d is None else r + weight * d for r, d in zip(right, drift, strict=True)]
+            right = [r if d is None else r + weight * d for r, d in zip(right, f_t, strict=True)]
         kept_rate = rate if _repeats(tableau, i + 1) else None
         return lin.solve_kept(factors, jacobian, step, right, stages.direct_right(i)), kept_rate
 

@@ -1,4 +1,7 @@
-"""Sparsity of a Jacobian, read off a function's own program."""
+"""Sparsity of a Jacobian, read off a function's own program.
+
+Entries that are zero by structure are left out of the elimination.
+"""
 
 from typing import Any, NamedTuple
 

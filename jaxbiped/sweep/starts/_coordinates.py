@@ -35,14 +35,33 @@ START_QUANTITIES = {name: _QUANTITIES.get(name) or STATE_QUANTITIES[name] for na
 
 
 def coordinate_names(scene: Scene | RigidScene) -> tuple[str, ...]:
-    """All coordinates that starts of a scene can differ in."""
+    """All coordinates that starts of a scene can differ in.
+
+    Args:
+        scene: the walker, compliant or rigid.
+
+    Returns:
+        Names of the state's coordinates, leg 2 standing, and then of the scene's parameters.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> jb.starts.coordinate_names(jb.seed_scene())[:2]
+        ('theta_stance', 'theta_swing')
+    """
     leaves = state_type(scene)._fields
     own = [name for name, leaf in COORDINATES.items() if leaf in leaves]
     return (*own, *parameter_names(scene))
 
 
 def coordinate_quantities(scene: Scene | RigidScene) -> dict[str, Quantity]:
-    """What each coordinate that starts of a scene can differ in is, with its unit, by name."""
+    """What each coordinate that starts of a scene can differ in is, with its unit, by name.
+
+    Args:
+        scene: the walker, compliant or rigid.
+
+    Returns:
+        A `Quantity` (words, symbol and SI unit) by each name.
+    """
     known = START_QUANTITIES | parameter_quantities(scene)
     return {name: known[name] for name in coordinate_names(scene)}
 

@@ -178,8 +178,17 @@ def grid(
         follow: a function of (scene, states), leaves (n,), that completes the starts in another
             way, after all else. For workers in other processes it must be a module's own.
 
+    Returns:
+        The starts, of the shape that the axes span; none is computed before it is labelled.
+
     Raises:
         ArgumentError: an unknown coordinate, an empty axis, a value that is not finite.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> axes = {"theta_stance": [0.10, 0.15, 0.20], "omega_stance": [-1.4, -1.2]}
+        >>> jb.starts.grid(jb.seed_scene(), axes).size
+        6
     """
     check_coordinates(scene, values)
     if not values:
@@ -211,6 +220,17 @@ def sample(
 
     A start is the same whichever chunk it is made in. "latin-hypercube" draws all of them for each
     chunk; the other methods only the chunk's.
+
+    Args:
+        scene: the walker.
+        bounds: lower and upper bound of each coordinate (see `coordinate_names`), in its SI unit.
+        count: how many starts.
+        method: one of `SAMPLINGS`.
+        seed: of the random numbers.
+        place, follow: as in `grid`.
+
+    Returns:
+        The starts, of shape (count,); none is computed before it is labelled.
 
     Raises:
         ArgumentError: an unknown coordinate or method, bounds that enclose nothing, no starts.

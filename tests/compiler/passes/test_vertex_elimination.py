@@ -64,7 +64,7 @@ def test_only_arrays_are_pulled_back(monkeypatch):
 
 
 def test_the_walker_in_fewer_operations_than_by_reverse_mode():
-    """The kept rates by state and parameters: that is what a step's derivatives are made of."""
+    """The kept rates in state and parameters: of their derivatives those of a step are made."""
     leaves, structure = jax.tree.flatten(jb.seed_scene())
     numbers = [jnp.asarray(x) for x in (*jb.seed_state(), *leaves)]
 

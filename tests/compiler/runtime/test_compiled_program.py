@@ -17,6 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
+from jaxbiped.compiler import LANES
 from jaxbiped.compiler.runtime import _compiled_program, _threads
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._host_cpu import host
@@ -25,7 +26,7 @@ from jaxbiped.compiler.runtime._threads import default_threads
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._units import units_of
-from jaxbiped.variational._differentiable_solve import Setting, compiled_solve
+from jaxbiped.variational._differentiable_solve import Setting, request_of
 
 SCENE = jb.seed_scene()
 SEED = np.array([float(leaf) for leaf in jb.seed_state()])
@@ -34,7 +35,8 @@ WATCH = ("fall", "stop", "stumble")
 
 def _program():
     setting = Setting(jb.solvers.Rodas4(), WATCH, counting=False, quick=True)
-    return compiled_solve(setting, jtu.tree_structure(SCENE))
+    one = jtu.tree_map(lambda leaf: leaf[0], _inputs([SEED]))
+    return LANES.compile(request_of(one, setting))
 
 
 def _inputs(starts, duration=0.3, most=20000.0, scene=SCENE):
@@ -53,7 +55,7 @@ def _inputs(starts, duration=0.3, most=20000.0, scene=SCENE):
         units=jtu.tree_map(each, units_of(SCENE, jb.seed_state())),
         footsteps=each(0),
         patience=each(0),
-        most_attempts=each(most),
+        max_attempts=each(most),
     )
 
 
@@ -89,7 +91,7 @@ def test_arrays_of_any_layout_and_dtype():
     inputs = _inputs(_perturbed(5))
     odd = inputs._replace(
         state=jb.State(*[starts[:, i] for i in range(8)]),
-        most_attempts=np.full(5, 20000, dtype=np.int16),
+        max_attempts=np.full(5, 20000, dtype=np.int16),
         scene=jtu.tree_map(lambda leaf: np.broadcast_to(leaf[0], (5,)), inputs.scene),
     )
     _same(_program().run(odd).outputs, _program().run(inputs).outputs)

@@ -1,4 +1,4 @@
-"""Programs that read a tape, a row at each attempt."""
+"""Programs that read a stream, a row at each attempt."""
 
 import jax
 import jax.numpy as jnp
@@ -24,58 +24,58 @@ def _summing():
         return (total + weight * (row[0] + 2.0 * row[1]), count), count >= steps
 
     number = jax.ShapeDtypeStruct((), jnp.float64)
-    return CompiledProgram(Program(start, attempt, lambda _, c: c, tape=2), (number, number))
+    return CompiledProgram(Program(start, attempt, lambda _, c: c, stream=2), (number, number))
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 19])
 def test_every_simulation_reads_its_own_rows(count):
     random = np.random.default_rng(count)
-    tape = random.standard_normal((count, 7, 2))
+    stream = random.standard_normal((count, 7, 2))
     weight, steps = random.standard_normal(count), 1.0 + np.arange(count) % 7
     for width in (1, host().width):
-        total, read = _summing().run((weight, steps), tape=tape, width=width).outputs
+        total, read = _summing().run((weight, steps), stream=stream, width=width).outputs
         rows = np.arange(7) < steps[:, None]
-        expected = weight * np.sum((tape[..., 0] + 2.0 * tape[..., 1]) * rows, axis=1)
+        expected = weight * np.sum((stream[..., 0] + 2.0 * stream[..., 1]) * rows, axis=1)
         np.testing.assert_allclose(total, expected, rtol=1e-12, atol=1e-14)
         np.testing.assert_array_equal(read, steps)
 
 
 def test_behind_the_last_row_comes_that_row_again():
-    total, _ = _summing().run((np.ones(1), np.full(1, 5.0)), tape=np.ones((1, 2, 2))).outputs
+    total, _ = _summing().run((np.ones(1), np.full(1, 5.0)), stream=np.ones((1, 2, 2))).outputs
     assert total[0] == 15.0
 
 
-def test_tapes_under_jit_and_vmap():
+def test_streams_under_jit_and_vmap():
     program = _summing()
-    tapes = jnp.arange(24.0).reshape(4, 3, 2)
+    streams = jnp.arange(24.0).reshape(4, 3, 2)
 
-    def one(tape, weight):
-        return call(program, (weight, jnp.asarray(3.0)), tape=tape)[0][0]
+    def one(stream, weight):
+        return call(program, (weight, jnp.asarray(3.0)), stream=stream)[0][0]
 
-    together = jax.jit(jax.vmap(one, in_axes=(0, None)))(tapes, jnp.asarray(2.0))
-    np.testing.assert_array_equal(together, [one(tape, jnp.asarray(2.0)) for tape in tapes])
+    together = jax.jit(jax.vmap(one, in_axes=(0, None)))(streams, jnp.asarray(2.0))
+    np.testing.assert_array_equal(together, [one(stream, jnp.asarray(2.0)) for stream in streams])
 
 
 @pytest.mark.parametrize(
-    ("tape", "said"),
+    ("stream", "said"),
     [
-        (np.ones((1, 3, 2)), "tape has 1 arrays of rows: it must have 2."),
-        (None, "tape has 0 arrays of rows: it must have 2."),
-        (np.ones((2, 3, 1)), r"tape holds an array of shape \(3, 1\): it must be \(rows, 2\)"),
+        (np.ones((1, 3, 2)), "stream has 1 arrays of rows: it must have 2."),
+        (None, "stream has 0 arrays of rows: it must have 2."),
+        (np.ones((2, 3, 1)), r"stream holds an array of shape \(3, 1\): it must be \(rows, 2\)"),
         (np.ones((2, 0, 2)), r"shape \(0, 2\).* with at least one row"),
         (np.ones((2, 2)), r"shape \(2,\)"),
     ],
 )
-def test_a_tape_of_another_size_is_refused(tape, said):
+def test_a_stream_of_another_size_is_refused(stream, said):
     """By an error that `python -O` keeps: the machine code would read what is not there."""
     with pytest.raises(ValueError, match=said):
-        _summing().run((np.ones(2), np.ones(2)), tape=tape)
+        _summing().run((np.ones(2), np.ones(2)), stream=stream)
 
 
-def test_a_tape_can_be_read_backwards():
+def test_a_stream_can_be_read_backwards():
     program = _summing()._program._replace(backwards=True)
     number = jax.ShapeDtypeStruct((), jnp.float64)
     backwards = CompiledProgram(program, (number, number))
-    tape = [np.arange(6.0).reshape(3, 2), np.arange(4.0).reshape(2, 2)]
-    total, _ = backwards.run((np.ones(2), np.ones(2)), tape=tape).outputs
+    stream = [np.arange(6.0).reshape(3, 2), np.arange(4.0).reshape(2, 2)]
+    total, _ = backwards.run((np.ones(2), np.ones(2)), stream=stream).outputs
     np.testing.assert_array_equal(total, [4.0 + 10.0, 2.0 + 6.0])

@@ -1,4 +1,4 @@
-"""Records that stay on the host: asked for later, or read by another program as its tape."""
+"""Records that stay on the host: asked for later, or read by another program as its stream."""
 
 import jax
 import jax.numpy as jnp
@@ -42,7 +42,7 @@ def _doubled():
 
     start = lambda steps: (jnp.zeros(()), jnp.zeros(()))
     return CompiledProgram(
-        Program(start, attempt, lambda _, c: c[1], record=record, tape=2), NUMBER
+        Program(start, attempt, lambda _, c: c[1], record=record, stream=2), NUMBER
     )
 
 
@@ -54,7 +54,7 @@ def _last_sum(*, backwards=False):
         return (total + row[1], count + 1.0), count + 1.0 >= steps
 
     start = lambda steps: (jnp.zeros(()), jnp.zeros(()))
-    program = Program(start, attempt, lambda _, c: c[0], tape=2, backwards=backwards)
+    program = Program(start, attempt, lambda _, c: c[0], stream=2, backwards=backwards)
     return CompiledProgram(program, NUMBER)
 
 
@@ -101,12 +101,12 @@ def test_what_is_no_longer_held_is_run_again(powers, runs, monkeypatch):
     assert runs == [1, 1]
 
 
-def test_a_recording_is_another_programs_tape(powers, runs):
+def test_a_recording_is_another_programs_stream(powers, runs):
     reader = _last_sum()
 
     def both(factor, steps):
         _, recording = _recording(powers, factor, steps)
-        total, _ = call(reader, steps, tape=recording)
+        total, _ = call(reader, steps, stream=recording)
         return total, recording.columns(jnp.zeros(2))[1]
 
     factors, steps = jnp.array([2.0, 3.0, 0.5]), jnp.array([3.0, 1.0, 5.0])
@@ -121,7 +121,7 @@ def test_what_is_read_but_once_is_then_no_longer_held(powers, runs):
     given = (jnp.asarray(0.25), jnp.asarray(2.0))
     _, recording = call_recording(powers, given, room=ROOM, quick=True, once=True)
     reader = _last_sum()
-    sums = [float(call(reader, jnp.asarray(2.0), tape=recording)[0]) for _ in range(3)]
+    sums = [float(call(reader, jnp.asarray(2.0), stream=recording)[0]) for _ in range(3)]
     assert sums == [0.3125] * 3
     assert runs == [1, 1, 1]
 
@@ -131,7 +131,7 @@ def test_a_recording_can_be_read_backwards(powers):
 
     def last_two(factor, steps):
         _, recording = _recording(powers, factor, steps)
-        return call(reader, jnp.asarray(2.0), tape=recording)[0]
+        return call(reader, jnp.asarray(2.0), stream=recording)[0]
 
     factors, steps = jnp.array([2.0, 3.0, 0.5]), jnp.array([3.0, 4.0, 5.0])
     sums = jax.jit(jax.vmap(last_two))(factors, steps)
@@ -145,8 +145,8 @@ def test_what_reads_a_recording_may_record_as_well(powers, monkeypatch, most):
 
     def total(factor, steps):
         _, recording = _recording(powers, factor, steps)
-        count, twice = call_recording(doubled, steps, room=ROOM, quick=True, tape=recording)
-        return count, call(reader, steps, tape=twice)[0], twice.columns(jnp.zeros(1))[0]
+        count, twice = call_recording(doubled, steps, room=ROOM, quick=True, stream=recording)
+        return count, call(reader, steps, stream=twice)[0], twice.columns(jnp.zeros(1))[0]
 
     factors, steps = jnp.array([2.0, 3.0]), jnp.array([3.0, 2.0])
     counts, sums, numbers = jax.jit(jax.vmap(total))(factors, steps)
@@ -160,7 +160,7 @@ def test_more_than_are_run_at_once(powers):
 
     def total(factor):
         _, recording = _recording(powers, factor, jnp.asarray(2.0))
-        return call(reader, jnp.asarray(2.0), tape=recording)[0]
+        return call(reader, jnp.asarray(2.0), stream=recording)[0]
 
     factors = jnp.linspace(0.1, 2.0, 1200)
     np.testing.assert_allclose(jax.vmap(total)(factors), factors + factors**2)

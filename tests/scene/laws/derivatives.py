@@ -1,4 +1,4 @@
-"""Derivatives of a law by its arguments and by each of its parameters, two ways."""
+"""Derivatives of a law with respect to its arguments and each of its parameters, two ways."""
 
 import jax
 import jax.numpy as jnp

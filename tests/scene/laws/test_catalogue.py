@@ -13,6 +13,7 @@ FRICTION = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
 BRISTLES = ("dahl", "lugre")
 EXACT = ("ristow-schafer", "smooth-ristow-schafer")
 ONE = jnp.asarray(1.0)
+_FRICTION = (jb.laws.AbstractFrictionLaw, jb.laws.AbstractBristleLaw)
 
 
 @pytest.mark.parametrize("name", jb.laws.NORMAL_LAWS)
@@ -172,3 +173,13 @@ def test_both_engines_agree(normal, friction):
     assert int(by_lanes.accepted) == int(by_xla.accepted)
     for ours, theirs in zip(by_lanes.final, by_xla.final, strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("laws", [jb.laws.NORMAL_LAWS, jb.laws.FRICTION_LAWS])
+def test_every_public_law_is_in_the_catalogue_under_its_own_name(laws):
+    kind = jb.laws.AbstractNormalLaw if laws is jb.laws.NORMAL_LAWS else _FRICTION
+    public = {each for each in vars(jb.laws).values() if isinstance(each, type)}
+    assert set(laws.values()) == {
+        law for law in public if issubclass(law, kind) and "Abstract" not in law.__name__
+    }
+    assert all(law.name == name for name, law in laws.items())

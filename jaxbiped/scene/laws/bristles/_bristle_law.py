@@ -1,6 +1,7 @@
 """Interface of bristle laws: friction with a state, bristles that bend before they slip."""
 
 import abc
+from typing import ClassVar
 
 import equinox as eqx
 
@@ -18,7 +19,12 @@ class AbstractBristleLaw(eqx.Module):
         ḃ = w (rate of the law) − (1 − w) relaxation b
 
     so that a foot lands with straight bristles and nothing jumps as it does.
+
+    Attributes:
+        name: as an `AbstractFrictionLaw` has it, with `like_seed`. A property of the class.
     """
+
+    name: ClassVar[str | None] = None
 
     def __check_init__(self) -> None:
         check_parameters(self)

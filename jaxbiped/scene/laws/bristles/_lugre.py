@@ -1,10 +1,19 @@
 """The LuGre law of friction."""
 
+from typing import ClassVar, Self
+
 import jax.numpy as jnp
 
+from jaxbiped._checks import check_positive
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
+
+_GIVE = 1e-5
+"""How far the bristles of the law like the seed's bend before they slip [m]."""
+_MASS_PER_LOAD = 0.05
+"""What they hold in place for each newton of load [kg/N]: 1 kg under 20 N."""
 
 
 class LuGre(AbstractBristleLaw):
@@ -34,6 +43,7 @@ class LuGre(AbstractBristleLaw):
             or relaxation below 0.
     """
 
+    name: ClassVar[str] = "lugre"
     mu_static: Parameter = parameter("static friction", r"$\mu_0$", positive=True)
     mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", positive=True)
     v_s: Parameter = parameter("Stribeck speed", "$v_s$", "m/s", positive=True)
@@ -61,3 +71,19 @@ class LuGre(AbstractBristleLaw):
         u = slip_speed / self.v_s
         steady = self.mu_kinetic + (self.mu_static - self.mu_kinetic) * jnp.exp(-u * u)
         return slip_speed - jnp.abs(slip_speed) * bristle / steady
+
+    @classmethod
+    def like_seed(cls, seed: BengisuAkay) -> Self:
+        """Both coefficients and the fall over 1/xi, on bristles that give by 1e-5 m before slip.
+
+        Their damping is critical for 1 kg that carries 20 N, and sigma_2 = 0.
+        """
+        check_positive("xi", seed.xi, "s/m")
+        sigma_0 = seed.mu_static / _GIVE
+        return cls(
+            mu_static=seed.mu_static,
+            mu_kinetic=seed.mu_kinetic,
+            v_s=1.0 / seed.xi,
+            sigma_0=sigma_0,
+            sigma_1=2.0 * jnp.sqrt(sigma_0 * _MASS_PER_LOAD),
+        )

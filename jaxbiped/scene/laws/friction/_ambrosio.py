@@ -1,6 +1,6 @@
 """Ambrósio's friction law."""
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
@@ -8,6 +8,7 @@ from jaxbiped._checks import check_positive
 from jaxbiped._parameter import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
 
 class Ambrosio(AbstractFrictionLaw):
@@ -32,6 +33,7 @@ class Ambrosio(AbstractFrictionLaw):
         ArgumentError: mu below 0, v0 not above 0 or v1 not above v0.
     """
 
+    name: ClassVar[str] = "ambrosio"
     builds_up_over: ClassVar[str | None] = "v1"
     mu: Parameter = parameter("friction coefficient", r"$\mu$", minimum=0.0)
     v0: Parameter = parameter("slip at onset", "$v_0$", "m/s", positive=True)
@@ -48,3 +50,8 @@ class Ambrosio(AbstractFrictionLaw):
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         bounds = (self.v0, self.v1)
         return (*(slip_speed - v for v in bounds), *(slip_speed + v for v in bounds))
+
+    @classmethod
+    def like_seed(cls, seed: BengisuAkay) -> Self:
+        """The kinetic coefficient, from v0/2 to v0 with the slope 2 mu/v0."""
+        return cls(mu=seed.mu_kinetic, v0=0.5 * seed.v0, v1=seed.v0)

@@ -1,6 +1,6 @@
 """The seed's friction law, with its Stribeck peak."""
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
@@ -30,6 +30,7 @@ class BengisuAkay(AbstractFrictionLaw):
         ArgumentError: a coefficient or xi below 0, or v0 not above 0.
     """
 
+    name: ClassVar[str] = "bengisu-akay"
     builds_up_over: ClassVar[str | None] = "v0"
     mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
     mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
@@ -49,3 +50,8 @@ class BengisuAkay(AbstractFrictionLaw):
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         # At rest it is the second derivative that jumps.
         return slip_speed - self.v0, slip_speed + self.v0, slip_speed
+
+    @classmethod
+    def like_seed(cls, seed: Self) -> Self:
+        """The seed's law."""
+        return seed

@@ -1,6 +1,6 @@
 """Brown and McPhee's friction law."""
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
@@ -12,6 +12,7 @@ from jaxbiped._checks import (
 from jaxbiped._parameter import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
 
 class BrownMcPhee(AbstractFrictionLaw):
@@ -40,6 +41,7 @@ class BrownMcPhee(AbstractFrictionLaw):
             above 0, or a mu_v above 0 without N_t.
     """
 
+    name: ClassVar[str] = "brown-mcphee"
     builds_up_over: ClassVar[str | None] = "v_t"
     mu_static: Parameter = parameter("static friction", r"$\mu_0$")
     mu_dynamic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
@@ -66,3 +68,8 @@ class BrownMcPhee(AbstractFrictionLaw):
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         return ()
+
+    @classmethod
+    def like_seed(cls, seed: BengisuAkay) -> Self:
+        """Both coefficients, the peak at v0 and a fall over a few v0; no viscous part."""
+        return cls(seed.mu_static, seed.mu_kinetic, seed.v0)

@@ -1,12 +1,13 @@
 """Coulomb friction, regularised at rest."""
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
 
 class RegularisedCoulomb(AbstractFrictionLaw):
@@ -20,6 +21,7 @@ class RegularisedCoulomb(AbstractFrictionLaw):
         ArgumentError: mu below 0 or v_d not above 0.
     """
 
+    name: ClassVar[str] = "coulomb"
     builds_up_over: ClassVar[str | None] = "v_d"
     mu: Parameter = parameter("friction coefficient", r"$\mu$", minimum=0.0)
     v_d: Parameter = parameter("build-up speed", "$v_d$", "m/s", positive=True)
@@ -29,3 +31,8 @@ class RegularisedCoulomb(AbstractFrictionLaw):
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         return ()
+
+    @classmethod
+    def like_seed(cls, seed: BengisuAkay) -> Self:
+        """The kinetic coefficient, and the slope 2 mu/v0 at rest: v_d = v0/2."""
+        return cls(mu=seed.mu_kinetic, v_d=0.5 * seed.v0)

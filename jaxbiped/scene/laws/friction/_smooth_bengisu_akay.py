@@ -1,12 +1,13 @@
 """The seed's friction law with its corner at v0 and its kink at rest rounded."""
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, smooth_ramp
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
 
 class SmoothBengisuAkay(AbstractFrictionLaw):
@@ -18,7 +19,7 @@ class SmoothBengisuAkay(AbstractFrictionLaw):
     - |u| ≥ 1: F = F_C + (F_S − F_C) exp(−xi R(s − v0)), R a C² ramp from zero that equals its
       argument from v0 on.
 
-    From 2 v0 on it is the original. README, "Smooth laws", tells how much it changes the gait.
+    From 2 v0 on it is the original. `docs/laws.md` tells how much it changes the gait.
 
     Attributes (leaves of any batch shape):
         mu_static: static coefficient, reached at v0 [–].
@@ -30,6 +31,7 @@ class SmoothBengisuAkay(AbstractFrictionLaw):
         ArgumentError: a coefficient or xi below 0, or v0 not above 0.
     """
 
+    name: ClassVar[str] = "smooth-bengisu-akay"
     builds_up_over: ClassVar[str | None] = "v0"
     mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
     mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
@@ -46,3 +48,8 @@ class SmoothBengisuAkay(AbstractFrictionLaw):
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         return ()
+
+    @classmethod
+    def like_seed(cls, seed: BengisuAkay) -> Self:
+        """The seed's own parameters."""
+        return cls(seed.mu_static, seed.mu_kinetic, seed.v0, seed.xi)

@@ -1,12 +1,14 @@
 """Friction with an exponential Stribeck curve and a viscous part."""
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
+from jaxbiped._checks import check_positive
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 from jaxbiped.scene.laws.friction._stribeck_curve import stribeck_coefficient, stribeck_switches
 
 
@@ -36,6 +38,7 @@ class Stribeck(AbstractFrictionLaw):
         ArgumentError: a coefficient or k_v below 0, or v_s, p or v_d not above 0.
     """
 
+    name: ClassVar[str] = "stribeck"
     builds_up_over: ClassVar[str | None] = "v_d"
     mu_static: Parameter = parameter("static friction", r"$\mu_0$", minimum=0.0)
     mu_kinetic: Parameter = parameter("kinetic friction", r"$\mu$", minimum=0.0)
@@ -54,3 +57,16 @@ class Stribeck(AbstractFrictionLaw):
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         """Rest, where p ≤ 1."""
         return stribeck_switches(self.p, slip_speed)
+
+    @classmethod
+    def like_seed(cls, seed: BengisuAkay) -> Self:
+        """Both coefficients, the slope 2 mu/v0 at rest (v_d = v0/2), the fall over 1/xi (p = 1)."""
+        check_positive("xi", seed.xi, "s/m")
+        return cls(
+            mu_static=seed.mu_static,
+            mu_kinetic=seed.mu_kinetic,
+            v_s=1.0 / seed.xi,
+            p=1.0,
+            k_v=0.0,
+            v_d=0.5 * seed.v0,
+        )

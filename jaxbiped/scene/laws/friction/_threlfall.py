@@ -1,12 +1,13 @@
 """Threlfall's friction law."""
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
 
 class Threlfall(AbstractFrictionLaw):
@@ -28,6 +29,7 @@ class Threlfall(AbstractFrictionLaw):
         ArgumentError: mu below 0 or v0 not above 0.
     """
 
+    name: ClassVar[str] = "threlfall"
     builds_up_over: ClassVar[str | None] = "v0"
     mu: Parameter = parameter("friction coefficient", r"$\mu$", minimum=0.0)
     v0: Parameter = parameter("slip of full friction", "$v_0$", "m/s", positive=True)
@@ -43,3 +45,8 @@ class Threlfall(AbstractFrictionLaw):
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         # At rest it is the second derivative that jumps.
         return slip_speed - self.v0, slip_speed + self.v0, slip_speed
+
+    @classmethod
+    def like_seed(cls, seed: BengisuAkay) -> Self:
+        """The kinetic coefficient, from rest with the slope 3 mu/v0 and held from v0 on."""
+        return cls(mu=seed.mu_kinetic, v0=seed.v0)

@@ -1,8 +1,11 @@
 """Viscous friction."""
 
+from typing import ClassVar, Self
+
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
+from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
 
 class Viscous(AbstractFrictionLaw):
@@ -18,6 +21,7 @@ class Viscous(AbstractFrictionLaw):
         ArgumentError: k below 0.
     """
 
+    name: ClassVar[str] = "viscous"
     k: Parameter = parameter("friction per slip", "$k$", "s/m", minimum=0.0)
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
@@ -25,3 +29,8 @@ class Viscous(AbstractFrictionLaw):
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         return ()
+
+    @classmethod
+    def like_seed(cls, seed: BengisuAkay) -> Self:
+        """mu_static F_N at the seed's v0, and without bound beyond."""
+        return cls(k=seed.mu_static / seed.v0)

@@ -1,6 +1,6 @@
 """Hertz's law of elastic contact."""
 
-from typing import Self
+from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
@@ -8,7 +8,8 @@ from jaxbiped._checks import check_positive, check_within
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, hertz_energy, hertz_force
-from jaxbiped.scene.laws.normal._weight_on_law import matched_to_weight
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
+from jaxbiped.scene.laws.normal._weight_on_law import Standing, matched_to_weight
 
 
 class Hertz(AbstractNormalLaw):
@@ -22,6 +23,7 @@ class Hertz(AbstractNormalLaw):
         ArgumentError: K not above 0 or n below 1.
     """
 
+    name: ClassVar[str] = "hertz"
     K: Parameter = parameter("contact stiffness", "$K$", "N/m^n", positive=True)
     n: Parameter = parameter("contact exponent", "$n$", minimum=1.0, default=1.5)
 
@@ -55,6 +57,13 @@ class Hertz(AbstractNormalLaw):
     def elastic_energy(self, penetration: Scalar) -> Scalar:
         return hertz_energy(self.K, self.n, penetration)
 
+    @classmethod
+    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
+        """The same penetration under the weight, and the seed's exponent."""
+        return cls.from_weight(
+            mass=standing.mass, penetration=standing.penetration, g=standing.g, n=seed.n
+        )
+
 
 def hertz_stiffness(
     *,
@@ -76,6 +85,9 @@ def hertz_stiffness(
         poisson: Poisson's ratio of the sphere, ν₁ [–].
         ground_modulus: Young's modulus of the plane, E₂ [Pa].
         ground_poisson: Poisson's ratio of the plane, ν₂ [–].
+
+    Returns:
+        K [N/m^1.5], a scalar or the shape that the arguments broadcast to.
 
     Raises:
         ArgumentError: a radius or modulus not above 0, or a Poisson's ratio that no isotropic

@@ -1,6 +1,6 @@
 """Hunt and Crossley's law and those of its family, which differ in one factor."""
 
-from typing import Self
+from typing import ClassVar, Self
 
 from jaxbiped._checks import check_choice, check_positive
 from jaxbiped._parameter import parameter
@@ -13,7 +13,8 @@ from jaxbiped.scene.laws._abstract_laws import (
     pushing,
 )
 from jaxbiped.scene.laws.normal._restitution import RESTITUTION_FORMULAS
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
+from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, Standing
 
 
 class HuntCrossley(AbstractDampedLaw):
@@ -35,6 +36,7 @@ class HuntCrossley(AbstractDampedLaw):
         ArgumentError: K not above 0, hysteresis below 0 or n below 1.
     """
 
+    name: ClassVar[str] = "hunt-crossley"
     K: Parameter = parameter("contact stiffness", "$K$", "N/m^n", positive=True)
     hysteresis: Parameter = parameter("hysteresis", r"$\chi/v^-$", "s/m", minimum=0.0)
     n: Parameter = parameter("contact exponent", "$n$", minimum=1.0, default=1.5)
@@ -87,3 +89,8 @@ class HuntCrossley(AbstractDampedLaw):
 
     def elastic_energy(self, penetration: Scalar) -> Scalar:
         return hertz_energy(self.K, self.n, penetration)
+
+    @classmethod
+    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
+        """The seed's exponent, penetration under the weight and damping ratio about it."""
+        return cls.from_weight(**standing._asdict(), n=seed.n)

@@ -1,13 +1,14 @@
 """Kelvin and Voigt's law: a linear spring beside a linear damper."""
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import pushing
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
+from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, Standing
 
 
 class KelvinVoigt(AbstractDampedLaw):
@@ -26,6 +27,7 @@ class KelvinVoigt(AbstractDampedLaw):
         ArgumentError: K not above 0 or D below 0.
     """
 
+    name: ClassVar[str] = "kelvin-voigt"
     K: Parameter = parameter("contact stiffness", "$K$", "N/m", positive=True)
     D: Parameter = parameter("contact damping", "$D$", "N s/m", minimum=0.0)
 
@@ -48,3 +50,8 @@ class KelvinVoigt(AbstractDampedLaw):
 
     def elastic_energy(self, penetration: Scalar) -> Scalar:
         return 0.5 * self.elastic_force(penetration) * penetration
+
+    @classmethod
+    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
+        """The same penetration under the weight, with the same damping ratio about it."""
+        return cls.from_weight(**standing._asdict())

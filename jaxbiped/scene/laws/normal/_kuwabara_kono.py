@@ -1,5 +1,7 @@
 """Kuwabara and Kono's law of the impact of viscoelastic spheres."""
 
+from typing import ClassVar, Self
+
 import jax.numpy as jnp
 
 from jaxbiped._parameter import parameter
@@ -10,7 +12,8 @@ from jaxbiped.scene.laws._abstract_laws import (
     hertz_force,
     pushing,
 )
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
+from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, Standing
 
 
 class KuwabaraKono(AbstractDampedLaw):
@@ -30,6 +33,7 @@ class KuwabaraKono(AbstractDampedLaw):
         ArgumentError: K not above 0 or gamma below 0.
     """
 
+    name: ClassVar[str] = "kuwabara-kono"
     K: Parameter = parameter("contact stiffness", "$K$", "N/m^1.5", positive=True)
     gamma: Parameter = parameter("contact damping", r"$\gamma$", "N s/m^1.5", minimum=0.0)
 
@@ -50,3 +54,8 @@ class KuwabaraKono(AbstractDampedLaw):
 
     def elastic_energy(self, penetration: Scalar) -> Scalar:
         return hertz_energy(self.K, 1.5, penetration)
+
+    @classmethod
+    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
+        """The same penetration under the weight, with the same damping ratio about it."""
+        return cls.from_weight(**standing._asdict())

@@ -1,5 +1,7 @@
 """The seed's normal law: Hertz stiffness with a damper that grows with penetration."""
 
+from typing import ClassVar, Self
+
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import (
@@ -9,7 +11,7 @@ from jaxbiped.scene.laws._abstract_laws import (
     power,
     pushing,
 )
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw
+from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, Standing
 
 
 class RistowSchafer(AbstractDampedLaw):
@@ -27,6 +29,7 @@ class RistowSchafer(AbstractDampedLaw):
         ArgumentError: K not above 0, c below 0 or n below 1.
     """
 
+    name: ClassVar[str] = "ristow-schafer"
     K: Parameter = parameter("contact stiffness", "$K$", "N/m^n", positive=True)
     c: Parameter = parameter("contact damping", "$c$", "N s/m^2", minimum=0.0)
     n: Parameter = parameter("contact exponent", "$n$", minimum=1.0, default=1.5)
@@ -49,3 +52,8 @@ class RistowSchafer(AbstractDampedLaw):
 
     def elastic_energy(self, penetration: Scalar) -> Scalar:
         return hertz_energy(self.K, self.n, penetration)
+
+    @classmethod
+    def like_seed(cls, seed: Self, standing: Standing) -> Self:
+        """The seed's law."""
+        return seed

@@ -1,5 +1,7 @@
 """The seed's normal law with its two corners rounded."""
 
+from typing import ClassVar, Self
+
 import jax.numpy as jnp
 import numpy as np
 
@@ -11,6 +13,8 @@ from jaxbiped.scene.laws._abstract_laws import (
     hertz_force,
     smooth_ramp,
 )
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
+from jaxbiped.scene.laws.normal._weight_on_law import Standing
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 _GAUSS = [(0.5 * (1.0 + float(x)), 0.5 * float(w)) for x, w in zip(_NODES, _WEIGHTS, strict=True)]
@@ -21,7 +25,7 @@ class SmoothRistowSchafer(AbstractNormalLaw):
 
     Penetration passes through a C² ramp of width `depth_width` and the force through one of
     width `force_width`; above both widths the law is the original, and it is exactly zero out of
-    contact. README, "Smooth laws", tells how much that changes the gait.
+    contact. `docs/laws.md` tells how much that changes the gait.
 
     Attributes (leaves of any batch shape):
         K: contact stiffness [N/mⁿ].
@@ -34,6 +38,7 @@ class SmoothRistowSchafer(AbstractNormalLaw):
         ArgumentError: K or a width not above 0, c below 0 or n below 1.
     """
 
+    name: ClassVar[str] = "smooth-ristow-schafer"
     K: Parameter = parameter("contact stiffness", "$K$", "N/m^n", positive=True)
     c: Parameter = parameter("contact damping", "$c$", "N s/m^2", minimum=0.0)
     n: Parameter = parameter("contact exponent", "$n$", minimum=1.0, default=1.5)
@@ -65,3 +70,8 @@ class SmoothRistowSchafer(AbstractNormalLaw):
         )
         above = hertz_energy(self.K, self.n, jnp.where(inside, width, penetration))
         return width * on_ramp + above - hertz_energy(self.K, self.n, width)
+
+    @classmethod
+    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
+        """The seed's own K, c and n."""
+        return cls(K=seed.K, c=seed.c, n=seed.n)

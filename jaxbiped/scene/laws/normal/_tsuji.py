@@ -1,5 +1,7 @@
 """Tsuji's law, whose restitution does not depend on the speed of impact."""
 
+from typing import ClassVar, Self
+
 import jax.numpy as jnp
 
 from jaxbiped._parameter import parameter
@@ -10,7 +12,8 @@ from jaxbiped.scene.laws._abstract_laws import (
     hertz_force,
     pushing,
 )
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
+from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, Standing
 
 
 class Tsuji(AbstractDampedLaw):
@@ -30,6 +33,7 @@ class Tsuji(AbstractDampedLaw):
         ArgumentError: K not above 0 or gamma below 0.
     """
 
+    name: ClassVar[str] = "tsuji"
     K: Parameter = parameter("contact stiffness", "$K$", "N/m^1.5", positive=True)
     gamma: Parameter = parameter("contact damping", r"$\gamma$", "N s/m^1.25", minimum=0.0)
 
@@ -53,6 +57,11 @@ class Tsuji(AbstractDampedLaw):
 
     def elastic_energy(self, penetration: Scalar) -> Scalar:
         return hertz_energy(self.K, 1.5, penetration)
+
+    @classmethod
+    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
+        """The same penetration under the weight, with the same damping ratio about it."""
+        return cls.from_weight(**standing._asdict())
 
 
 def _fourth_root(x: Scalar) -> Scalar:

@@ -1,7 +1,7 @@
 """Weight on a normal law: its parameters from how a mass stands on it."""
 
 import abc
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import jax.numpy as jnp
 
@@ -55,6 +55,22 @@ class AbstractDampedLaw(AbstractNormalLaw):
         )
         weight: Any = as_float(mass) * as_float(g)
         return cls(K, cls.damping_coefficient(damper, as_float(penetration), weight), **n)
+
+
+class Standing(NamedTuple):
+    """How a mass stands on a law: the arguments of `from_weight`.
+
+    Attributes:
+        mass: what stands there [kg].
+        penetration: how deep [m].
+        damping_ratio: of small oscillations about that [–].
+        g: gravitational acceleration [m/s²].
+    """
+
+    mass: Scalar
+    penetration: Scalar
+    damping_ratio: Scalar
+    g: Scalar
 
 
 def matched_to_weight(

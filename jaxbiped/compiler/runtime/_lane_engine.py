@@ -1,0 +1,71 @@
+"""Lane engine: programs as vector machine code for the host's CPU, one simulation a lane."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+
+from jaxbiped._caches import PROGRAMS, bounded_cache
+from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
+from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
+from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result
+from jaxbiped.compiler.runtime._primitive import Schedule, call, call_recording
+from jaxbiped.compiler.runtime._program import Program
+
+
+class LaneEngine(AbstractEngine):
+    """Compiles a program on its first request. Computes in 64 bits; has no derivatives."""
+
+    def can(self, request: Request) -> str | None:
+        """None, or which operation of the program lanes do not have. Traces the program."""
+        return _hindrance(request.program, *request.shapes())
+
+    def run(self, request: Request) -> Result:
+        """See `AbstractEngine.run`.
+
+        Raises:
+            UnknownPrimitiveError: the program holds an operation that lanes do not have.
+        """
+        compiled, quick = self.compile(request), request.quick
+        if request.batch:
+            return Result(*compiled.run(request.inputs, room=request.room, quick=quick))
+        if request.keeps_records:
+            recorded = call_recording(
+                compiled,
+                request.inputs,
+                room=request.room,
+                quick=quick,
+                stream=request.stream,
+                once=request.reads_once,
+            )
+            return Result(recorded[0], recording=recorded[1])
+        schedule = None if request.times is None else Schedule(request.times)
+        found = call(
+            compiled,
+            request.inputs,
+            schedule,
+            stream=request.stream,
+            room=request.room,
+            quick=quick,
+        )
+        return Result(*found)
+
+    def compile(self, request: Request) -> CompiledProgram:
+        """The compiled program of requests with inputs of these shapes, traced when needed."""
+        return _compiled(request.program, *request.shapes())
+
+
+@bounded_cache(PROGRAMS)
+def _compiled(program: Program, structure: Any, shapes: Any) -> CompiledProgram:
+    leaves = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in shapes]
+    return CompiledProgram(program, jtu.tree_unflatten(structure, leaves))
+
+
+@bounded_cache(PROGRAMS)
+def _hindrance(program: Program, structure: Any, shapes: Any) -> str | None:
+    try:
+        _compiled(program, structure, shapes).check()
+    except UnknownPrimitiveError as error:
+        return str(error)
+    return None

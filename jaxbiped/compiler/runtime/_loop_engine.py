@@ -1,0 +1,159 @@
+"""Loop engine: the same programs as loops that XLA compiles, on every device."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import Array, PyTree
+
+from jaxbiped._caches import cached_jit
+from jaxbiped._types import Scalar
+from jaxbiped.compiler.runtime._compiled_program import Recorded
+from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result
+from jaxbiped.compiler.runtime._program import Program
+
+_ROUND = 128
+"""Attempted steps after which slots that are over take the next simulations."""
+
+
+class LoopEngine(AbstractEngine):
+    """Runs a program in the precision of its inputs, and has forward derivatives.
+
+    Attributes:
+        slots: simulations of a batch that are followed at once, always as many: every other
+            number compiles anew.
+    """
+
+    def __init__(self, slots: int = 1024) -> None:
+        self.slots = slots
+
+    def can(self, request: Request) -> str | None:
+        """None, or which part of a request only lanes have."""
+        if request.times is not None or request.program.scheduled:
+            return "records at given times are the lanes'"
+        if request.stream is not None or request.program.stream:
+            return "programs that read a stream are the lanes'"
+        if request.keeps_records or (request.batch and request.room):
+            return "records that stay on the host, or of a batch, are the lanes'"
+        return None
+
+    def run(self, request: Request) -> Result:
+        """See `AbstractEngine.run`."""
+        if request.batch:
+            return Result(_run_batch(request.program, request.inputs, self.slots))
+        return Result(*_run_one(request.program, request.inputs, request.room))
+
+
+@cached_jit
+def _run_one(program: Program, inputs: PyTree, room: int) -> tuple[PyTree, Recorded | None]:
+    first = program.start(inputs)
+    never = jnp.asarray(jnp.inf)
+    records: list[Array] = []
+    if program.record is not None:
+        _, values = jax.eval_shape(program.record, inputs, first, never)
+        records = [jnp.zeros(room, value.dtype) for value in values]
+
+    def advance(loop: tuple[PyTree, Scalar, Scalar, list[Array]]) -> Any:
+        now, _, count, kept = loop
+        after, over = program.attempt(inputs, now)
+        if program.record is not None:
+            is_one, values = program.record(inputs, after, never)
+            # Where there is none, the place is past the end, and nothing is written.
+            place = jnp.where(is_one, count, room)
+            kept = [
+                each.at[place].set(value, mode="drop")
+                for each, value in zip(kept, values, strict=True)
+            ]
+            count = count + is_one.astype(count.dtype)
+        return after, over, count, kept
+
+    begin = (first, jnp.asarray(False), jnp.asarray(0), records)
+    end, _, count, kept = jax.lax.while_loop(lambda loop: ~loop[1], advance, begin)
+    recorded = None if program.record is None else Recorded(jnp.stack(kept, axis=-1), count)  # type: ignore[arg-type]
+    return program.finish(inputs, end), recorded
+
+
+def _run_batch(program: Program, inputs: PyTree, slots: int) -> PyTree:
+    """Runs n simulations; arrays (n, …) in, NumPy's out.
+
+    One that is over waits for the end of its round, not for the longest of the batch: its slot
+    then takes the next one from the queue.
+    """
+    count = int(np.shape(jtu.tree_leaves(inputs)[0])[0])
+    owner = np.arange(slots)
+    given = _rows(inputs, np.minimum(owner, count - 1))
+    owner[count:] = -1
+    over = jnp.asarray(owner < 0)
+    now = _begin(program, given)
+    waiting = min(slots, count)
+    found: list[tuple[np.ndarray, PyTree]] = []
+    while (owner >= 0).any():
+        now, over = _advance(program, given, now, over)
+        done = np.flatnonzero(np.asarray(over) & (owner >= 0))
+        if not len(done):
+            continue
+        outputs = jtu.tree_map(np.asarray, _finish(program, given, now))
+        found.append((owner[done], _rows(outputs, done)))
+        owner[done] = -1
+        fresh = np.arange(waiting, min(waiting + len(done), count))
+        waiting += len(fresh)
+        if len(fresh):
+            places = done[: len(fresh)]
+            owner[places] = fresh
+            rows, beyond = np.resize(fresh, slots), np.full(slots, slots)
+            beyond[: len(places)] = places
+            given, now, over = _refill(
+                program, given, now, over, jnp.asarray(beyond), _rows(inputs, rows)
+            )
+    order = np.argsort(np.concatenate([places for places, _ in found]))
+    parts = [part for _, part in found]
+    return jtu.tree_map(lambda *leaves: np.concatenate(leaves)[order], *parts)
+
+
+@cached_jit
+def _begin(program: Program, inputs: PyTree) -> PyTree:
+    return jax.vmap(program.start)(inputs)
+
+
+@cached_jit
+def _finish(program: Program, inputs: PyTree, now: PyTree) -> PyTree:
+    return jax.vmap(program.finish)(inputs, now)
+
+
+@cached_jit
+def _advance(program: Program, inputs: PyTree, now: PyTree, over: Array) -> tuple[PyTree, Array]:
+    """At most so many attempts further; what is over stays as it is."""
+    attempt = jax.vmap(program.attempt)
+
+    def going(loop: tuple[PyTree, Array, Scalar]) -> Scalar:
+        _, over, attempts = loop
+        return (attempts < _ROUND) & ~jnp.all(over)
+
+    def onward(loop: tuple[PyTree, Array, Scalar]) -> tuple[PyTree, Array, Scalar]:
+        now, over, attempts = loop
+        after, ended = attempt(inputs, now)
+        kept = jtu.tree_map(lambda old, new: jnp.where(over, old, new), now, after)
+        return kept, over | ended, attempts + 1
+
+    now, over, _ = jax.lax.while_loop(going, onward, (now, over, jnp.asarray(0)))
+    return now, over
+
+
+@cached_jit
+def _refill(
+    program: Program, given: PyTree, now: PyTree, over: Array, places: Array, fresh: PyTree
+) -> tuple[PyTree, PyTree, Array]:
+    """The simulations at these places replaced; a place beyond the slots takes none."""
+    begun = jax.vmap(program.start)(fresh)
+
+    def put(old: Any, new: Any) -> Any:
+        return old.at[places].set(new, mode="drop")
+
+    given, now = jtu.tree_map(put, given, fresh), jtu.tree_map(put, now, begun)
+    return given, now, over.at[places].set(False, mode="drop")
+
+
+def _rows(tree: PyTree, rows: np.ndarray) -> PyTree:
+    return jtu.tree_map(lambda leaf: leaf[rows], tree)
