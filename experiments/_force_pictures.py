@@ -9,7 +9,7 @@ from _force_samples import Stance
 from _options import Options
 from matplotlib.axes import Axes
 
-from jaxbiped.plot._style import GROUND_COLOUR, dress
+from jaxbiped.plot.style import GROUND_COLOUR, dress
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#882255")
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))

@@ -10,7 +10,7 @@ from _force_samples import Motion, largest, motion, strikes
 from _options import Options
 from matplotlib.axes import Axes
 
-from jaxbiped.plot._style import LEG_COLOURS, LEG_NAMES, LEG_STYLES, dress
+from jaxbiped.plot.style import LEG_COLOURS, LEG_NAMES, LEG_STYLES, dress
 
 SLOPES = (0.010, 0.015, 0.020, 0.025, 0.030, 0.040)
 QUICK_SLOPES = (0.020, 0.040)

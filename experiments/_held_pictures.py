@@ -7,7 +7,7 @@ from _held import COLOURS, FLOOR, STYLES, Curve
 from _options import Options
 
 import jaxbiped as jb
-from jaxbiped.plot._style import dress, new_figure
+from jaxbiped.plot.style import dress, new_figure
 
 PARTS = 100
 """Of a curve that wiggles more often than a picture has room for."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import tyro
 
-from jaxbiped.cli._report import Report
+from jaxbiped.cli import Report
 
 
 @dataclasses.dataclass(frozen=True)

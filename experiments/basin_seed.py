@@ -14,7 +14,7 @@ from _options import Options, parse
 
 import jaxbiped as jb
 from jaxbiped import plot
-from jaxbiped.plot._style import new_figure
+from jaxbiped.plot.style import new_figure
 
 SLOPE = 0.02
 SIDE, QUICK_SIDE = 200, 60

@@ -14,7 +14,7 @@ from _options import Options, parse
 
 import jaxbiped as jb
 from jaxbiped import plot
-from jaxbiped.plot._style import new_figure
+from jaxbiped.plot.style import new_figure
 
 SLOPES = (0.004, 0.009)
 SIDES, QUICK_SIDES = (200, 400), (100, 200)

@@ -24,7 +24,7 @@ from _held import (
 from _options import Options, parse
 
 import jaxbiped as jb
-from jaxbiped.plot._style import dress, new_figure
+from jaxbiped.plot.style import dress, new_figure
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 STEPS = (1e-4, 1e-5, 1e-6)

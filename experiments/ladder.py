@@ -13,7 +13,7 @@ from _rigid_limit import DOUBLINGS, PATHS, QUICK_DOUBLINGS, Approach, approach
 from _rungs import Cost, cost_of, distances, gait_of, measures_of
 
 import jaxbiped as jb
-from jaxbiped.plot._style import new_figure
+from jaxbiped.plot.style import new_figure
 
 BATCH, QUICK_BATCH = 4096, 128
 TOLERANCES = (1e-6, 1e-7, 1e-8)

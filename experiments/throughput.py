@@ -23,7 +23,7 @@ import numpy as np
 from _options import Options, parse
 
 import jaxbiped as jb
-from jaxbiped.plot._style import new_figure
+from jaxbiped.plot.style import new_figure
 
 SIZES, QUICK_SIZES = (1000, 10_000, 100_000, 1_000_000), (500, 2000)
 CHUNKS, QUICK_CHUNKS = (1024, 4096, 16384, 65536), (512, 2048)

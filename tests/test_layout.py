@@ -9,6 +9,7 @@ import jaxbiped as jb
 from tests.import_graph import LAYERS, PACKAGE, drawn, import_graph, imports_of, layer_of
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
+EXPERIMENTS = sorted((PACKAGE.parent / "experiments").glob("*.py"))
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
@@ -66,3 +67,13 @@ def test_what_outlives_a_call_is_kept_by_the_caches(path):
             assert node.attr not in ("lru_cache", "cache", "filter_jit"), "see jaxbiped/_caches.py"
         decorators = getattr(node, "decorator_list", [])
         assert "jax.jit" not in map(ast.unparse, decorators), "cached_jit, see jaxbiped/_caches.py"
+
+
+INSIDE = {"_lane_work.py": "what a lane's program takes", "gradient_accuracy.py": "plain tangents"}
+"""Experiments on the inside itself: what the public interface does not offer."""
+
+
+@pytest.mark.parametrize("path", EXPERIMENTS, ids=lambda path: path.name)
+def test_experiments_use_the_public_interface(path):
+    private = [name for name in imports_of(path) if name.startswith("jaxbiped.") and "._" in name]
+    assert bool(private) == (path.name in INSIDE), private

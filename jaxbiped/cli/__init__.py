@@ -15,6 +15,7 @@ from jaxbiped.cli._constraints import Constraints
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
 from jaxbiped.cli._refusal import one_sentence
+from jaxbiped.cli._report import Report as Report
 from jaxbiped.cli._walk import Walk
 
 _Command = (

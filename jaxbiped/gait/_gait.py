@@ -11,6 +11,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._quantity import Quantity
+from jaxbiped._summary import summary
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Recording
 from jaxbiped.gait._fixed_point_search import Found, Search
@@ -109,6 +110,10 @@ class Gait(eqx.Module):
     parameters: tuple[str, ...] = eqx.field(static=True)
     engine: str = eqx.field(static=True)
     quantities: tuple[Quantity, ...] = eqx.field(static=True, default=())
+
+    def __repr__(self) -> str:
+        like, code = self.measures.period, self.ending
+        return summary(self, like=like, code=code, names=Search, engine=self.engine)
 
     @property
     def outcome(self) -> Search:

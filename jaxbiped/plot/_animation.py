@@ -10,8 +10,8 @@ from matplotlib.patches import Circle
 
 from jaxbiped._checks import check_positive
 from jaxbiped.plot._samples import end_time, state_at
-from jaxbiped.plot._style import GROUND_COLOUR, LEG_COLOURS, LEG_NAMES, LEG_STYLES, new_figure
 from jaxbiped.plot._upright import Pose, poses, upright
+from jaxbiped.plot.style import GROUND_COLOUR, LEG_COLOURS, LEG_NAMES, LEG_STYLES, new_figure
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 

@@ -6,7 +6,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped._checks import check_positive, check_type
-from jaxbiped.plot._style import (
+from jaxbiped.plot._symbols import FORCE_RATIO, law_name
+from jaxbiped.plot.style import (
     GROUND_COLOUR,
     LEG_COLOURS,
     LEG_STYLES,
@@ -15,7 +16,6 @@ from jaxbiped.plot._style import (
     figure_of,
     legend_above,
 )
-from jaxbiped.plot._symbols import FORCE_RATIO, law_name
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 _GIVES = 5.0

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.plot._style import GROUND_COLOUR, dress, new_figure
+from jaxbiped.plot.style import GROUND_COLOUR, dress, new_figure
 
 _MEASURES = {
     "max_violation_m": r"largest violation, $|\Phi|$ (m)",

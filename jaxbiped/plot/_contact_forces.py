@@ -10,7 +10,8 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._contacts import Contacts
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.plot._force_samples import sampled_forces
-from jaxbiped.plot._style import (
+from jaxbiped.plot._symbols import NORMAL_FORCE, TANGENTIAL_FORCE, TIME
+from jaxbiped.plot.style import (
     LEG_COLOURS,
     LEG_NAMES,
     LEG_STYLES,
@@ -19,7 +20,6 @@ from jaxbiped.plot._style import (
     legend_above,
     new_figure,
 )
-from jaxbiped.plot._symbols import NORMAL_FORCE, TANGENTIAL_FORCE, TIME
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 

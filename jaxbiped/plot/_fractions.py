@@ -12,8 +12,8 @@ from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_po
 from jaxbiped._quantity import Quantity
 from jaxbiped.basins._fractions import Fraction, wilson_interval
 from jaxbiped.plot._label_colours import in_order, label_colour, label_marker
-from jaxbiped.plot._style import axes_or_new, dress, figure_of
 from jaxbiped.plot._symbols import axis_label
+from jaxbiped.plot.style import axes_or_new, dress, figure_of
 
 
 def basin_fractions(

@@ -12,20 +12,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from jaxbiped._checks import check_positive, check_type
-from jaxbiped.plot._style import (
-    GROUND_COLOUR,
-    LEG_COLOURS,
-    axes_or_new,
-    dress,
-    figure_of,
-    new_figure,
-)
 from jaxbiped.plot._symbols import (
     FORCE_RATIO,
     NORMAL_FORCE,
     PENETRATION,
     SLIP_SPEED,
     law_name,
+)
+from jaxbiped.plot.style import (
+    GROUND_COLOUR,
+    LEG_COLOURS,
+    axes_or_new,
+    dress,
+    figure_of,
+    new_figure,
 )
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, AbstractNormalLaw
 

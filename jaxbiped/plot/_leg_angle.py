@@ -6,7 +6,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped.plot._samples import sample
-from jaxbiped.plot._style import (
+from jaxbiped.plot._symbols import LEG_ANGLE, TIME
+from jaxbiped.plot.style import (
     LEG_COLOURS,
     LEG_NAMES,
     LEG_STYLES,
@@ -15,7 +16,6 @@ from jaxbiped.plot._style import (
     figure_of,
     legend_above,
 )
-from jaxbiped.plot._symbols import LEG_ANGLE, TIME
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 

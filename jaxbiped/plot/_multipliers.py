@@ -9,7 +9,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.plot._style import GROUND_COLOUR, LEG_COLOURS, SHADE_COLOUR, axes_or_new, figure_of
+from jaxbiped.plot.style import GROUND_COLOUR, LEG_COLOURS, SHADE_COLOUR, axes_or_new, figure_of
 
 _NEAR_ZERO = 0.03
 """Multipliers closer to zero than this are named together."""

@@ -7,7 +7,8 @@ from matplotlib.figure import Figure
 from jaxbiped.gait._gait import Gait
 from jaxbiped.plot._arrows import direction_arrows
 from jaxbiped.plot._multipliers import check_drawable
-from jaxbiped.plot._style import (
+from jaxbiped.plot._symbols import LEG_ANGLE, LEG_RATE
+from jaxbiped.plot.style import (
     LEG_COLOURS,
     LEG_NAMES,
     LEG_STYLES,
@@ -16,7 +17,6 @@ from jaxbiped.plot._style import (
     figure_of,
     legend_above,
 )
-from jaxbiped.plot._symbols import LEG_ANGLE, LEG_RATE
 
 
 def gait_orbit(gait: Gait, *, ax: Axes | None = None) -> Figure:

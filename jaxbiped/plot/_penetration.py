@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._samples import evaluate_along
 from jaxbiped.plot._samples import sample
-from jaxbiped.plot._style import (
+from jaxbiped.plot._symbols import PENETRATION, TIME
+from jaxbiped.plot.style import (
     LEG_COLOURS,
     LEG_NAMES,
     LEG_STYLES,
@@ -18,7 +19,6 @@ from jaxbiped.plot._style import (
     figure_of,
     legend_above,
 )
-from jaxbiped.plot._symbols import PENETRATION, TIME
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 

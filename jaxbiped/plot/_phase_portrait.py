@@ -10,7 +10,8 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.plot._arrows import direction_arrows
 from jaxbiped.plot._samples import sample
-from jaxbiped.plot._style import (
+from jaxbiped.plot._symbols import LEG_ANGLE, LEG_RATE
+from jaxbiped.plot.style import (
     LEG_COLOURS,
     LEG_NAMES,
     LEG_STYLES,
@@ -19,7 +20,6 @@ from jaxbiped.plot._style import (
     figure_of,
     legend_below,
 )
-from jaxbiped.plot._symbols import LEG_ANGLE, LEG_RATE
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._trajectory import Trajectory

@@ -13,7 +13,7 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped.basins._refined_boundary import RefinedBoundary
 from jaxbiped.plot._basin import draw_labels, finish, names_of
-from jaxbiped.plot._style import axes_or_new, figure_of
+from jaxbiped.plot.style import axes_or_new, figure_of
 
 _CORNERS = np.asarray([(0, 0), (1, 0), (1, 1), (0, 1)])
 

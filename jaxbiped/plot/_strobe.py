@@ -11,7 +11,9 @@ from matplotlib.lines import Line2D
 
 from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.plot._samples import end_time, state_at
-from jaxbiped.plot._style import (
+from jaxbiped.plot._symbols import HEIGHT, HORIZONTAL
+from jaxbiped.plot._upright import Pose, poses
+from jaxbiped.plot.style import (
     GROUND_COLOUR,
     LEG_COLOURS,
     LEG_NAMES,
@@ -21,8 +23,6 @@ from jaxbiped.plot._style import (
     figure_of,
     legend_above,
 )
-from jaxbiped.plot._symbols import HEIGHT, HORIZONTAL
-from jaxbiped.plot._upright import Pose, poses
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 

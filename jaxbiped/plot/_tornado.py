@@ -9,8 +9,8 @@ from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped.gait._gait import Gait
 from jaxbiped.plot._multipliers import check_drawable
-from jaxbiped.plot._style import GROUND_COLOUR, LEG_COLOURS, new_figure
 from jaxbiped.plot._symbols import row_label
+from jaxbiped.plot.style import GROUND_COLOUR, LEG_COLOURS, new_figure
 
 MEASURES = {
     "period": "period",

@@ -12,6 +12,7 @@ from jaxbiped._checks import (
     check_type,
     check_unbatched,
 )
+from jaxbiped._summary import summary
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import LANES, XLA, Request
 from jaxbiped.dynamics._rigid_state import RigidState
@@ -52,6 +53,9 @@ class RigidWalked(eqx.Module):
     attempts: Scalar
     strikes: tuple[Scalar, RigidState]
     engine: str = eqx.field(static=True)
+
+    def __repr__(self) -> str:
+        return summary(self, like=self.t, code=self.ending, names=Ending, engine=self.engine)
 
     @property
     def outcome(self) -> Ending:

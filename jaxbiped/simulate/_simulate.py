@@ -139,9 +139,9 @@ class Simulation(eqx.Module):
     """A checked request to simulate. `prepare` it, then `compile` it to run it apart from that.
 
     Attributes:
-        scene, state, duration, rtol, atol, dt, solver, adjoint, footsteps, watch: as in
-            `simulate`, checked, all of one precision; max_solver_steps, section, max_arrivals and
-            extremes, too.
+        scene, state, duration, rtol, atol, dt, solver, adjoint: as in `simulate`, checked, all of
+            one precision.
+        footsteps, watch, max_solver_steps, section, max_arrivals, extremes: as in `simulate`.
         correction: how a redundant start was put on its constraints, or None.
         times: at which to save [s], shape (n,), or None.
         save_steps: whether every step is saved.

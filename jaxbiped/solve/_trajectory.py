@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int, PyTree
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._summary import summary
 from jaxbiped.dynamics._state import State
 from jaxbiped.solve._dense_output import evaluate_dense
 from jaxbiped.solve._ending import Ending
@@ -43,6 +44,9 @@ class Trajectory(eqx.Module):
     highest: PyTree = None
     correction: PyTree = None
     engine: str = eqx.field(static=True, default="xla")
+
+    def __repr__(self) -> str:
+        return summary(self, like=self.t, code=self.ending, names=Ending, engine=self.engine)
 
     @property
     def final(self) -> State:

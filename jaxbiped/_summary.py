@@ -1,0 +1,47 @@
+"""Summary of a result in a line: how it ended, its shape, precision and memory, and what ran it."""
+
+import collections
+import enum
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.tree_util as jtu
+import numpy as np
+
+_UNITS = ("B", "kB", "MB", "GB", "TB")
+
+
+def summary(result: Any, *, like: Any, code: Any, names: type[enum.IntEnum], engine: str) -> str:
+    """The class of a result and what is in it, as `repr` of a result prints it.
+
+    Args:
+        result: pytree whose arrays count for the memory.
+        like: the array whose shape and precision stand for the result's.
+        code: of how each simulation ended, an array of the batch's shape.
+        names: what the codes mean.
+        engine: what computed it.
+    """
+    size = sum(leaf.nbytes for leaf in jtu.tree_leaves(eqx.filter(result, eqx.is_array)))
+    return (
+        f"{type(result).__name__}({_outcomes(code, names)}, engine={engine}, "
+        f"shape={tuple(like.shape)}, dtype={like.dtype}, {_memory(size)})"
+    )
+
+
+def _outcomes(code: Any, names: type[enum.IntEnum]) -> str:
+    """The outcome, of a batch how many of each, the most frequent first."""
+    if isinstance(code, jax.core.Tracer):
+        return "traced"
+    codes = np.ravel(np.asarray(code))
+    if np.ndim(code) == 0:
+        return str(names(int(codes[0])))
+    counts = collections.Counter(codes.tolist()).most_common()
+    return ", ".join(f"{count} {names(each)}" for each, count in counts) or "nothing"
+
+
+def _memory(size: float) -> str:
+    place = 0
+    while size >= 1000.0 and place + 1 < len(_UNITS):
+        size, place = size / 1000.0, place + 1
+    return f"{size:.3g} {_UNITS[place]}"
