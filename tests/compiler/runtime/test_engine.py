@@ -21,9 +21,7 @@ def _attempt(x, carried):
 
 ROOT = Program(lambda x: (x, jnp.zeros_like(x)), _attempt, lambda x, carried: carried)
 RECORDED = replace(ROOT, record=lambda x, carried, _: (carried[1] > 2.0, [carried[0]]))
-STREAM = dataclasses.replace(
-    ROOT, attempt=lambda x, c, row: _attempt(x + 0.0 * row[0], c), stream=1
-)
+STREAM = replace(ROOT, attempt=lambda x, c, row: _attempt(x + 0.0 * row[0], c), stream=1)
 ERF = replace(ROOT, finish=lambda x, carried: jax.scipy.special.erf(carried[0]))
 
 
