@@ -25,8 +25,8 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import ACCURACIES, resolve_slip_speed
 from jaxbiped.solve._engine import engine_for
+from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.solve.solvers import solver_named
 from jaxbiped.sweep._broadcast import broadcast_leaves
 from jaxbiped.sweep._family import Family
 from jaxbiped.sweep._follow_start import Effort, follow_starts
