@@ -1,18 +1,35 @@
 """Names for the shapes that annotations use."""
 
-from typing import Any, TypeAlias
+from collections.abc import Callable
+from typing import Any, TypeAlias, TypeVar
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+import numpy as np
+from jaxtyping import Array, Float, PyTree
 
 from jaxbiped._checks import is_number
 
 Scalar: TypeAlias = Float[Array, "..."]
 """A number: one scalar leaf, or one such leaf for each entry of a batch or a time series."""
 
+Numbers: TypeAlias = Array | np.ndarray
+"""An array, of JAX or of NumPy."""
+
+SomeTree = TypeVar("SomeTree")
+"""A pytree that comes back in the same structure."""
+
 Parameter: TypeAlias = Any
 """A number that a constructor turns into a floating-point array: a float, an array, a tracer."""
+
+RealScalarLike: TypeAlias = Array | np.ndarray | float
+"""A number as diffrax takes it: of JAX, of NumPy or of Python."""
+
+BoolScalarLike: TypeAlias = Array | np.ndarray | bool
+"""A truth value, likewise."""
+
+VectorField: TypeAlias = Callable[[RealScalarLike, PyTree, PyTree], PyTree]
+"""Rates of change f(t, state, args), in the form that `diffrax.ODETerm` takes."""
 
 
 def as_float(value: Any) -> Any:

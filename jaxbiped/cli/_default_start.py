@@ -1,16 +1,17 @@
 """Default start of a command: the seed's start, fitted to the scene."""
 
 import math
-from typing import Any
+from typing import Any, cast
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._bristle_state import MinimalState
 from jaxbiped.dynamics._feet import standing_height
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._state import State, seed_state
+from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._state import seed_state
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
@@ -22,7 +23,7 @@ _STEP = 1.01
 _ROUNDS = 8
 
 
-def default_start(scene: Any) -> State | RigidState:
+def default_start(scene: Any) -> WalkerState:
     """The seed's start, fitted to the scene's legs and as loaded on its ground as on its own.
 
     For the seed's own scene it is the seed's start to the last bit.
@@ -34,7 +35,7 @@ def default_start(scene: Any) -> State | RigidState:
         own.walker, own.normal, own.ground.g
     ):
         return seed
-    start = default_guess(scene)
+    start = cast(MinimalState, default_guess(scene))
     depth = standing_height(own, seed.theta_2) - seed.hip_z
     load = (scene.walker.total_mass * scene.ground.g) / (own.walker.total_mass * own.ground.g)
     fitted = float(_depth(scene.normal, own.normal, depth, load))

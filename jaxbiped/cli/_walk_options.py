@@ -18,8 +18,7 @@ from jaxbiped._checks import (
 from jaxbiped._types import as_float
 from jaxbiped.cli._default_start import default_start
 from jaxbiped.constraints._constraint_methods import method_named
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
@@ -199,7 +198,7 @@ class StartOptions:
         """The numbers that were said."""
         return {name: x for name, x in dataclasses.asdict(self).items() if x is not None}
 
-    def state(self, scene: Any) -> State | RigidState:
+    def state(self, scene: Any) -> WalkerState:
         """The start, of the kind that the scene needs; raises `ArgumentError`.
 
         A rigid walker takes the place and the legs' angles and rates.

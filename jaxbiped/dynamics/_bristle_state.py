@@ -1,8 +1,9 @@
 """State of a walker with bristle friction."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import jax.numpy as jnp
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
@@ -31,12 +32,16 @@ class BristleState(NamedTuple):
     bristle_2: Scalar
 
 
+MinimalState: TypeAlias = State | BristleState
+"""A state in minimal coordinates of a walker with laws of contact."""
+
+
 @state_type.register
-def _(scene: Scene) -> Any:
+def _(scene: Scene) -> type[MinimalState]:
     return BristleState if scene.has_bristles else State
 
 
-def state_for(scene: Scene, state: Any, name: str = "state") -> Any:
+def state_for(scene: Scene, state: PyTree, name: str = "state") -> MinimalState:
     """A checked start of the type that a scene needs: bristles are straight unless given.
 
     Raises:

@@ -1,6 +1,6 @@
 """Consistent redundant states: on their constraints after each step, and at the start."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 
@@ -17,7 +17,9 @@ from jaxbiped.dynamics._redundant_motion import (
     with_coordinates,
 )
 from jaxbiped.dynamics._redundant_state import (
+    CompliantState,
     EulerState,
+    LegsState,
     RedundantState,
     is_redundant,
     redundant_state,
@@ -39,13 +41,13 @@ class Consistent(NamedTuple):
         velocity: the same of its velocities [m/s].
     """
 
-    state: Any
+    state: LegsState
     violation: Violation
     position: Scalar
     velocity: Scalar
 
 
-def project(scene: RedundantScene, state: Any) -> Any:
+def project(scene: RedundantScene, state: LegsState) -> LegsState:
     """The state as the scene's method corrects it after each step; differentiable.
 
     Args:
@@ -68,7 +70,7 @@ def project(scene: RedundantScene, state: Any) -> Any:
 
 
 def consistent_state(
-    scene: RedundantScene, state: Any, *, max_violation: Violation = FURTHEST
+    scene: RedundantScene, state: CompliantState, *, max_violation: Violation = FURTHEST
 ) -> Consistent:
     """The consistent state nearest to a start, least in the mass metric.
 
@@ -105,7 +107,7 @@ def consistent_state(
     return Consistent(with_coordinates(state, new_q, new_v), off, size(new_q, q), size(new_v, v))
 
 
-def _check_state_of_scene(scene: RedundantScene, state: Any) -> Any:
+def _check_state_of_scene(scene: RedundantScene, state: object) -> LegsState:
     if not is_redundant(state):
         return redundant_state(scene, state_for(scene.scene, state))
     kind = EulerState if scene.orientation == "euler" else RedundantState

@@ -1,12 +1,13 @@
 """Feet: where they are, how they move, and which of them touch the ground."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._redundant_state import Leg, legs_of
-from jaxbiped.scene._scene import Scene
+from jaxbiped.dynamics._redundant_state import CompliantState, Leg, legs_of
+from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._redundant_scene import CompliantScene
 
 
 class Foot(NamedTuple):
@@ -45,7 +46,7 @@ class Feet(NamedTuple):
     foot_2: Foot
 
 
-def feet(scene: Any, state: Any) -> Feet:
+def feet(scene: CompliantScene, state: CompliantState) -> Feet:
     """Both feet's kinematics (model: foot centre O = S + (l − r)(sin θ, −cos θ)).
 
     In redundant coordinates S is where the foot's own leg has the hip.
@@ -61,12 +62,12 @@ def feet(scene: Any, state: Any) -> Feet:
     return feet_of(scene, legs_of(scene, state))
 
 
-def feet_of(scene: Any, legs: tuple[Leg, Leg]) -> Feet:
+def feet_of(scene: CompliantScene, legs: tuple[Leg, Leg]) -> Feet:
     """The feet at the ends of legs."""
     return Feet(_foot(scene, 1, legs[0]), _foot(scene, 2, legs[1]))
 
 
-def _foot(scene: Any, number: int, leg: Leg) -> Foot:
+def _foot(scene: CompliantScene, number: int, leg: Leg) -> Foot:
     length, radius = scene.walker.hip_to_foot, scene.walker.r
     sine, cosine = leg.sine, leg.cosine
     x = leg.hip_x + length * sine
@@ -119,7 +120,7 @@ def standing_foot(both: Feet) -> Scalar:
 
 
 def standing_height(
-    scene: Scene, stance_angle: Scalar, penetration: Scalar | float = 0.0
+    scene: AbstractScene, stance_angle: Scalar, penetration: Scalar | float = 0.0
 ) -> Scalar:
     """Height of the hip over a leg that stands on its foot.
 

@@ -1,12 +1,14 @@
 """Forces of the ground on the feet."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.dynamics._redundant_state import CompliantState
+from jaxbiped.scene._redundant_scene import CompliantScene
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 from jaxbiped.scene.laws.friction._frictionless import Frictionless
 
@@ -23,7 +25,7 @@ class FootForce(NamedTuple):
     tangential: Scalar | None
 
 
-def foot_force(scene: Any, foot: Foot) -> FootForce:
+def foot_force(scene: CompliantScene, foot: Foot) -> FootForce:
     """Force on a foot whose kinematics are known."""
     if foot.admitted is False:
         nothing = jnp.zeros_like(foot.penetration)
@@ -54,7 +56,7 @@ class FootForces(NamedTuple):
     foot_2: FootForce
 
 
-def foot_forces(scene: Any, state: Any) -> FootForces:
+def foot_forces(scene: CompliantScene, state: CompliantState) -> FootForces:
     """Forces on both feet at a state; leaves shaped as the state's.
 
     Args:

@@ -1,9 +1,9 @@
 """Equations of motion of a linkage, by any of the constraint methods."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
 from jaxbiped.constraints._linkage import Linkage
 from jaxbiped.constraints._linkage_constraints import Heading, constraints_of, masses_of
@@ -77,7 +77,7 @@ def linkage_motion(scene: LinkageScene, state: LinkageState) -> LinkageMotion:
     return motion_under(linkage, scene.method, state.q, state.v, applied)
 
 
-def linkage_field(t: Any, state: LinkageState, scene: LinkageScene) -> LinkageState:
+def linkage_field(t: RealScalarLike, state: LinkageState, scene: LinkageScene) -> LinkageState:
     """Time derivative of a linkage's state, in the form that `diffrax.ODETerm` takes.
 
     Args:

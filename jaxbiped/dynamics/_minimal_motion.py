@@ -1,15 +1,17 @@
 """Equations of motion in minimal coordinates: hip x, hip z and two leg angles."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 
 from jaxbiped._circular import sine_cosine
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar, VectorField
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._forces import foot_force
 from jaxbiped.dynamics._formulation import field_of
+from jaxbiped.dynamics._redundant_state import CompliantState
 from jaxbiped.dynamics._state import State
+from jaxbiped.scene._redundant_scene import CompliantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
@@ -111,7 +113,9 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
     )
 
 
-def bristle_rates(law: AbstractBristleLaw, scene: Any, state: Any) -> dict[str, Scalar]:
+def bristle_rates(
+    law: AbstractBristleLaw, scene: CompliantScene, state: CompliantState
+) -> dict[str, Scalar]:
     """Rates of both feet's bristles by their names in the state [1/s]."""
     rates = {}
     for name, foot in zip(("bristle_1", "bristle_2"), feet(scene, state), strict=True):
@@ -121,7 +125,7 @@ def bristle_rates(law: AbstractBristleLaw, scene: Any, state: Any) -> dict[str, 
     return rates
 
 
-def vector_field(t: Any, state: State, scene: Scene) -> State:
+def vector_field(t: RealScalarLike, state: State, scene: Scene) -> State:
     """Time derivative of the state, in the form that `diffrax.ODETerm` takes.
 
     Args:
@@ -150,5 +154,5 @@ def vector_field(t: Any, state: State, scene: Scene) -> State:
 
 
 @field_of.register
-def _(scene: Scene) -> Any:
+def _(scene: Scene) -> VectorField:
     return vector_field

@@ -1,11 +1,12 @@
 """Equations of motion in redundant coordinates: each leg its own body, joined at the hip."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 import jax.numpy as jnp
+from jaxtyping import PyTree
 
 from jaxbiped._circular import sine_cosine
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar, VectorField
 from jaxbiped.constraints._linkage_constraints import (
     constraints_of,
     headings_of,
@@ -17,9 +18,9 @@ from jaxbiped.dynamics._forces import foot_force
 from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.dynamics._linkage_motion import LinkageMotion, motion_under
 from jaxbiped.dynamics._minimal_motion import Accelerations, accelerations, bristle_rates
-from jaxbiped.dynamics._redundant_state import Leg, legs_of
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.dynamics._redundant_state import Leg, LegsState, legs_of
+from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._redundant_scene import CompliantScene, RedundantScene
 from jaxbiped.scene._walker_linkage import leg_of
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
@@ -47,9 +48,9 @@ class Violation(NamedTuple):
         normalisation: largest | cos² + sin² − 1 | of a leg's Euler parameters; 0 without them.
     """
 
-    position: Any
-    rate: Any
-    normalisation: Any
+    position: RealScalarLike
+    rate: RealScalarLike
+    normalisation: RealScalarLike
 
 
 class RedundantMotion(NamedTuple):
@@ -67,18 +68,19 @@ class RedundantMotion(NamedTuple):
     minimal: Accelerations
 
 
-def coordinates_of(scene: RedundantScene, state: Any) -> tuple[list[Scalar], list[Scalar]]:
+def coordinates_of(scene: RedundantScene, state: LegsState) -> tuple[list[Scalar], list[Scalar]]:
     """Coordinates and rates of a redundant state as the linkage has them."""
     count = 2 * scene.linkage.coordinates
-    return list(state[:count]), list(state[count : 2 * count])
+    leaves = cast(tuple[Scalar, ...], state)
+    return list(leaves[:count]), list(leaves[count : 2 * count])
 
 
-def with_coordinates(state: Any, q: list[Scalar], v: list[Scalar]) -> Any:
+def with_coordinates(state: PyTree, q: list[Scalar], v: list[Scalar]) -> LegsState:
     """The state with other coordinates and rates; bristles stay."""
     return type(state)(*q, *v, state.bristle_1, state.bristle_2)
 
 
-def redundant_motion(scene: RedundantScene, state: Any) -> RedundantMotion:
+def redundant_motion(scene: RedundantScene, state: LegsState) -> RedundantMotion:
     """Accelerations and the hip's reaction by the scene's method.
 
     Args:
@@ -97,7 +99,7 @@ def redundant_motion(scene: RedundantScene, state: Any) -> RedundantMotion:
     return RedundantMotion(moved.accelerations, force, minimal)
 
 
-def redundant_field(t: Any, state: Any, scene: RedundantScene) -> Any:
+def redundant_field(t: RealScalarLike, state: LegsState, scene: RedundantScene) -> LegsState:
     """Time derivative of a redundant state, in the form that `diffrax.ODETerm` takes.
 
     Args:
@@ -117,11 +119,11 @@ def redundant_field(t: Any, state: Any, scene: RedundantScene) -> Any:
 
 
 @field_of.register
-def _(scene: RedundantScene) -> Any:
+def _(scene: RedundantScene) -> VectorField:
     return redundant_field
 
 
-def violation(scene: RedundantScene, state: Any) -> Violation:
+def violation(scene: RedundantScene, state: LegsState) -> Violation:
     """How far apart the two legs' hips are, and how fast they part.
 
     Args:
@@ -138,7 +140,7 @@ def violation(scene: RedundantScene, state: Any) -> Violation:
     return Violation(jnp.hypot(*at.violation[:2]), jnp.hypot(*at.rate[:2]), off)
 
 
-def hip_force(scene: Scene | RedundantScene, state: Any) -> HipForce:
+def hip_force(scene: CompliantScene, state: PyTree) -> HipForce:
     """The hip's reaction on leg 1, in either formulation.
 
     In minimal coordinates it does no work and is in no equation: it is what Newton's law for leg 1
@@ -166,12 +168,12 @@ def hip_force(scene: Scene | RedundantScene, state: Any) -> HipForce:
     )
 
 
-def _gravity(scene: Any) -> tuple[Scalar, Scalar]:
+def _gravity(scene: AbstractScene) -> tuple[Scalar, Scalar]:
     ground = scene.ground
     return ground.g * jnp.sin(ground.slope), -ground.g * jnp.cos(ground.slope)
 
 
-def _linkage_motion(scene: RedundantScene, state: Any) -> LinkageMotion:
+def _linkage_motion(scene: RedundantScene, state: LegsState) -> LinkageMotion:
     q, v = coordinates_of(scene, state)
     legs = legs_of(scene, state)
     headings = headings_of(scene.linkage, q, v, [(leg.sine, leg.cosine) for leg in legs])
@@ -180,7 +182,7 @@ def _linkage_motion(scene: RedundantScene, state: Any) -> LinkageMotion:
     )
 
 
-def _applied_forces(scene: RedundantScene, state: Any, legs: tuple[Leg, Leg]) -> list[Scalar]:
+def _applied_forces(scene: RedundantScene, state: LegsState, legs: tuple[Leg, Leg]) -> list[Scalar]:
     """Gravity and the ground's forces on each leg, from that leg's own coordinates."""
     walker, linkage = scene.walker, scene.linkage
     body, distance = leg_of(walker)
@@ -198,7 +200,7 @@ def _applied_forces(scene: RedundantScene, state: Any, legs: tuple[Leg, Leg]) ->
             if reaction.tangential is not None:
                 force_x = force_x + reaction.tangential
                 torque = torque + reaction.tangential * (reach * leg.cosine + walker.r)
-        own = state[size * k : size * (k + 1)]
+        own = cast(tuple[Scalar, ...], state)[size * k : size * (k + 1)]
         applied += [force_x, force_z, *torque_on(linkage, own, torque)]
     return applied
 

@@ -1,16 +1,20 @@
 """State in redundant coordinates: each leg has its own."""
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias, cast
 
 import jax.numpy as jnp
 
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._bristle_state import BristleState
+from jaxbiped.dynamics._bristle_state import BristleState, MinimalState
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._walker_linkage import leg_of
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeIs
 
 
 class RedundantState(NamedTuple):
@@ -39,8 +43,8 @@ class RedundantState(NamedTuple):
     vx_2: Scalar
     vz_2: Scalar
     omega_2: Scalar
-    bristle_1: Any = None
-    bristle_2: Any = None
+    bristle_1: Scalar | None = None
+    bristle_2: Scalar | None = None
 
 
 class EulerState(NamedTuple):
@@ -70,8 +74,8 @@ class EulerState(NamedTuple):
     vz_2: Scalar
     cos_rate_2: Scalar
     sin_rate_2: Scalar
-    bristle_1: Any = None
-    bristle_2: Any = None
+    bristle_1: Scalar | None = None
+    bristle_2: Scalar | None = None
 
     @property
     def theta_1(self) -> Scalar:
@@ -94,6 +98,13 @@ class EulerState(NamedTuple):
         return _rate(self.cos_half_2, self.sin_half_2, self.cos_rate_2, self.sin_rate_2)
 
 
+LegsState: TypeAlias = RedundantState | EulerState
+"""A state with coordinates of each leg."""
+
+CompliantState: TypeAlias = MinimalState | LegsState
+"""A state of a walker with laws of contact."""
+
+
 class Leg(NamedTuple):
     """One leg as its own coordinates have it: the hip is where this leg says it is.
 
@@ -111,25 +122,25 @@ class Leg(NamedTuple):
     rate: Scalar
     sine: Scalar
     cosine: Scalar
-    bristle: Any
+    bristle: Scalar | None
 
 
-def is_redundant(state: Any) -> bool:
+def is_redundant(state: object) -> "TypeIs[LegsState]":
     """Whether a state has coordinates for each leg."""
     return isinstance(state, RedundantState | EulerState)
 
 
-def legs_of(scene: Any, state: Any) -> tuple[Leg, Leg]:
+def legs_of(scene: AbstractScene, state: CompliantState) -> tuple[Leg, Leg]:
     """Both legs of a state of either formulation."""
     return _leg(scene, state, 1), _leg(scene, state, 2)
 
 
 @state_type.register
-def _(scene: RedundantScene) -> Any:
+def _(scene: RedundantScene) -> type[LegsState]:
     return EulerState if scene.orientation == "euler" else RedundantState
 
 
-def redundant_state(scene: RedundantScene, state: Any) -> Any:
+def redundant_state(scene: RedundantScene, state: MinimalState) -> LegsState:
     """The consistent state of a redundant scene that is the same as a minimal one.
 
     Args:
@@ -141,7 +152,7 @@ def redundant_state(scene: RedundantScene, state: Any) -> Any:
     """
     _, distance = leg_of(scene.walker)
     kind = state_type(scene)
-    fields: dict[str, Any] = {}
+    fields: dict[str, Scalar | None] = {}
     for leg, angle, rate in (
         ("1", state.theta_1, state.omega_1),
         ("2", state.theta_2, state.omega_2),
@@ -167,7 +178,7 @@ def redundant_state(scene: RedundantScene, state: Any) -> Any:
     return kind(**fields)
 
 
-def minimal_state(scene: Any, state: Any) -> Any:
+def minimal_state(scene: AbstractScene, state: CompliantState) -> MinimalState:
     """The minimal state that a redundant one stands for: the hip half way between the legs' two.
 
     A minimal state is returned as it is.
@@ -194,10 +205,12 @@ def minimal_state(scene: Any, state: Any) -> Any:
     )
     if state.bristle_1 is None:
         return State(**values)
-    return BristleState(**values, bristle_1=one.bristle, bristle_2=two.bristle)
+    return BristleState(
+        **values, bristle_1=cast(Scalar, one.bristle), bristle_2=cast(Scalar, two.bristle)
+    )
 
 
-def _leg(scene: Any, state: Any, number: int) -> Leg:
+def _leg(scene: AbstractScene, state: CompliantState, number: int) -> Leg:
     def own(name: str) -> Scalar:
         return getattr(state, f"{name}_{number}")
 

@@ -1,10 +1,11 @@
 """The state of the rigid walker, and the whole motion that it stands for."""
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._bristle_state import MinimalState
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -27,6 +28,10 @@ class RigidState(NamedTuple):
     theta_2: Scalar
     omega_1: Scalar
     omega_2: Scalar
+
+
+WalkerState: TypeAlias = MinimalState | RigidState
+"""A state of a walker in minimal coordinates, compliant or rigid."""
 
 
 @state_type.register

@@ -1,11 +1,11 @@
 """Single support of the rigid walker: leg 2 rolls without slip, leg 1 swings."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 
 from jaxbiped._circular import sine_cosine
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar, VectorField
 from jaxbiped.dynamics._forces import FootForce
 from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.dynamics._rigid_state import RigidState
@@ -164,7 +164,7 @@ def rolling(scene: RigidScene, state: RigidState) -> RollingMotion:
     return RollingMotion(alpha_1, alpha_2, force)
 
 
-def rolling_field(t: Any, state: RigidState, scene: RigidScene) -> RigidState:
+def rolling_field(t: RealScalarLike, state: RigidState, scene: RigidScene) -> RigidState:
     """Time derivative of the state, in the form that `diffrax.ODETerm` takes.
 
     Args:
@@ -188,5 +188,5 @@ def rolling_field(t: Any, state: RigidState, scene: RigidScene) -> RigidState:
 
 
 @field_of.register
-def _(scene: RigidScene) -> Any:
+def _(scene: RigidScene) -> VectorField:
     return rolling_field

@@ -2,7 +2,6 @@
 
 import abc
 from collections.abc import Callable
-from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -28,10 +27,10 @@ class AbstractSection(eqx.Module):
 class MidStance(AbstractSection):
     """The leg that stands, leg 2, passes the slope's normal on its way back, and carries."""
 
-    def value(self, args: PyTree, y: Any) -> Scalar:
+    def value(self, args: PyTree, y: PyTree) -> Scalar:
         return -y.theta_2
 
-    def counts(self, args: PyTree, y: Any) -> Scalar:
+    def counts(self, args: PyTree, y: PyTree) -> Scalar:
         if isinstance(y, RigidState):
             return jnp.asarray(True)
         return touches(feet(args, y).foot_2)
@@ -40,13 +39,13 @@ class MidStance(AbstractSection):
 class HeelStrike(AbstractSection):
     """The foot ahead comes down; by then its leg is called leg 2, the new stance leg."""
 
-    def value(self, args: PyTree, y: Any) -> Scalar:
+    def value(self, args: PyTree, y: PyTree) -> Scalar:
         if isinstance(y, RigidState):
             # Both feet touch where the angles are opposite; then the one ahead comes down.
             return -(y.theta_1 + y.theta_2)
         return feet(args, y).foot_2.penetration
 
-    def counts(self, args: PyTree, y: Any) -> Scalar:
+    def counts(self, args: PyTree, y: PyTree) -> Scalar:
         if isinstance(y, RigidState):
             return y.theta_2 > y.theta_1
         both = feet(args, y)

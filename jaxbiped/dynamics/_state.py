@@ -1,8 +1,9 @@
 """The state of the walker in minimal coordinates, and the seed's start."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import jax.numpy as jnp
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._types import Scalar, as_float
@@ -54,7 +55,11 @@ def seed_state() -> State:
     )
 
 
-def exchange_legs(state: Any) -> Any:
+SomeState = TypeVar("SomeState", bound=NamedTuple)
+"""A state of any kind, which comes back as the same kind."""
+
+
+def exchange_legs(state: SomeState) -> SomeState:
     """The same motion with the names of the two legs exchanged; of a state of any kind.
 
     Args:
@@ -70,7 +75,7 @@ def exchange_legs(state: Any) -> Any:
     return state._replace(**swapped)
 
 
-def check_state(state: Any, kind: type = State, name: str = "state") -> Any:
+def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTree:
     """`state` with every leaf a floating-point array of one shape.
 
     Raises:
@@ -80,7 +85,7 @@ def check_state(state: Any, kind: type = State, name: str = "state") -> Any:
     return check_leaves(state, name)
 
 
-def check_leaves(state: Any, name: str) -> Any:
+def check_leaves(state: SomeState, name: str) -> SomeState:
     """`state` with every leaf a floating-point array of one shape; None stays.
 
     Raises:

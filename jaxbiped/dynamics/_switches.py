@@ -3,11 +3,13 @@
 No step may straddle one: derivatives taken through it would be wrong.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._forces import foot_force
+from jaxbiped.dynamics._redundant_state import CompliantState
+from jaxbiped.scene._redundant_scene import CompliantScene
 
 
 class Switch(NamedTuple):
@@ -22,11 +24,11 @@ class Switch(NamedTuple):
     """
 
     value: Scalar
-    live: Any
+    live: Scalar | bool
     force_jumps: bool = False
 
 
-def switches(scene: Any, state: Any) -> tuple[Switch, ...]:
+def switches(scene: CompliantScene, state: CompliantState) -> tuple[Switch, ...]:
     """Every switch of a scene: touchdown, reaction leaving zero, slip at ±v0 and 0, clearance rule.
 
     Source: the seed paper, section 2.2, whose laws have these corners.
@@ -47,7 +49,7 @@ def switches(scene: Any, state: Any) -> tuple[Switch, ...]:
     )
 
 
-def _foot_switches(scene: Any, foot: Foot, rate: Scalar) -> list[Switch]:
+def _foot_switches(scene: CompliantScene, foot: Foot, rate: Scalar) -> list[Switch]:
     if foot.admitted is False:
         return []
     below, touching = foot.penetration > 0.0, touches(foot)

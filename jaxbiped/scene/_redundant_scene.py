@@ -1,7 +1,7 @@
 """A scene whose legs have coordinates of their own."""
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import equinox as eqx
 
@@ -86,3 +86,7 @@ class RedundantScene(AbstractScene):
     def linkage(self) -> Linkage:
         """The legs and the hip as a linkage."""
         return walker_linkage(self.scene.walker, self.orientation)
+
+
+CompliantScene: TypeAlias = Scene | RedundantScene
+"""A walker with laws of contact, in minimal or redundant coordinates."""

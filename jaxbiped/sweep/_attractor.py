@@ -1,6 +1,6 @@
 """Attractors: the metric in which a gait draws starts in, and how far that reaches."""
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
@@ -108,5 +108,5 @@ def component_scales(scene: Scene | RigidScene, state: Any) -> np.ndarray:
     sizes = {"hip_vx": speed, "hip_vz": speed, "omega_1": rate, "omega_2": rate}
     sizes |= {"theta_1": 1.0, "theta_2": 1.0, "bristle_1": 1.0, "bristle_2": 1.0}
     if scene.compliant:
-        sizes["hip_z"] = abs(float(feet(scene, state).foot_2.penetration))
+        sizes["hip_z"] = abs(float(feet(cast(Scene, scene), state).foot_2.penetration))
     return np.array([sizes[name] for name in state._fields[1:]])
