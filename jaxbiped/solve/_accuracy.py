@@ -9,8 +9,9 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.scene._abstract_scene import is_rigid
+from jaxbiped.scene._redundant_scene import CompliantScene
 
 
 class Tolerances(NamedTuple):
@@ -20,8 +21,8 @@ class Tolerances(NamedTuple):
     default the absolute one is a hundredth of the relative one, in the scene's `Units`.
     """
 
-    rtol: float
-    atol: float
+    rtol: RealScalarLike
+    atol: RealScalarLike
 
 
 class Precision(NamedTuple):
@@ -33,8 +34,8 @@ class Precision(NamedTuple):
         tangent_rtol: relative tolerance of the columns.
     """
 
-    rtol: Any
-    tangent_rtol: Any
+    rtol: RealScalarLike
+    tangent_rtol: RealScalarLike
 
 
 class Accuracy(NamedTuple):
@@ -72,7 +73,7 @@ which steps may chatter about that."""
 
 
 def tolerances(
-    accuracy: str, rtol: float | None, atol: float | None, scene: Any = None
+    accuracy: str, rtol: float | None, atol: float | None, scene: PyTree = None
 ) -> Tolerances:
     """The tolerances that a name stands for in a scene, either one replaced where it is given.
 
@@ -87,7 +88,7 @@ def tolerances(
     return Tolerances(relative, absolute)
 
 
-def precision_of(accuracy: str, scene: Any = None) -> Precision:
+def precision_of(accuracy: str, scene: PyTree = None) -> Precision:
     """Tolerances of state and derivatives of a gait; one of `GAIT_ACCURACIES`."""
     named = ACCURACIES[accuracy]
     found = named.rigid_gait if is_rigid(scene) else named.gait
@@ -95,7 +96,7 @@ def precision_of(accuracy: str, scene: Any = None) -> Precision:
     return found
 
 
-def resolve_slip_speed(rtol: float, scene: Any) -> Any:
+def resolve_slip_speed(rtol: float, scene: PyTree) -> RealScalarLike:
     """A relative tolerance, or the largest below it that resolves how friction builds up."""
     law = getattr(scene, "friction", None)
     name = getattr(law, "builds_up_over", None)
@@ -125,7 +126,7 @@ def rms_norm(error: PyTree) -> Scalar:
     return jnp.sqrt(total / size)
 
 
-def check_precision(scene: Any, dtype: np.dtype) -> None:
+def check_precision(scene: CompliantScene, dtype: np.dtype) -> None:
     """Refuses a precision too coarse for the scene's contact.
 
     Rounding a position of the order of l moves a foot by ε l. Where that alone changes the

@@ -4,14 +4,15 @@ Rounding differs, and it decides on step sizes after a few steps: the steps are 
 """
 
 import contextlib
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import diffrax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Numbers, RealScalarLike, Scalar
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._state import State
@@ -24,9 +25,10 @@ from jaxbiped.solve._saved_outputs import LastStep, Saved
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
 from jaxbiped.solve.controllers._step_control import first_step, step_control
+from jaxbiped.solve.controllers._wrapped_control import StepControl
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, step_of
 
-_TERM: Any = diffrax.ODETerm(vector_field)
+_TERM = diffrax.ODETerm(vector_field)
 
 
 class Solve(NamedTuple):
@@ -44,14 +46,14 @@ class Solve(NamedTuple):
 
     scene: Scene
     state: State
-    duration: Any
-    almost: Any
-    rtol: Any
-    atol: Any
+    duration: Numbers
+    almost: Numbers
+    rtol: Numbers
+    atol: Numbers
     units: Units
-    footsteps: Any
-    patience: Any
-    max_attempts: Any
+    footsteps: Numbers
+    patience: Numbers
+    max_attempts: Numbers
 
 
 class Solved(NamedTuple):
@@ -60,11 +62,11 @@ class Solved(NamedTuple):
     `lowest` and `highest` are the extremes of what was asked for, None where nothing was.
     """
 
-    t: Any
+    t: Scalar
     state: State
-    ending: Any
-    accepted: Any
-    rejected: Any
+    ending: Scalar
+    accepted: Scalar
+    rejected: Scalar
     lowest: PyTree = None
     highest: PyTree = None
 
@@ -75,7 +77,7 @@ class _Now(NamedTuple):
     t: Scalar
     next_t: Scalar
     state: State
-    control: Any
+    control: PyTree
     accepted: Scalar
     rejected: Scalar
     events: tuple[Scalar, ...]
@@ -214,20 +216,19 @@ class AdaptiveSolve:
             return None
         values = _numbers(self.saved.extremes(scene, state))
 
-        def chosen(combine: Any, old: PyTree) -> PyTree:
+        def chosen(combine: Callable[[Scalar, Scalar], Scalar], old: PyTree) -> PyTree:
             return jtu.tree_map(lambda a, b: jnp.where(keep, combine(a, b), a), old, values)
 
         low, high = now.extremes
         return chosen(jnp.minimum, low), chosen(jnp.maximum, high)
 
-    def _controller(self, solve: Solve) -> Any:
-        control: Any = step_control(solve.rtol, solve.atol, rms_norm, solve.units)
+    def _controller(self, solve: Solve) -> StepControl:
+        control = step_control(solve.rtol, solve.atol, rms_norm, solve.units)
         if not self.counting:
             return control
-        limit: Any = solve.footsteps
-        return FootstepLimit(control, limit)
+        return FootstepLimit(control, solve.footsteps)
 
-    def _error_order(self) -> Any:
+    def _error_order(self) -> RealScalarLike | None:
         return self.solver.error_order(_TERM)
 
 

@@ -1,6 +1,6 @@
 """Dense output: states between the steps of a solve, compiled once whatever its length."""
 
-from typing import Any
+from collections.abc import Callable
 
 import diffrax
 import jax
@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
+from jaxbiped._types import Scalar
 
 AT_ONCE = 4096
 """Times or states in one call of a compiled function: one size for all lengths."""
@@ -46,8 +47,14 @@ def evaluate_dense(dense: diffrax.DenseInterpolation, times: np.ndarray) -> PyTr
 
 
 @cached_jit
-def _evaluate(kind: Any, start: np.ndarray, end: np.ndarray, info: PyTree, t: np.ndarray) -> PyTree:
-    def evaluate(start: Any, end: Any, info: Any, t: Any) -> PyTree:
+def _evaluate(
+    kind: Callable[..., diffrax.AbstractLocalInterpolation],
+    start: np.ndarray,
+    end: np.ndarray,
+    info: PyTree,
+    t: np.ndarray,
+) -> PyTree:
+    def evaluate(start: Scalar, end: Scalar, info: PyTree, t: Scalar) -> PyTree:
         return kind(t0=start, t1=end, **info).evaluate(t)
 
     return jax.vmap(evaluate)(*jtu.tree_map(jnp.asarray, (start, end, info, t)))

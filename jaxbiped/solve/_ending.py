@@ -1,14 +1,15 @@
 """Endings of a simulation, and the events that bring them."""
 
 import enum
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
+from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._minimal_motion import accelerations
@@ -150,32 +151,33 @@ def rigid_ending(state: RigidState) -> Scalar:
     return jnp.where(jnp.isfinite(sum(state)), code, int(Ending.SOLVER_FAILED))
 
 
-def _failed(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+def _failed(t: RealScalarLike, y: PyTree, args: PyTree, **kwargs: Any) -> Scalar:
     return ~jnp.isfinite(sum(jtu.tree_leaves(y)))
 
 
-def _fell_forward(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+def _fell_forward(t: RealScalarLike, y: PyTree, args: PyTree, **kwargs: Any) -> Scalar:
     y = minimal_state(args, y)
     too_late, _ = is_barred(args, y)
     return too_late | (has_fallen(args, y) & (y.hip_vx >= 0.0))
 
 
-def _fell_back(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+def _fell_back(t: RealScalarLike, y: PyTree, args: PyTree, **kwargs: Any) -> Scalar:
     y = minimal_state(args, y)
     return has_fallen(args, y) & (y.hip_vx < 0.0)
 
 
-def _stopped(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
-    return has_stopped(args, minimal_state(args, y))
+def _stopped(t: RealScalarLike, y: PyTree, args: PyTree, **kwargs: Any) -> Scalar:
+    y = minimal_state(args, y)
+    return has_stopped(args, y)
 
 
-def _stumbled(t: Any, y: Any, args: Any, **kwargs: Any) -> Any:
+def _stumbled(t: RealScalarLike, y: PyTree, args: PyTree, **kwargs: Any) -> Scalar:
     y = minimal_state(args, y)
     _, too_short = is_barred(args, y)
     return too_short | has_stumbled(args, y)
 
 
-_EVENTS: dict[str, dict[Ending, Callable[..., Any]]] = {
+_EVENTS: dict[str, dict[Ending, Callable[..., Scalar]]] = {
     "fall": {Ending.FELL_FORWARD: _fell_forward, Ending.FELL_BACK: _fell_back},
     "stop": {Ending.STOPPED: _stopped},
     "stumble": {Ending.STUMBLED: _stumbled},
@@ -183,7 +185,7 @@ _EVENTS: dict[str, dict[Ending, Callable[..., Any]]] = {
 WATCHES = tuple(_EVENTS)
 
 
-def ending_events(watch: tuple[str, ...]) -> dict[Ending, Callable[..., Any]]:
+def ending_events(watch: tuple[str, ...]) -> dict[Ending, Callable[..., Scalar]]:
     """The conditions, for `diffrax.Event`, that end a solve whose `args` is the scene.
 
     The same functions each time: JAX's caches know what they have traced by the functions.
@@ -196,7 +198,7 @@ def ending_events(watch: tuple[str, ...]) -> dict[Ending, Callable[..., Any]]:
 
 
 def ending_code(
-    events: dict[Ending, Any], *, done: Scalar, out_of_steps: Scalar, timed_out: Scalar
+    events: Mapping[Ending, Scalar], *, done: Scalar, out_of_steps: Scalar, timed_out: Scalar
 ) -> Scalar:
     """The code of how a solve ended.
 

@@ -4,13 +4,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Numbers, Scalar
 
 _CLIPPED_ULPS = 100
 """A step that would end this near the end, in units in the last place, ends there."""
 
 
-def just_before_end(duration: Scalar) -> Scalar:
+def just_before_end(duration: Numbers) -> Scalar:
     """The time from which on a step that would end there ends at `duration`, as diffrax has it.
 
     Units are counted in the bits of the 64-bit number, which are in the numbers' own order: as
@@ -25,7 +25,7 @@ def just_before_end(duration: Scalar) -> Scalar:
 
 
 def clip_step(
-    keep: Scalar, t: Scalar, next_t: Scalar, end: Scalar, almost_end: Scalar
+    keep: Scalar, t: Scalar, next_t: Scalar, end: Numbers, almost_end: Numbers
 ) -> tuple[Scalar, Scalar]:
     """The times at which the next step begins and ends, once it comes near `end`."""
     t = jnp.minimum(t, end)

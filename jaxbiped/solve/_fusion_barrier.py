@@ -3,7 +3,6 @@
 import contextlib
 import contextvars
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import equinox.internal as eqxi
 import jax
@@ -11,7 +10,7 @@ import jax.extend
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, SomeTree
 
 _UP = contextvars.ContextVar("barriers are up", default=True)
 
@@ -26,7 +25,7 @@ def without_barriers() -> Iterator[None]:
         _UP.reset(token)
 
 
-def fusion_barrier(happens: Scalar, compute: Callable[[], Any]) -> Any:
+def fusion_barrier(happens: Scalar, compute: Callable[[], SomeTree]) -> SomeTree:
     """`compute()`, kept apart from what comes before and after it in the compiled program.
 
     XLA's CPU backend fuses every scalar operation into each of its consumers, repeating it for

@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import diffrax
 import equinox as eqx
@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._types import BoolScalarLike, RealScalarLike
 from jaxbiped.constraints._constraint_method import (
     AbstractConstraintMethod,
     AbstractProjectingMethod,
@@ -17,7 +18,9 @@ from jaxbiped.constraints._constraint_method import (
 from jaxbiped.dynamics._consistent_state import project
 from jaxbiped.scene._redundant_scene import RedundantScene
 
-_SCAN_KINDS: dict[Any, str | None] = {
+_Solver = TypeVar("_Solver", bound=diffrax.AbstractSolver)
+
+_SCAN_KINDS: dict[type, str | None] = {
     diffrax.RecursiveCheckpointAdjoint: None,
     diffrax.DirectAdjoint: "bounded",
     diffrax.ForwardMode: "lax",
@@ -25,7 +28,9 @@ _SCAN_KINDS: dict[Any, str | None] = {
 """Adjoints that go through the steps themselves, and how Runge–Kutta methods loop for them."""
 
 
-def check_adjoint(method: AbstractConstraintMethod, adjoint: Any) -> None:
+def check_adjoint(
+    method: AbstractConstraintMethod, adjoint: diffrax.AbstractAdjoint | None
+) -> None:
     """Raises `ArgumentError` for an adjoint that would not see a method's projections."""
     projects = isinstance(method, AbstractProjectingMethod)
     if projects and adjoint is not None and type(adjoint) not in _SCAN_KINDS:
@@ -47,7 +52,7 @@ class Projected(diffrax.AbstractWrappedSolver):
         project: `project(args, y)`, the state on the constraints.
     """
 
-    solver: Any  # type: ignore[misc]
+    solver: diffrax.AbstractSolver  # type: ignore[misc]
     project: Callable[[PyTree, PyTree], PyTree] = eqx.field(static=True)
 
     @property
@@ -56,12 +61,12 @@ class Projected(diffrax.AbstractWrappedSolver):
         return self.solver.term_structure
 
     @property
-    def interpolation_cls(self) -> Any:  # type: ignore[override]
+    def interpolation_cls(self) -> Callable[..., diffrax.AbstractLocalInterpolation]:  # type: ignore[override]
         """The solver's."""
         return self.solver.interpolation_cls
 
     @property
-    def scan_kind(self) -> Any:
+    def scan_kind(self) -> str | None:
         """The solver's, where it has one: diffrax asks Runge–Kutta methods."""
         return getattr(self.solver, "scan_kind", None)
 
@@ -69,28 +74,30 @@ class Projected(diffrax.AbstractWrappedSolver):
         """The solver's."""
         return self.solver.order(terms)
 
-    def error_order(self, terms: Any) -> Any:
+    def error_order(self, terms: Any) -> RealScalarLike | None:
         """The solver's."""
         return self.solver.error_order(terms)
 
-    def init(self, terms: Any, t0: Any, t1: Any, y0: PyTree, args: PyTree) -> Any:
+    def init(
+        self, terms: Any, t0: RealScalarLike, t1: RealScalarLike, y0: PyTree, args: PyTree
+    ) -> Any:
         """The solver's."""
         return self.solver.init(terms, t0, t1, y0, args)
 
-    def func(self, terms: Any, t0: Any, y0: PyTree, args: PyTree) -> PyTree:
+    def func(self, terms: Any, t0: RealScalarLike, y0: PyTree, args: PyTree) -> PyTree:
         """The vector field at a point."""
         return self.solver.func(terms, t0, y0, args)
 
     def step(
         self,
         terms: Any,
-        t0: Any,
-        t1: Any,
+        t0: RealScalarLike,
+        t1: RealScalarLike,
         y0: PyTree,
         args: PyTree,
         solver_state: Any,
-        made_jump: Any,
-    ) -> tuple[PyTree, PyTree, dict[str, Any], Any, Any]:
+        made_jump: BoolScalarLike,
+    ) -> tuple[PyTree, PyTree, dict[str, PyTree], Any, Any]:
         """One step, as `diffrax.AbstractSolver.step` describes it."""
         anew = jnp.ones_like(jnp.asarray(made_jump))
         y1, error, dense, state, result = self.solver.step(
@@ -101,17 +108,23 @@ class Projected(diffrax.AbstractWrappedSolver):
 
 
 def wrap_projected(
-    solver: Any, project: Callable[[PyTree, PyTree], PyTree], adjoint: Any = None
-) -> Any:
+    solver: _Solver,
+    project: Callable[[PyTree, PyTree], PyTree],
+    adjoint: diffrax.AbstractAdjoint | None = None,
+) -> _Solver:
     """A `Projected` solver, ready for what will differentiate it."""
     kind = _SCAN_KINDS.get(type(adjoint))
     if kind is not None and getattr(solver, "scan_kind", "none") is None:
         # diffrax would set it, but cannot through a wrapper.
-        solver = dataclasses.replace(solver, scan_kind=kind)
-    return Projected(solver, project)
+        solver = dataclasses.replace(solver, scan_kind=kind)  # type: ignore[call-arg]
+    return cast(_Solver, Projected(solver, project))  # as adaptive as what it wraps
 
 
-def with_projection(scene: RedundantScene, solver: Any, adjoint: Any = None) -> Any:
+def with_projection(
+    scene: RedundantScene,
+    solver: _Solver,
+    adjoint: diffrax.AbstractAdjoint | None = None,
+) -> _Solver:
     """The solver, wrapped where the scene's method projects after each step."""
     projects = isinstance(scene.method, AbstractProjectingMethod)
     return wrap_projected(solver, project, adjoint) if projects else solver

@@ -1,12 +1,12 @@
 """Steps of the rigid walker: explicit Runge–Kutta in single support, ended by impacts."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._circular import sine_cosine
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, SomeTree
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -43,10 +43,10 @@ class RigidWalk(NamedTuple):
 
     scene: RigidScene
     state: RigidState
-    duration: Any
-    footsteps: Any
-    rtol: Any
-    max_attempts: Any
+    duration: Scalar
+    footsteps: Scalar
+    rtol: Scalar
+    max_attempts: Scalar
 
 
 class RigidProgress(NamedTuple):
@@ -267,5 +267,5 @@ def _opening(state: RigidState) -> tuple[Scalar, Scalar]:
     return state.theta_1 + state.theta_2, state.omega_1 + state.omega_2
 
 
-def _where(condition: Scalar, a: Any, b: Any) -> Any:
+def _where(condition: Scalar, a: SomeTree, b: SomeTree) -> SomeTree:
     return jtu.tree_map(lambda x, y: jnp.where(condition, x, y), a, b)

@@ -2,10 +2,11 @@
 
 import functools
 import operator
-from typing import Any
+from collections.abc import Sequence
 
 import diffrax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._rigid_state import RigidState
@@ -51,14 +52,16 @@ def accelerations(scene: RigidScene, state: RigidState) -> tuple[Scalar, Scalar]
     return motion.alpha_1, motion.alpha_2
 
 
-def advance(state: RigidState, step: Scalar, weights: Any, stages: list[Rates]) -> RigidState:
+def advance(
+    state: RigidState, step: Scalar, weights: Sequence[float] | np.ndarray, stages: list[Rates]
+) -> RigidState:
     """The state a step further, at weighted rates of its angles and of their rates."""
     old = state[1:]
     new = (leaf + step * _weighted(weights, stages, i) for i, leaf in enumerate(old))
     return RigidState(state.hip_x, *new)
 
 
-def _weighted(weights: Any, stages: list[Rates], i: int) -> Scalar:
+def _weighted(weights: Sequence[float] | np.ndarray, stages: list[Rates], i: int) -> Scalar:
     pairs = zip(weights, stages, strict=True)
     terms = [float(weight) * stage[i] for weight, stage in pairs if weight != 0.0]
     return functools.reduce(operator.add, terms)

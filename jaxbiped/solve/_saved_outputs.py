@@ -1,7 +1,7 @@
 """Saved outputs of a solve by lanes, and how they are found within a step."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -119,7 +119,7 @@ class Saved(NamedTuple):
         def value(state: State) -> Scalar:
             return section.value(scene, _with_leg_names(~last.changed, state))
 
-        def halve(_: Any, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+        def halve(_: Scalar, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
             middle = 0.5 * (ends[0] + ends[1])
             before = value(dense.evaluate(middle)) < 0.0
             return jnp.where(before, middle, ends[0]), jnp.where(before, ends[1], middle)

@@ -1,14 +1,12 @@
 """Trajectory: the result of a simulation."""
 
-from typing import Any
-
 import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Array, Float, Int, PyTree
+from jaxtyping import Array, ArrayLike, Float, Int, PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._summary import summary
@@ -58,7 +56,7 @@ class Trajectory(eqx.Module):
         """How it ended, by name; for one simulation, not a batch."""
         return Ending(int(self.ending))
 
-    def at(self, t: Any) -> State:
+    def at(self, t: ArrayLike) -> State:
         """States at times `t` [s] of any shape, to the order of the solver's dense output.
 
         Under `jit`, `vmap` or derivatives, where it cannot raise, they are NaN outside of the

@@ -12,7 +12,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.scene._abstract_scene import AbstractScene, is_compliant
 
@@ -35,10 +35,10 @@ class Units(NamedTuple):
     """
 
     inverse: PyTree
-    time: Any
+    time: Numbers
 
 
-def units_of(args: Any, state: PyTree) -> Units:
+def units_of(args: PyTree, state: PyTree) -> Units:
     """Units of a state's leaves, from a scene's leg length l and √(l/g).
 
     Ones where `args` is no scene of a compliant walker. They have no derivatives.
@@ -61,7 +61,7 @@ def si_units(units: Units) -> Units:
     return units._replace(inverse=jtu.tree_map(lambda each: each / each, units.inverse))
 
 
-def recurring_inverse_units(args: Any, count: int) -> Scalar:
+def recurring_inverse_units(args: PyTree, count: int) -> Scalar:
     """`Units.inverse` of a minimal state without hip_x, shape (count,)."""
     if not is_compliant(args):
         return jnp.ones(count)

@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
+from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
 
 
 class Extremes(AbstractWrappedControl):
@@ -21,20 +22,33 @@ class Extremes(AbstractWrappedControl):
         function: of (args, state).
     """
 
-    controller: Any
+    controller: StepControl
     function: Callable[[PyTree, PyTree], PyTree] = eqx.field(static=True)
 
     def init(
-        self, terms: Any, t0: Any, t1: Any, y0: PyTree, dt0: Any, args: Any, *rest: Any
-    ) -> Any:
+        self,
+        terms: Any,
+        t0: RealScalarLike,
+        t1: RealScalarLike,
+        y0: PyTree,
+        dt0: Scalar | None,
+        args: PyTree,
+        *rest: Any,
+    ) -> tuple[Scalar, Any]:
         """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(terms, t0, t1, y0, dt0, args, *rest)
         value = self.function(args, y0)
         return first, (inner, value, value)
 
     def adapt_step_size(
-        self, t0: Any, t1: Any, y0: PyTree, y1_candidate: PyTree, args: Any, *rest: Any
-    ) -> Any:
+        self,
+        t0: RealScalarLike,
+        t1: RealScalarLike,
+        y0: PyTree,
+        y1_candidate: PyTree,
+        args: PyTree,
+        *rest: Any,
+    ) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, and looks."""
         *others, (inner, lowest, highest) = rest
         keep, next_t0, next_t1, jump, inner, result = self.controller.adapt_step_size(
@@ -42,7 +56,7 @@ class Extremes(AbstractWrappedControl):
         )
         value = self.function(args, y1_candidate)
 
-        def kept(choose: Callable[[Any, Any], Any], old: PyTree) -> PyTree:
+        def kept(choose: Callable[[Scalar, Scalar], Scalar], old: PyTree) -> PyTree:
             return jtu.tree_map(lambda a, b: jnp.where(keep, choose(a, b), a), old, value)
 
         state = (inner, kept(jnp.minimum, lowest), kept(jnp.maximum, highest))

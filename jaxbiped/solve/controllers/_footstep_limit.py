@@ -1,13 +1,16 @@
 """Footstep limit: a step-size controller that ends the solve after enough footsteps."""
 
+from collections.abc import Callable
 from typing import Any
 
 import diffrax
 import jax.numpy as jnp
+from jaxtyping import PyTree
 
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.dynamics._feet import feet, landings, standing_foot
 from jaxbiped.dynamics._state import State
-from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
 
 PATIENCE = 100.0
 """Time allowed for each footstep asked for [s]."""
@@ -24,20 +27,20 @@ class FootstepLimit(AbstractWrappedControl):
         limit: number of heel strikes after which the solve ends.
     """
 
-    controller: Any
-    limit: Any
+    controller: StepControl
+    limit: RealScalarLike
 
     def init(
         self,
         terms: Any,
-        t0: Any,
-        t1: Any,
+        t0: RealScalarLike,
+        t1: RealScalarLike,
         y0: State,
-        dt0: Any,
-        args: Any,
-        func: Any,
-        error_order: Any,
-    ) -> tuple[Any, Any]:
+        dt0: Scalar | None,
+        args: PyTree,
+        func: Callable[..., PyTree],
+        error_order: RealScalarLike | None,
+    ) -> tuple[Scalar, Any]:
         """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(terms, t0, t1, y0, dt0, args, func, error_order)
         last = standing_foot(feet(args, y0))
@@ -45,15 +48,15 @@ class FootstepLimit(AbstractWrappedControl):
 
     def adapt_step_size(
         self,
-        t0: Any,
-        t1: Any,
+        t0: RealScalarLike,
+        t1: RealScalarLike,
         y0: State,
         y1_candidate: State,
-        args: Any,
-        y_error: Any,
-        error_order: Any,
+        args: PyTree,
+        y_error: PyTree,
+        error_order: RealScalarLike | None,
         controller_state: Any,
-    ) -> tuple[Any, Any, Any, Any, Any, Any]:
+    ) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, and counts."""
         inner, last, count = controller_state
         keep, next_t0, next_t1, made_jump, inner, result = self.controller.adapt_step_size(

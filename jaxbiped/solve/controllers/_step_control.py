@@ -1,16 +1,16 @@
 """Step control: how steps are chosen, the same for every solve of the project."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import diffrax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Numbers, RealScalarLike, Scalar
 from jaxbiped.solve._units import Units
-from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
 
 _FIRST_STEP = 1e-5
 """First step tried, in units of time; a start that is not a number must not choose it."""
@@ -23,8 +23,11 @@ so many steps that the same error takes more of them."""
 
 
 def step_control(
-    rtol: Any, atol: Any, norm: Callable[[Any], Any], units: Units | None = None
-) -> Any:
+    rtol: RealScalarLike,
+    atol: RealScalarLike,
+    norm: Callable[[PyTree], Scalar],
+    units: Units | None = None,
+) -> StepControl:
     """The controller of step sizes for these tolerances, errors measured by `norm`.
 
     Args:
@@ -41,10 +44,11 @@ def step_control(
         safety=_SAFETY,
         force_dtmin=True,  # a state that is no longer a number ends the solve in another way
     )
-    return control if units is None else InUnits(control, units.inverse)
+    found = cast(StepControl, control)
+    return found if units is None else InUnits(found, units.inverse)
 
 
-def first_step(duration: Scalar, time_unit: Any = 1.0) -> Scalar:
+def first_step(duration: Numbers, time_unit: RealScalarLike = 1.0) -> Scalar:
     """The first step to try [s] in a solve of at most `duration` [s]."""
     return jnp.minimum(jnp.full_like(duration, _FIRST_STEP) * time_unit, duration)
 
@@ -57,16 +61,23 @@ class InUnits(AbstractWrappedControl):
         inverse: one over the unit of each leaf of the state.
     """
 
-    controller: Any
+    controller: StepControl
     inverse: PyTree
 
-    def init(self, *request: Any) -> Any:
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
         """The first step's end and the controller's state, as diffrax asks."""
         return self.controller.init(*request)
 
     def adapt_step_size(
-        self, t0: Any, t1: Any, y0: Any, y1_candidate: Any, args: Any, y_error: Any, *rest: Any
-    ) -> Any:
+        self,
+        t0: RealScalarLike,
+        t1: RealScalarLike,
+        y0: PyTree,
+        y1_candidate: PyTree,
+        args: PyTree,
+        y_error: PyTree,
+        *rest: Any,
+    ) -> Adapted:
         """Accepts or rejects a step, as diffrax asks."""
         before, after, error = (
             jtu.tree_map(lambda leaf, inverse: leaf * inverse, y, self.inverse)

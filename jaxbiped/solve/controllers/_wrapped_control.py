@@ -5,17 +5,32 @@ diffrax looks for tolerances and norm on the controller it is given, whatever th
 
 import abc
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
 
 import equinox as eqx
 from jaxtyping import PyTree
 
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.solve._accuracy import rms_norm
 
 if TYPE_CHECKING:  # which takes the adaptive one's abstract attributes for arguments
     from diffrax import AbstractStepSizeController as AbstractControl
 else:
     from diffrax import AbstractAdaptiveStepSizeController as AbstractControl
+
+Adapted: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Any, Any]
+"""Whether a step is kept, the next one's ends, whether a jump was passed, the controller's state,
+and diffrax's result."""
+
+
+class StepControl(Protocol):
+    """What is asked of a controller of step sizes; see `diffrax.AbstractStepSizeController`."""
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        """The first step's end and the controller's state."""
+
+    def adapt_step_size(self, *step: Any) -> Adapted:
+        """Accepts or rejects a step."""
 
 
 class AbstractWrappedControl(AbstractControl):
@@ -25,32 +40,32 @@ class AbstractWrappedControl(AbstractControl):
         controller: decides every step's size.
     """
 
-    controller: eqx.AbstractVar[Any]
+    controller: eqx.AbstractVar[StepControl]
 
     @property
-    def rtol(self) -> Any:
+    def rtol(self) -> RealScalarLike:
         """The wrapped controller's; steps of one size have no tolerances."""
         return getattr(self.controller, "rtol", 0.0)
 
     @property
-    def atol(self) -> Any:
+    def atol(self) -> RealScalarLike:
         """The same of the absolute one."""
         return getattr(self.controller, "atol", 0.0)
 
     @property
-    def norm(self) -> Callable[[PyTree], Any]:
+    def norm(self) -> Callable[[PyTree], RealScalarLike]:
         """Of errors in units of the tolerance."""
-        norm: Callable[[PyTree], Any] = getattr(self.controller, "norm", rms_norm)
+        norm: Callable[[PyTree], RealScalarLike] = getattr(self.controller, "norm", rms_norm)
         return norm
 
-    def wrap(self, direction: Any) -> "AbstractWrappedControl":
+    def wrap(self, direction: RealScalarLike) -> Self:
         """As diffrax asks; direction makes no difference to what is wrapped here."""
         return self
 
     @abc.abstractmethod
-    def init(self, *request: Any) -> tuple[Any, Any]:
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
         """The first step's end and the controller's state, as diffrax asks."""
 
     @abc.abstractmethod
-    def adapt_step_size(self, *step: Any) -> Any:
+    def adapt_step_size(self, *step: Any) -> Adapted:
         """Accepts or rejects a step, as diffrax asks."""

@@ -3,7 +3,7 @@
 import abc
 import math
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import equinox as eqx
 import jax
@@ -17,7 +17,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.linalg._elimination import Entry, Matrix, inverse, matmul
 from jaxbiped.solve.rosenbrock._sparsity import Structure, structure_of
 
-Components: TypeAlias = list[Any]
+Components: TypeAlias = list[Scalar]
 """A point of the state space: its scalars one by one, or one vector that holds them all."""
 
 _MOST_SCALARS = 24
@@ -32,22 +32,22 @@ class AbstractLinearisation(eqx.Module):
         """The vector field at any point."""
 
     @abc.abstractmethod
-    def time_derivative(self) -> Components:
+    def time_derivative(self) -> list[Entry]:
         """∂f/∂t at the point of linearisation; None for a component that has none."""
 
     @abc.abstractmethod
-    def jacobian(self) -> Any:
+    def jacobian(self) -> PyTree:
         """J = ∂f/∂y at the point of linearisation, in a form of its own."""
 
     @abc.abstractmethod
-    def factorise(self, jacobian: Any, step: Scalar) -> Any:
+    def factorise(self, jacobian: PyTree, step: Scalar) -> PyTree:
         """What `solve_kept` needs of I − step J."""
 
     @abc.abstractmethod
     def solve_kept(
         self,
-        factors: Any,
-        jacobian: Any,
+        factors: PyTree,
+        jacobian: PyTree,
         step: Scalar,
         right: Components,
         direct_right: dict[int, Scalar],
@@ -107,28 +107,28 @@ def linearise(
 class _DenseLinearisation(AbstractLinearisation):
     """One vector, one dense matrix."""
 
-    field: Callable[[Scalar, Any], Any]
+    field: Callable[[Scalar, Scalar], Scalar]
     t: Scalar
-    y: Any
+    y: Scalar
 
     def evaluate(self, t: Scalar, y: Components) -> Components:
         return [self.field(t, y[0])]
 
-    def time_derivative(self) -> Components:
+    def time_derivative(self) -> list[Entry]:
         one = jnp.ones_like(self.t)
         return [jax.jvp(lambda t: self.field(t, self.y), (self.t,), (one,))[1]]
 
-    def jacobian(self) -> Any:
+    def jacobian(self) -> PyTree:
         return jax.jacfwd(lambda y: self.field(self.t, y))(self.y)
 
-    def factorise(self, jacobian: Any, step: Scalar) -> Any:
+    def factorise(self, jacobian: PyTree, step: Scalar) -> PyTree:
         identity = jnp.eye(self.y.size, dtype=self.y.dtype)
         return jax.scipy.linalg.lu_factor(identity - step * jacobian)
 
     def solve_kept(
         self,
-        factors: Any,
-        jacobian: Any,
+        factors: PyTree,
+        jacobian: PyTree,
         step: Scalar,
         right: Components,
         direct_right: dict[int, Scalar],
@@ -150,15 +150,15 @@ class _ScalarLinearisation(AbstractLinearisation):
     of n coordinates so costs an n × n elimination, not 2n × 2n.
     """
 
-    run: Callable[..., list[Any]]
+    run: Callable[..., list[Scalar]]
     structure: Structure
     t: Scalar
-    y: tuple[Any, ...]
+    y: tuple[Scalar, ...]
 
     def evaluate(self, t: Scalar, y: Components) -> Components:
         return self.run(t, *y)
 
-    def time_derivative(self) -> Components:
+    def time_derivative(self) -> list[Entry]:
         return self._column(0)
 
     def jacobian(self) -> Matrix:
@@ -203,7 +203,7 @@ class _ScalarLinearisation(AbstractLinearisation):
         if not any(position in used for used in self.structure.depends):
             return [None] * len(self.y)
 
-        def along(value: Scalar) -> list[Any]:
+        def along(value: Scalar) -> list[Scalar]:
             return self.run(*inputs[:position], value, *inputs[position + 1 :])
 
         _, tangents = jax.jvp(along, (inputs[position],), (jnp.ones_like(inputs[position]),))

@@ -3,7 +3,7 @@
 import functools
 import operator
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, TypeVar
 
 import diffrax
 import jax.numpy as jnp
@@ -13,7 +13,7 @@ from equinox.internal import ω
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
-from jaxbiped._types import Scalar
+from jaxbiped._types import BoolScalarLike, RealScalarLike, Scalar
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.rosenbrock._linearisation import (
     AbstractLinearisation,
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 else:
     from equinox import AbstractClassVar
 
+_Component = TypeVar("_Component")
 Row: TypeAlias = tuple[float, ...]
 
 
@@ -69,13 +70,15 @@ class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
         coefficients: k_1, k_2, … of the polynomial, each shaped as the solution.
     """
 
-    t0: Any  # type: ignore[misc]
-    t1: Any  # type: ignore[misc]
+    t0: RealScalarLike  # type: ignore[misc]
+    t1: RealScalarLike  # type: ignore[misc]
     y0: PyTree
     y1: PyTree
     coefficients: tuple[PyTree, ...]
 
-    def evaluate(self, t0: Any, t1: Any = None, left: bool = True) -> PyTree:
+    def evaluate(
+        self, t0: RealScalarLike, t1: RealScalarLike | None = None, left: bool = True
+    ) -> PyTree:
         del left
         if t1 is not None:
             return (self.evaluate(t1) ** ω - self.evaluate(t0) ** ω).ω
@@ -108,24 +111,26 @@ class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):
     term_structure: ClassVar = diffrax.AbstractTerm
     interpolation_cls: ClassVar[Callable[..., RosenbrockInterpolation]] = RosenbrockInterpolation
 
-    def init(self, terms: Any, t0: Any, t1: Any, y0: PyTree, args: PyTree) -> None:
+    def init(
+        self, terms: Any, t0: RealScalarLike, t1: RealScalarLike, y0: PyTree, args: PyTree
+    ) -> None:
         """Rosenbrock methods carry nothing from step to step."""
         return None
 
-    def func(self, terms: Any, t0: Any, y0: PyTree, args: PyTree) -> PyTree:
+    def func(self, terms: Any, t0: RealScalarLike, y0: PyTree, args: PyTree) -> PyTree:
         """The vector field at a point."""
         return terms.vf(t0, y0, args)
 
     def step(
         self,
         terms: Any,
-        t0: Any,
-        t1: Any,
+        t0: RealScalarLike,
+        t1: RealScalarLike,
         y0: PyTree,
         args: PyTree,
         solver_state: None,
-        made_jump: Any,
-    ) -> tuple[PyTree, PyTree, dict[str, Any], None, Any]:
+        made_jump: BoolScalarLike,
+    ) -> tuple[PyTree, PyTree, dict[str, PyTree], None, Any]:
         """One step, as `diffrax.AbstractSolver.step` describes it."""
         del solver_state, made_jump
         y1, error, coefficients = _cached_step(self.tableau, terms, t0, t1, y0, args)
@@ -134,7 +139,12 @@ class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):
 
 
 def step_of(
-    tableau: RosenbrockTableau, terms: Any, t0: Any, t1: Any, y0: PyTree, args: PyTree
+    tableau: RosenbrockTableau,
+    terms: Any,
+    t0: RealScalarLike,
+    t1: RealScalarLike,
+    y0: PyTree,
+    args: PyTree,
 ) -> tuple[PyTree, PyTree, tuple[PyTree, ...]]:
     """The new value, its error estimate and the coefficients of the dense output."""
     start, join = split(y0)
@@ -178,8 +188,8 @@ class Stages(NamedTuple):
     start: Components
     step: Scalar
     lin: AbstractLinearisation
-    jacobian: Any
-    factors: Any
+    jacobian: PyTree
+    factors: PyTree
     direct: dict[int, int]
     kept: list[int]
     matrix: np.ndarray
@@ -190,7 +200,7 @@ class Stages(NamedTuple):
         """Σ_j weights_j u_j for every component."""
         row = np.asarray(weights)
         count = len(row)
-        totals: Components = [None] * len(self.start)
+        totals: list[PyTree] = [None] * len(self.start)
         for place, i in enumerate(self.kept):
             totals[i] = _sum(row, [stage[place] for stage in self.increments])
         through = row @ self.matrix[:count]
@@ -239,7 +249,7 @@ def stages_of(
     step = tableau.gamma * control
     moves = control != 0.0
 
-    def picked(components: Components) -> Components:
+    def picked(components: list[_Component]) -> list[_Component]:
         return [components[i] for i in kept]
 
     slope, f_t, jacobian = fusion_barrier(
@@ -253,7 +263,7 @@ def stages_of(
     )
     last_rate = slope
 
-    def stage(i: int) -> tuple[Components, Components | None]:
+    def stage(i: int) -> tuple[Components, PyTree]:
         row_a, row_c = (tableau.a[i - 1], tableau.c[i - 1]) if i else ((), ())
         rate = slope
         if _repeats(tableau, i):
@@ -286,7 +296,7 @@ def _repeats(tableau: RosenbrockTableau, i: int) -> bool:
     return tableau.a[i - 1] == (*tableau.a[i - 2], 0.0)
 
 
-def _sum(weights: Sequence[float] | np.ndarray, values: list[Any]) -> Any:
+def _sum(weights: Sequence[float] | np.ndarray, values: list[Scalar]) -> Scalar:
     """Σ weights_j values_j, zero weights left out and units not multiplied by."""
     terms = [v if w == 1.0 else float(w) * v for w, v in zip(weights, values, strict=False) if w]
     return functools.reduce(operator.add, terms) if terms else jnp.zeros_like(values[0])

@@ -3,9 +3,9 @@
 Entries that are zero by structure are left out of the elimination.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
-from jax.extend.core import ClosedJaxpr, Jaxpr, Literal
+from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal, Var
 
 
 class Structure(NamedTuple):
@@ -32,10 +32,10 @@ def structure_of(program: ClosedJaxpr) -> Structure:
 def _propagate(
     jaxpr: Jaxpr, inputs: list[frozenset[int]], copies: list[int | None]
 ) -> tuple[list[frozenset[int]], list[int | None]]:
-    depends: dict[Any, frozenset[int]] = dict(zip(jaxpr.invars, inputs, strict=True))
-    copied: dict[Any, int | None] = dict(zip(jaxpr.invars, copies, strict=True))
+    depends: dict[Var, frozenset[int]] = dict(zip(jaxpr.invars, inputs, strict=True))
+    copied: dict[Var, int | None] = dict(zip(jaxpr.invars, copies, strict=True))
 
-    def read(atom: Any) -> tuple[frozenset[int], int | None]:
+    def read(atom: Var | Literal) -> tuple[frozenset[int], int | None]:
         if isinstance(atom, Literal):
             return frozenset(), None
         return depends.get(atom, frozenset()), copied.get(atom)
@@ -57,10 +57,10 @@ def _propagate(
     return [used for used, _ in outputs], [source for _, source in outputs]
 
 
-def _inner_program(equation: Any) -> Jaxpr | None:
+def _inner_program(equation: JaxprEqn) -> Jaxpr | None:
     """The program that a call runs on exactly its own arguments, where it is one."""
     inner = equation.params.get("jaxpr", equation.params.get("call_jaxpr"))
-    jaxpr = getattr(inner, "jaxpr", inner)
+    jaxpr = cast(Jaxpr, getattr(inner, "jaxpr", inner))
     plain_call = isinstance(jaxpr, Jaxpr) and equation.primitive.name in _CALLS
     if plain_call and len(jaxpr.invars) == len(equation.invars):
         return jaxpr
