@@ -1,12 +1,12 @@
 """Adjoint solve of the second variation along a known motion, by lanes."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-from jaxtyping import PyTree
+from jaxtyping import PyTree, PyTreeDef
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
@@ -42,7 +42,7 @@ class _Given(NamedTuple):
     """
 
     args: PyTree
-    arrival: Any
+    arrival: Scalar
     leading: FirstVariation
     after: Adjoints
 
@@ -51,8 +51,8 @@ class _Now(NamedTuple):
     """What is carried: adjoints, in order, and the state where a step starts; steps read so far."""
 
     adjoints: Adjoints
-    state: Any
-    count: Any
+    state: Scalar
+    count: Scalar  # type: ignore[assignment]
 
 
 def carry_tangents(flow: Flow, nodes: Nodes, leading: Scalar) -> tuple[FirstVariation, Recording]:
@@ -102,7 +102,7 @@ class _Kind(NamedTuple):
     system: AbstractSystem
     arrival: Arrival
     active: tuple[int, ...]
-    state: Any
+    state: PyTreeDef
 
 
 def _kind(flow: Flow) -> _Kind:
@@ -115,7 +115,7 @@ def _program(kind: _Kind, final: bool | None) -> Program:
     # Compiled by itself, the field is traced once, not at each of its many uses.
     field = jax.jit(kind.system.vector_field)
 
-    def flow(given: Any) -> Flow:
+    def flow(given: FirstVariationInputs | _Given) -> Flow:
         no_columns = jnp.zeros((0, 0))
         seeded = Seeded(given.args, no_columns, no_columns, kind.active)
         return Flow(kind.system, kind.arrival, field, seeded, kind.state)
@@ -129,7 +129,7 @@ def _program(kind: _Kind, final: bool | None) -> Program:
 class _AdjointSolve:
     """The functions of the program: its input stream's rows are steps, read backwards."""
 
-    def __init__(self, flow: Callable[[Any], Flow], step: Step, final: bool) -> None:
+    def __init__(self, flow: Callable[[_Given], Flow], step: Step, final: bool) -> None:
         self.flow, self.step, self.final = flow, step, final
 
     def program(self) -> Program:

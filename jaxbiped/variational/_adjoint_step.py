@@ -6,11 +6,12 @@ source f''[V, Q] and the jump (J₊ − J₋) V (dg·Q)/ġ. So the weights go ba
 one for Q, however many families there are. All components are in order.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
+from jaxbiped._types import Scalar
 from jaxbiped.variational._collocated_step import Linear, Rows
 from jaxbiped.variational._first_variation import Step, without_flow
 
@@ -20,12 +21,14 @@ class Adjoints(NamedTuple):
     parameters (p,).
     """
 
-    second: Any
-    family: Any
-    parameters: Any
+    second: Scalar
+    family: Scalar
+    parameters: Scalar
 
 
-def adjoint_step(rows: Rows, linear: Linear, step: Step, early: Any, after: Adjoints) -> Adjoints:
+def adjoint_step(
+    rows: Rows, linear: Linear, step: Step, early: Scalar, after: Adjoints
+) -> Adjoints:
     """Adjoints before a step, from those behind it; `early` as from `earlier_at`."""
     order, stages = rows.order, linear.stages
     c, d, count = len(order.every), order.direct, len(step.leading)
@@ -48,7 +51,7 @@ def adjoint_step(rows: Rows, linear: Linear, step: Step, early: Any, after: Adjo
     return _with_flow(linear, step, lost, without)
 
 
-def _with_flow(linear: Linear, step: Step, lost: Any, after: Adjoints) -> Adjoints:
+def _with_flow(linear: Linear, step: Step, lost: Scalar, after: Adjoints) -> Adjoints:
     """Adjoints before parts of the flow are taken out of V and Q, and C changes with them.
 
     Where V loses σ f and Q loses τ f, C gains σ τ f' − σ Q' − τ V'. Of V that is `lost`.
@@ -56,7 +59,7 @@ def _with_flow(linear: Linear, step: Step, lost: Any, after: Adjoints) -> Adjoin
     order, velocity, gradient = linear.stages.order, linear.velocity, linear.at_start
     c, d = len(order.every), order.direct
 
-    def rate_of(tangent: Any) -> Any:
+    def rate_of(tangent: Scalar) -> Scalar:
         kept = gradient[:, :c] @ tangent
         return jnp.concatenate([tangent[d : 2 * d], kept]) if d else kept
 

@@ -5,7 +5,7 @@ hand, and the step is one, not many.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
@@ -38,11 +38,11 @@ class Order(NamedTuple):
         """Positions of the others."""
         return self.every[self.direct :]
 
-    def sorted(self, vector: Any) -> Any:
+    def sorted(self, vector: Scalar) -> Scalar:
         """The last axis of an array in this order."""
         return jnp.stack([vector[..., i] for i in self.every], axis=-1)
 
-    def restored(self, vector: Any) -> Any:
+    def restored(self, vector: Scalar) -> Scalar:
         """The last axis of an array from this order in the components' own."""
         return jnp.stack(
             [vector[..., self.every.index(i)] for i in range(len(self.every))], axis=-1
@@ -69,14 +69,14 @@ class Stages(NamedTuple):
     """
 
     order: Order
-    weights: Any
-    by_direct: Any
+    weights: Scalar
+    by_direct: Scalar
     factors: BlockFactors
 
     @staticmethod
-    def of(order: Order, share: Any, jacobians: Any) -> "Stages":
+    def of(order: Order, share: Scalar, jacobians: Scalar) -> "Stages":
         """From the Jacobians of the kept rates, (3, k, c), their columns in order."""
-        weights = RADAU * share
+        weights = cast(Scalar, RADAU * share)
         d, k = order.direct, len(order.kept)
         by_direct, by_kept = jacobians[..., :d], jacobians[..., d:]
         blocks = weights[:, None, :, None] * jnp.swapaxes(by_kept, 0, 1)[None]
@@ -89,7 +89,7 @@ class Stages(NamedTuple):
         matrix = jnp.eye(3 * k) - blocks.reshape(3 * k, 3 * k)
         return Stages(order, weights, by_direct, factorise(matrix, k))
 
-    def solve(self, right: Any, forcing: Any) -> Any:
+    def solve(self, right: Scalar, forcing: Scalar) -> Scalar:
         """u of (I − A ⊗ J) u = r + (A ⊗ I) b, shape (3, c); r (3, c), b of the kept (3, k)."""
         d = self.order.direct
         direct, kept = right[:, :d], right[:, d:]
@@ -99,13 +99,13 @@ class Stages(NamedTuple):
             return found
         return jnp.concatenate([direct + self.weights @ found[:, :d], found], axis=1)
 
-    def carried(self, tangents: Any) -> Any:
+    def carried(self, tangents: Scalar) -> Scalar:
         """Tangents at the points, (v, 3, c), of those where the step starts, (v, c)."""
         unforced = jnp.zeros((3, len(self.order.kept)))
         every = [self.solve(jnp.stack([start] * 3), unforced) for start in tangents]
         return jnp.stack(every)
 
-    def pulled(self, u: Any) -> tuple[Any, Any]:
+    def pulled(self, u: Scalar) -> tuple[Scalar, Scalar]:
         """Derivatives of a sum of u with respect to r, one vector for all points, and to b.
 
         Args:
@@ -131,23 +131,23 @@ class Stages(NamedTuple):
 class Rows:
     """Rates and their derivatives at one point, of `field` for components in this `order`."""
 
-    def __init__(self, field: Field, order: Order, parameters: Any) -> None:
+    def __init__(self, field: Field, order: Order, parameters: Sequence[Scalar]) -> None:
         self.field, self.order, self.parameters = field, order, list(parameters)
         # Compiled by themselves, these are traced once, not at each use.
         self.by_state, self.curved = jax.jit(self._by_state), jax.jit(self._curved)
 
-    def velocity(self, y: Any) -> Any:
+    def velocity(self, y: Scalar) -> Scalar:
         return jnp.stack(self.field(list(y), self.parameters))
 
-    def _by_state(self, y: Any) -> Any:
+    def _by_state(self, y: Scalar) -> Scalar:
         """Derivatives of the kept rates with respect to the components, (k, c)."""
         return self.order.sorted(jacobian(lambda z: self._kept(z, self.parameters), list(y)))
 
-    def gradient(self, y: Any) -> Any:
+    def gradient(self, y: Scalar) -> Scalar:
         """Derivatives of the kept rates, (k, n)."""
         return self._by_all(self._kept, list(y))
 
-    def _curved(self, y: Any, along: Any, weights: Any) -> Any:
+    def _curved(self, y: Scalar, along: Scalar, weights: Scalar) -> Scalar:
         """Derivatives of a sum of the kept rates' derivatives along tangents of the state, (n,).
 
         Tangents (v, c), in the components' own order, and weights (v, k).
@@ -170,7 +170,7 @@ class Rows:
         every = self.field(y, q)
         return [every[i] for i in self.order.kept]
 
-    def _by_all(self, function: Callable[..., list[Scalar]], y: list[Scalar]) -> Any:
+    def _by_all(self, function: Callable[..., list[Scalar]], y: list[Scalar]) -> Scalar:
         c = len(y)
         found = jacobian(lambda z: function(z[:c], z[c:]), [*y, *self.parameters])
         return jnp.concatenate([self.order.sorted(found[:, :c]), found[:, c:]], axis=1)
@@ -189,14 +189,14 @@ class Linear(NamedTuple):
     """
 
     stages: Stages
-    points: Any
-    by_parameter: Any
-    at_start: Any
-    velocity: Any
-    jump: Any
+    points: Scalar
+    by_parameter: Scalar
+    at_start: Scalar
+    velocity: Scalar
+    jump: Scalar
 
 
-def collocate_step(rows: Rows, path: Path, crossed: Any) -> tuple[Any, Any, Any]:
+def collocate_step(rows: Rows, path: Path, crossed: Scalar) -> tuple[Scalar, Scalar, Scalar]:
     """A step whose leaves have no leading axis: its collocation points, (3, c), in their own order.
 
     Also their shares of time, (3,), and the rates where it begins.
@@ -210,7 +210,7 @@ def collocate_step(rows: Rows, path: Path, crossed: Any) -> tuple[Any, Any, Any]
 
 
 def linearise_about(
-    rows: Rows, before: Any, after: Any, points: Any, share: Any, crossed: Any
+    rows: Rows, before: Scalar, after: Scalar, points: Scalar, share: Scalar, crossed: Scalar
 ) -> Linear:
     """The field about a step between two states, whose `points` and shares are known."""
     order = rows.order
@@ -218,7 +218,7 @@ def linearise_about(
     found = jax.lax.map(rows.gradient, jnp.concatenate([points, before[None]]))
     stages = Stages.of(order, share, found[:3, :, :c])
 
-    def jump() -> Any:
+    def jump() -> Scalar:
         sides = after + jnp.asarray(SIDES)[:, None] * rows.velocity(after)
         return jump_of(jax.lax.map(rows.by_state, sides)[None])[0]
 
@@ -228,7 +228,9 @@ def linearise_about(
     )
 
 
-def _correct(rows: Rows, path: Path, part: Any, share: Any, begins: Any, ends: Any) -> Any:
+def _correct(
+    rows: Rows, path: Path, part: Scalar, share: Scalar, begins: Scalar, ends: Scalar
+) -> Scalar:
     """The collocation points: a cubic, once corrected."""
     order = rows.order
     h, change = path.span, path.after - path.before

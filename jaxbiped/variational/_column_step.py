@@ -5,13 +5,13 @@ XLA.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, VectorField
 from jaxbiped.compiler import jacobian
 from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve.rosenbrock._linearisation import Components, split
@@ -45,20 +45,20 @@ class Differentiated(NamedTuple):
     end: PyTree
     error: PyTree
     order: list[int]
-    by_state: Any
-    by_curvature: Any
-    by_parameter: Any
+    by_state: Scalar
+    by_curvature: Scalar
+    by_parameter: Scalar
 
 
 def differentiate_step(
     tableau: RosenbrockTableau,
-    field: Callable[[Any, PyTree, PyTree], PyTree],
-    t0: Any,
-    t1: Any,
+    field: VectorField,
+    t0: Scalar,
+    t1: Scalar,
     y0: PyTree,
     args: Seeded,
     *,
-    carries_parameters: Any,
+    carries_parameters: Scalar | bool,
 ) -> Differentiated:
     """A step of an autonomous system of scalars, with all that its derivatives share.
 
@@ -97,7 +97,7 @@ def differentiate_step(
     )
 
 
-def _pick(array: Any, places: Sequence[int]) -> Any:
+def _pick(array: Scalar, places: Sequence[int]) -> Scalar:
     return jnp.stack([array[..., i] for i in places], axis=-1)
 
 
@@ -106,8 +106,8 @@ def _derivatives(
     stages: Stages,
     kept_rates: Callable[[Components, Sequence[Scalar]], Components],
     parameters: Sequence[Scalar],
-    carries_parameters: Any,
-) -> tuple[Any, Any, Any]:
+    carries_parameters: Scalar | bool,
+) -> tuple[Scalar, Scalar, Scalar]:
     """Of all stages A_i and B_i by components (stages, kept, c), A_i + B_i by parameters."""
     start, size = stages.start, len(tableau.alpha)
     points = [start] + [
@@ -120,7 +120,7 @@ def _derivatives(
     def rates(z: Components) -> Components:
         return kept_rates(z[:count], z[count:])
 
-    def apart(found: Any, constant: Any) -> tuple[Any, Any]:
+    def apart(found: Scalar, constant: Scalar | float) -> tuple[Scalar, Scalar]:
         """With respect to components, and to parameters, where `constant` is added."""
         no_parameters = jnp.zeros((len(found), len(parameters)))
         by_parameter = constant + found[:, count:]
@@ -128,10 +128,10 @@ def _derivatives(
             carries_parameters, lambda: by_parameter, lambda: no_parameters
         )
 
-    def at_point(point: Any) -> tuple[Any, Any]:
+    def at_point(point: Scalar) -> tuple[Scalar, Scalar]:
         return apart(jacobian(rates, [*point, *parameters]), 0.0)
 
-    def at_start(both: tuple[Any, Any]) -> tuple[Any, Any]:
+    def at_start(both: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
         along, constant = list(both[0]), both[1]
 
         def directional_derivative(z: Components) -> Components:
@@ -146,7 +146,9 @@ def _derivatives(
     return by_point, by_start, by_parameter
 
 
-def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple[Any, Any]:
+def column_step(
+    step: Differentiated, column: Scalar, forcing: Scalar | None
+) -> tuple[Scalar, Scalar]:
     """The derivative of a step along one direction: of the new state, and of its error estimate.
 
     `column` are the components' derivatives, shape (c,), in their own order; `forcing` that of the
@@ -158,7 +160,7 @@ def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple
     start = jnp.stack([column[i] for i in order])
     zero_state = jnp.zeros_like(start)
     inverse, entries = _inverse(stages)
-    increments: list[Any] = []
+    increments: list[Scalar] = []
     for i in range(len(tableau.alpha)):
         argument = _weighted_sum(tableau.a[i - 1] if i else (), increments, start)
         coefficients = [tableau.gamma * c for c in tableau.c[i - 1]] if i else ()
@@ -180,7 +182,7 @@ def column_step(step: Differentiated, column: Any, forcing: Any | None) -> tuple
     return jnp.stack([end[i] for i in back]), jnp.stack([error[i] for i in back])
 
 
-def _inverse(stages: Stages) -> tuple[Any, Any]:
+def _inverse(stages: Stages) -> tuple[Scalar, Scalar]:
     """(I − g J)⁻¹ of the kept components, and their J by the direct ones."""
     kept = kept_in_order(stages)
     places = [stages.kept.index(i) for i in kept]
@@ -198,7 +200,7 @@ def _inverse(stages: Stages) -> tuple[Any, Any]:
     return inverse, jnp.stack([jnp.stack(row) for row in entries])
 
 
-def _weighted_sum(weights: Sequence[float], increments: Sequence[Any], start: Any) -> Any:
+def _weighted_sum(weights: Sequence[float], increments: Sequence[Scalar], start: Scalar) -> Scalar:
     """start + Σ weights_j increments_j, one behind the other: sums that begin alike are shared."""
     for weight, increment in zip(weights, increments, strict=False):
         if weight != 0.0:

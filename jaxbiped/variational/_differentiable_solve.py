@@ -4,13 +4,14 @@ JAX cannot differentiate machine code, so the rules of both modes are given here
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jax.custom_derivatives import SymbolicZero
+from jaxtyping import PyTree, PyTreeDef
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
@@ -86,9 +87,9 @@ def solve_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[So
     """One simulation, not traced, and the records of its at most so many steps, (n, numbers)."""
     one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], solve)
 
-    def run(room: int) -> tuple[Solved, Any]:
+    def run(room: int) -> tuple[Solved, Recorded]:
         found = LANES.run(request_of(one, setting)._replace(room=room, batch=True))
-        return found.outputs, found.records
+        return found.outputs, cast(Recorded, found.records)
 
     outputs, recorded = run(min(most, _ROOM))
     if recorded.counts[0] > _ROOM:
@@ -108,32 +109,36 @@ def _program(setting: Setting) -> Program:
     return AdaptiveSolve(solver, watch, counting=counting, saved=saved).program()
 
 
-def _run(solve: Solve, setting: Setting, **options: Any) -> tuple[Solved, Any]:
+def _run(solve: Solve, setting: Setting, **options: Any) -> tuple[Solved, Recorded | None]:
     found = LANES.run(request_of(solve, setting)._replace(**options))
     return found.outputs, found.records
 
 
 @bounded_cache(PROGRAMS)
-def _differentiable(setting: Setting, structure: Any) -> Callable[..., list[Scalar]]:
+def _differentiable(setting: Setting, structure: PyTreeDef) -> Callable[..., list[Scalar]]:
     @jax.custom_jvp
     def run(*leaves: Scalar) -> list[Scalar]:
         solve = jtu.tree_unflatten(structure, leaves)
         return jtu.tree_leaves(_run(solve, setting)[0])
 
-    def rule(primals: Sequence[Scalar], tangents: Sequence[Any]) -> tuple[Any, Any]:
+    def rule(
+        primals: Sequence[Scalar], tangents: Sequence[Scalar | SymbolicZero]
+    ) -> tuple[list[Scalar], list[Scalar]]:
         found = run(*primals)
         solve = jtu.tree_unflatten(structure, primals)
         solve_dot = jtu.tree_unflatten(structure, tangents)
         t, state, *counts = _unflatten(solve.state, found)
         t_dot, state_dot = _tangents(setting, solve, solve_dot, t, state)
-        none = [np.zeros(jnp.shape(count), dtype=jax.dtypes.float0) for count in counts]
+        none: list[PyTree] = [
+            np.zeros(jnp.shape(count), dtype=jax.dtypes.float0) for count in counts
+        ]
         return found, [t_dot, *state_dot, *none]
 
     run.defjvp(rule, symbolic_zeros=True)
     return run
 
 
-def _unflatten(like: Any, found: Sequence[Scalar]) -> tuple[Any, ...]:
+def _unflatten(like: State, found: Sequence[Scalar]) -> tuple[Any, ...]:
     t, *rest = found
     size = len(like)
     return t, type(like)(*rest[:size]), *rest[size:]
@@ -160,7 +165,7 @@ def _tangents(
     return t_dot, total
 
 
-def _is_zero(tangent: Any) -> bool:
+def _is_zero(tangent: object) -> bool:
     return isinstance(tangent, SymbolicZero)
 
 

@@ -4,7 +4,7 @@ The adjoint solve reads these steps backwards, with all that it needs of the mot
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -31,12 +31,12 @@ class Step(NamedTuple):
         leading: these tangents where it starts, in order, with the flow still in them, (v, c).
     """
 
-    before: Any
-    points: Any
-    share: Any
-    fresh: Any
-    which: Any
-    leading: Any
+    before: Scalar
+    points: Scalar
+    share: Scalar
+    fresh: Scalar
+    which: Scalar
+    leading: Scalar
 
     def row(self) -> Scalar:
         """One number after the other."""
@@ -57,14 +57,15 @@ class Step(NamedTuple):
     def shape(components: int, count: int) -> "Step":
         """Shapes of a step's arrays."""
 
-        def numbers(*shape: int) -> Any:
+        def numbers(*shape: int) -> PyTree:
             return jax.ShapeDtypeStruct(shape, jnp.float64)
 
+        flag: PyTree = jax.ShapeDtypeStruct((), jnp.bool_)
         return Step(
             before=numbers(components),
             points=numbers(3, components),
             share=numbers(3),
-            fresh=jax.ShapeDtypeStruct((), jnp.bool_),
+            fresh=flag,
             which=numbers(),
             leading=numbers(count, components),
         )
@@ -81,18 +82,18 @@ class FirstVariationInputs(NamedTuple):
     """
 
     args: PyTree
-    start: Any
-    arrival: Any
-    leading: Any
-    steps: Any
+    start: Scalar
+    arrival: Scalar
+    leading: Scalar
+    steps: Scalar
 
 
 class FirstVariation(NamedTuple):
     """Outputs: tangents before the arrival (v, c), the state there, and the number of steps."""
 
-    leading: Any
-    state: Any
-    steps: Any
+    leading: Scalar
+    state: Scalar
+    steps: Scalar
 
 
 class _Now(NamedTuple):
@@ -107,16 +108,16 @@ class _Now(NamedTuple):
         step: the last one, if the last node `ends` one.
     """
 
-    node: Any
-    t: Any
-    state: Any
-    fresh: Any
-    switched: Any
-    leading: Any
-    read: Any
-    taken: Any
+    node: Scalar
+    t: Scalar
+    state: Scalar
+    fresh: Scalar
+    switched: Scalar
+    leading: Scalar
+    read: Scalar
+    taken: Scalar
     step: Step
-    ends: Any
+    ends: Scalar
 
 
 class FirstVariationSolve:
@@ -127,7 +128,7 @@ class FirstVariationSolve:
     the flow is taken out of the tangents; see `_curvature`.
     """
 
-    def __init__(self, flow: Callable[[Any], Flow], row: int) -> None:
+    def __init__(self, flow: Callable[[FirstVariationInputs], Flow], row: int) -> None:
         self.flow, self.row = flow, row
 
     def program(self) -> Program:

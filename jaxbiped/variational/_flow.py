@@ -4,14 +4,13 @@ The second variation differentiates with respect to both, which here are one vec
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
-from jaxtyping import PyTree
+from jaxtyping import PyTree, PyTreeDef
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, VectorField
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.variational._hybrid_system import AbstractSystem
 from jaxbiped.variational._switch_locator import MARGIN
@@ -37,9 +36,9 @@ class Flow(eqx.Module):
 
     system: AbstractSystem = eqx.field(static=True)
     arrival: Arrival = eqx.field(static=True)
-    field: Callable[[Any, PyTree, PyTree], PyTree] = eqx.field(static=True)
+    field: VectorField = eqx.field(static=True)
     args: Seeded
-    structure: Any = eqx.field(static=True)
+    structure: PyTreeDef = eqx.field(static=True)
 
     def __call__(self, z: Sequence[Scalar]) -> list[Scalar]:
         state, scene = self._parts(z)

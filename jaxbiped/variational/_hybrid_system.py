@@ -4,24 +4,25 @@ The walker is only one of them: solves and searches ask this interface, so a use
 """
 
 import abc
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.dynamics._forces import foot_forces
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._redundant_motion import redundant_field
+from jaxbiped.dynamics._redundant_state import LegsState
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling, rolling_field
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.dynamics._switches import Switch, switches
-from jaxbiped.scene._abstract_scene import is_rigid
+from jaxbiped.scene._abstract_scene import AbstractScene, is_rigid
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -46,7 +47,7 @@ class AbstractSystem(eqx.Module):
     reset_is_symmetry: ClassVar[bool] = False
 
     @abc.abstractmethod
-    def vector_field(self, t: Any, y: PyTree, args: PyTree) -> PyTree:
+    def vector_field(self, t: RealScalarLike, y: PyTree, args: PyTree) -> PyTree:
         """Time derivative of the state, in the form that `diffrax.ODETerm` takes."""
 
     @abc.abstractmethod
@@ -66,7 +67,7 @@ class AbstractSystem(eqx.Module):
         """A quantity whose largest value along the orbit is wanted, or None."""
 
 
-def system_of(scene: Scene | RigidScene | RedundantScene) -> AbstractSystem:
+def system_of(scene: AbstractScene) -> AbstractSystem:
     """The system that a scene describes, in minimal coordinates."""
     return Walking() if scene.compliant else Rolling()
 
@@ -77,7 +78,7 @@ class Walking(AbstractSystem):
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (State._fields.index("hip_x"),)
     reset_is_symmetry: ClassVar[bool] = True
 
-    def vector_field(self, t: Any, y: State, args: Scene) -> State:
+    def vector_field(self, t: RealScalarLike, y: State, args: Scene) -> State:
         return vector_field(t, y, args)
 
     def switches(self, args: Scene, y: State) -> tuple[Switch, ...]:
@@ -102,36 +103,36 @@ class RedundantWalking(AbstractSystem):
 
     reset_is_symmetry: ClassVar[bool] = True
 
-    def vector_field(self, t: Any, y: Any, args: RedundantScene) -> Any:
+    def vector_field(self, t: RealScalarLike, y: LegsState, args: RedundantScene) -> LegsState:
         return redundant_field(t, y, args)
 
-    def switches(self, args: Any, y: Any) -> tuple[Switch, ...]:
+    def switches(self, args: PyTree, y: PyTree) -> tuple[Switch, ...]:
         return switches(args, y)
 
-    def ending(self, args: Any, y: Any) -> Scalar:
+    def ending(self, args: PyTree, y: PyTree) -> Scalar:
         return _ending(args, y)
 
-    def reset_map(self, args: Any, y: Any) -> Any:
+    def reset_map(self, args: RedundantScene, y: LegsState) -> LegsState:
         return exchange_legs(y)
 
-    def load(self, args: Any, y: Any) -> Scalar:
+    def load(self, args: PyTree, y: PyTree) -> Scalar:
         """Normal force on the foot that carries more [N]."""
         return _load(args, y)
 
 
-def _ending(args: Any, y: Any) -> Scalar:
+def _ending(args: PyTree, y: PyTree) -> Scalar:
     code = jnp.asarray(0)
     for name, happens in ending_events(WATCHES).items():
         code = jnp.where(happens(0.0, y, args), int(name), code)
     return code
 
 
-def _load(args: Any, y: Any) -> Scalar:
+def _load(args: PyTree, y: PyTree) -> Scalar:
     forces = foot_forces(args, y)
     return jnp.maximum(forces.foot_1.normal, forces.foot_2.normal)
 
 
-def section_of(scene: Any, section: AbstractSection | None) -> AbstractSection:
+def section_of(scene: object, section: AbstractSection | None) -> AbstractSection:
     """The section asked for, or the one that a scene's cycles begin at unless told otherwise.
 
     Raises:
@@ -152,7 +153,7 @@ class Rolling(AbstractSystem):
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (RigidState._fields.index("hip_x"),)
 
-    def vector_field(self, t: Any, y: RigidState, args: RigidScene) -> RigidState:
+    def vector_field(self, t: RealScalarLike, y: RigidState, args: RigidScene) -> RigidState:
         return rolling_field(t, y, args)
 
     def switches(self, args: RigidScene, y: RigidState) -> tuple[Switch, ...]:

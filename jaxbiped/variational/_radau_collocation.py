@@ -4,11 +4,12 @@ Source: Hairer and Wanner, Solving Ordinary Differential Equations II, section I
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.solve._fusion_barrier import fusion_barrier
@@ -102,7 +103,7 @@ def gradients(
     unit = jnp.eye(size)
     constants = list(parameters)
 
-    def pulls(y: Scalar, tangent: Scalar) -> Any:
+    def pulls(y: Scalar, tangent: Scalar) -> PyTree:
         z = [*y, *constants]
         if along is None or along_parameters is None:
             return jax.vjp(rates, z)[1]
@@ -115,7 +116,7 @@ def gradients(
     every = fusion_barrier(moves, lambda: jax.vmap(pulls)(flat, tangents))
 
     def pulled() -> Scalar:
-        def one(pull: Any) -> Any:
+        def one(pull: Callable[[list[Scalar]], list[list[Scalar]]]) -> Scalar:
             return jax.vmap(lambda e: jnp.stack(pull(list(e))[0]))(unit)
 
         # A linear field leaves nothing to pull through: the size is said, not read off.

@@ -4,14 +4,13 @@ For XLA, which multiplies matrices of directions; `_column_step` takes them one 
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar, VectorField
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.rosenbrock._linearisation import Components, split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
@@ -26,9 +25,9 @@ from jaxbiped.variational._tangents import Seeded, Tangents, active_leaves, with
 
 def rosenbrock_tangents(
     tableau: RosenbrockTableau,
-    field: Callable[[Any, PyTree, PyTree], PyTree],
-    t0: Any,
-    t1: Any,
+    field: VectorField,
+    t0: RealScalarLike,
+    t1: RealScalarLike,
     y0: Tangents,
     args: Seeded,
 ) -> tuple[Tangents, Tangents] | None:
@@ -71,7 +70,7 @@ def rosenbrock_tangents(
 
     back = [order.index(i) for i in range(count)]
 
-    def combined() -> tuple[Any, ...]:
+    def combined() -> tuple[Components, Components, Scalar, Scalar]:
         constant = by_curvature @ seeded + at_stages[..., count:] @ args.seeds
         changes = _column_stages(tableau, stages, at_stages[..., :count], constant, columns)
         end, error = end_weights(tableau), error_weights(tableau)
@@ -110,19 +109,19 @@ def _derivatives(
     def directional_derivative(y: Components, q: Sequence[Scalar], along: Components) -> Components:
         return jax.jvp(lambda y: kept_rates(y, q), (y,), (along,))[1]
 
-    def at_point(y: Components, _: Components) -> Any:
+    def at_point(y: Components, _: Components) -> PyTree:
         return jax.vjp(kept_rates, y, list(parameters))[1]
 
-    def at_start(_: Components, along: Components) -> Any:
+    def at_start(_: Components, along: Components) -> PyTree:
         return jax.vjp(lambda y, q: directional_derivative(y, q, along), start, list(parameters))[1]
 
     unit = list(jnp.eye(len(stages.kept), dtype=points[0].dtype))
     moves = stages.step != 0.0
 
-    def gradients(of: Callable[..., Any]) -> Scalar:
+    def gradients(of: Callable[[Components, Components], PyTree]) -> Scalar:
         pulls = fusion_barrier(moves, lambda: jax.vmap(of)(points, directions))
 
-        def pulled() -> Any:
+        def pulled() -> PyTree:
             # A linear field leaves nothing to pull through: the size is said, not read off.
             every = jax.vmap(lambda pull: jax.vmap(lambda *e: pull(list(e)))(*unit), axis_size=size)
             return every(pulls)

@@ -1,6 +1,6 @@
 """Saltation of tangents at a switch where the vector field jumps."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -9,6 +9,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
 
 _BEYOND = 1e-3
@@ -35,17 +36,17 @@ class Saltation(NamedTuple):
     which: Scalar
 
 
-def has_saltation(watch: Any, state: PyTree, args: PyTree) -> bool:
+def has_saltation(watch: Watch, state: PyTree, args: PyTree) -> bool:
     """Whether the field jumps anywhere at all; known before anything runs."""
     return any(switch.force_jumps for switch in watch.switches(args, state))
 
 
-def jump_surface_values(watch: Any, state: PyTree, args: PyTree) -> Scalar:
+def jump_surface_values(watch: Watch, state: PyTree, args: PyTree) -> Scalar:
     """Values of the functions that are zero where the field jumps."""
     return jnp.stack([s.value for s in watch.switches(args, state) if s.force_jumps])
 
 
-def saltation_at(watch: Any, state: PyTree, args: Seeded, happens: Scalar) -> Saltation:
+def saltation_at(watch: Watch, state: PyTree, args: Seeded, happens: Scalar) -> Saltation:
     """The saltation at a state that lies just past a surface where the field jumps.
 
     Of several surfaces it is the one that was passed last. Zero where it does not `happen`.

@@ -1,12 +1,10 @@
 """Solves to a section by lanes, with derivatives."""
 
-from typing import Any
-
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.compiler import Recording
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -25,9 +23,9 @@ def solve_to_section_by_lanes(
     sizes: Scalar,
     *,
     precision: Precision,
-    max_time: Any,
+    max_time: RealScalarLike,
     max_solver_steps: int,
-    carries_parameters: Any,
+    carries_parameters: Scalar | bool,
 ) -> SectionArrival:
     """`solve_to_section` for columns as `solve_variational` takes them; nodes are a `Recording`."""
     found, recording = solve_variational(

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar, VectorField
 from jaxbiped.solve._accuracy import Precision, rms_norm
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._units import units_of
@@ -29,7 +29,9 @@ from jaxbiped.variational._tangent_solver import (
 )
 from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
 
-Along: TypeAlias = Callable[[Callable[[PyTree, PyTree], Any], Tangents, Seeded], tuple[Any, Any]]
+Along: TypeAlias = Callable[
+    [Callable[[PyTree, PyTree], PyTree], Tangents, Seeded], tuple[PyTree, PyTree]
+]
 """Values of a function of state and arguments, and their derivatives along columns."""
 
 
@@ -45,7 +47,7 @@ class Nodes(NamedTuple):
     """
 
     start: Scalar
-    ends: Any
+    ends: PyTree
     arrival: Scalar
     steps: Scalar
 
@@ -67,12 +69,12 @@ class SectionArrival(NamedTuple):
         nodes: the ends of the accepted steps, where saved.
     """
 
-    y: Any
+    y: PyTree
     time: Scalar
-    time_columns: Any
+    time_columns: PyTree
     code: Scalar
     peak: Scalar
-    peak_columns: Any
+    peak_columns: PyTree
     jumps: Scalar
     missed: Scalar
     attempted: Scalar
@@ -82,11 +84,11 @@ class SectionArrival(NamedTuple):
 def solve_to_section(
     watch: Watch,
     solver: diffrax.AbstractAdaptiveSolver,
-    y0: Any,
-    args: Any,
+    y0: PyTree,
+    args: PyTree,
     *,
     precision: Precision,
-    max_time: Any,
+    max_time: RealScalarLike,
     max_solver_steps: int,
     columns_only_choose_steps: bool = False,
     save_nodes: bool = False,
@@ -105,7 +107,7 @@ def solve_to_section(
         one = jnp.ones((), y0.columns.dtype)
         carried = units._replace(inverse=Tangents(units.inverse, one))
     controller: Any = step_control(precision.rtol, 1e-2 * precision.rtol, norm, carried)
-    field: Any = watch.field
+    field: VectorField = watch.field
     if carries:
         inverse = jnp.stack(jtu.tree_leaves(units.inverse))
         controller = TangentControl(controller, precision.tangent_rtol, inverse)
@@ -152,14 +154,14 @@ def solve_to_section(
     )
 
 
-def _nodes(times: Scalar, states: PyTree, time: Scalar, y: Any) -> Nodes:
+def _nodes(times: Scalar, states: PyTree, time: Scalar, y: PyTree) -> Nodes:
     """From times and states of which the first are those of the start; infinite beyond the last."""
     rows = jnp.stack([times, *jtu.tree_leaves(states)], axis=-1)
     arrival = jnp.stack([time, *jtu.tree_leaves(plain_state(y))])
     return Nodes(rows[0], rows[1:], arrival, jnp.sum(jnp.isfinite(times)) - 1)
 
 
-def _plain_node(t: Any, y: Any, args: Any) -> PyTree:
+def _plain_node(t: RealScalarLike, y: PyTree, args: PyTree) -> PyTree:
     return y.state if isinstance(y, Tangents) else y
 
 
@@ -177,7 +179,7 @@ def arrival_at(watch: Watch, state: PyTree, args: PyTree) -> tuple[PyTree, Scala
     assert watch.section is not None
     section = watch.section
 
-    def back(y: PyTree, rate: PyTree, time: Any) -> PyTree:
+    def back(y: PyTree, rate: PyTree, time: Scalar) -> PyTree:
         return jtu.tree_map(lambda s, r: s - time * r, y, rate)
 
     def newton(y: PyTree) -> tuple[Scalar, PyTree]:
@@ -195,8 +197,8 @@ def arrival_at(watch: Watch, state: PyTree, args: PyTree) -> tuple[PyTree, Scala
 
 
 def onto_section(
-    watch: Watch, y: Any, t: Any, args: Any, along: Along = along_columns
-) -> tuple[Any, Scalar, Any]:
+    watch: Watch, y: PyTree, t: Scalar, args: PyTree, along: Along = along_columns
+) -> tuple[PyTree, Scalar, PyTree]:
     """Takes the small overshoot back; its derivatives follow the arrival.
 
     Gives what is on the section, the time, and the time's derivatives. `along` differentiates
@@ -216,7 +218,7 @@ def onto_section(
 
 
 def peak_of(
-    watch: Watch, at_peak: Any, args: Seeded, along: Along = along_columns
+    watch: Watch, at_peak: Tangents, args: Seeded, along: Along = along_columns
 ) -> tuple[Scalar, Scalar]:
     """The largest load and its derivatives.
 

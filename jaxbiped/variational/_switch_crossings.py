@@ -1,7 +1,7 @@
 """Switch crossings of a known motion, and their effect on the second variation."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
@@ -66,7 +66,7 @@ def crossing_of(
     def values(z: Scalar) -> list[Scalar]:
         return [surface.value for surface in surfaces(z)]
 
-    def live(z: Scalar) -> list[Any]:
+    def live(z: Scalar) -> list[Scalar | bool]:
         return [surface.live for surface in surfaces(z)]
 
     velocity = rate(new)
@@ -115,11 +115,11 @@ def _rate(rates: Rates, parameters: Scalar) -> Callable[[Scalar], Scalar]:
     return lambda z: jnp.concatenate([stack_rates(rates)(z), jnp.zeros_like(parameters)])
 
 
-def _pick(which: Scalar, each: Sequence[Scalar], value: Any) -> Scalar:
+def _pick(which: Scalar, each: Sequence[Scalar], value: Scalar | float) -> Scalar:
     """That of the switch of this number, or `value` where there is none."""
     for number, candidate in enumerate(each):
         value = jnp.where(which == 1 + number, candidate, value)
-    return value
+    return cast(Scalar, value)
 
 
 def sides_of(rates: Rates, crossings: Crossings, parameters: Scalar) -> Scalar:

@@ -5,7 +5,7 @@ A step across a switch would ruin derivatives long before the state shows it.
 
 import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import diffrax
 import equinox as eqx
@@ -14,10 +14,10 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar, VectorField
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
 from jaxbiped.variational._tangents import Seeded, Tangents
 
 _OVERSHOOT = 1e-4
@@ -40,13 +40,13 @@ class Watch(eqx.Module):
         peak: a quantity whose largest value is to be known.
     """
 
-    field: Callable[[Any, PyTree, PyTree], PyTree] = eqx.field(static=True)
+    field: VectorField = eqx.field(static=True)
     switches: Callable[[PyTree, PyTree], tuple[Switch, ...]] = eqx.field(static=True)
     section: Callable[[PyTree, PyTree], tuple[Scalar, Scalar]] | None = eqx.field(
         static=True, default=None
     )
     ending: Callable[[PyTree, PyTree], Scalar] | None = eqx.field(static=True, default=None)
-    peak: Callable[[PyTree, PyTree], Any] | None = eqx.field(static=True, default=None)
+    peak: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
 
 
 class SwitchLocatorState(NamedTuple):
@@ -65,7 +65,7 @@ class SwitchLocatorState(NamedTuple):
         at_peak: the solve's whole state there.
     """
 
-    inner: Any
+    inner: PyTree
     accepted: Scalar
     landings: Scalar
     jumps: Scalar
@@ -73,8 +73,8 @@ class SwitchLocatorState(NamedTuple):
     peak_saltation_pending: Scalar
     arrived: Scalar
     code: Scalar
-    peak: Any
-    at_peak: Any
+    peak: PyTree
+    at_peak: PyTree
 
 
 class SwitchLocator(AbstractWrappedControl):
@@ -86,10 +86,19 @@ class SwitchLocator(AbstractWrappedControl):
     counts as an arrival, so a solve may start on its section.
     """
 
-    controller: Any
+    controller: StepControl
     watch: Watch
 
-    def init(self, terms: Any, t0: Any, t1: Any, y0: Any, dt0: Any, args: Any, *rest: Any) -> Any:
+    def init(
+        self,
+        terms: Any,
+        t0: RealScalarLike,
+        t1: RealScalarLike,
+        y0: PyTree,
+        dt0: Scalar | None,
+        args: PyTree,
+        *rest: Any,
+    ) -> tuple[Scalar, SwitchLocatorState]:
         """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(terms, t0, t1, y0, dt0, args, *rest)
         zero = jnp.asarray(0)
@@ -102,22 +111,24 @@ class SwitchLocator(AbstractWrappedControl):
 
     def adapt_step_size(
         self,
-        t0: Any,
-        t1: Any,
-        y0: Any,
-        y1_candidate: Any,
-        args: Any,
-        y_error: Any,
-        error_order: Any,
+        t0: RealScalarLike,
+        t1: RealScalarLike,
+        y0: PyTree,
+        y1_candidate: PyTree,
+        args: PyTree,
+        y_error: PyTree,
+        error_order: RealScalarLike | None,
         controller_state: SwitchLocatorState,
-    ) -> Any:
+    ) -> Adapted:
         """Accepts or rejects a step, as diffrax asks."""
         keep, next_t0, next_t1, jump, inner, result = self.controller.adapt_step_size(
             t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state.inner
         )
         parts = (plain_args(args), plain_state(y0), plain_state(y1_candidate))
         scene, before, after = jax.lax.stop_gradient(parts)
-        crossed, part = self._crossings(t1 - t0, scene, before, after, controller_state)
+        crossed, part = self._crossings(
+            cast(Scalar, t1 - t0), scene, before, after, controller_state
+        )
         before_switch, span = (t1 - t0) * part, t1 - t0
         far = span - before_switch > jnp.maximum(_OVERSHOOT * before_switch, 4.0 * MARGIN)
         again = crossed.any & far
@@ -141,7 +152,12 @@ class SwitchLocator(AbstractWrappedControl):
         return keep, next_t0, next_t1, jump | landed.saltation_pending, landed, result
 
     def _crossings(
-        self, span: Any, scene: PyTree, before: PyTree, after: PyTree, landed: SwitchLocatorState
+        self,
+        span: Scalar,
+        scene: PyTree,
+        before: PyTree,
+        after: PyTree,
+        landed: SwitchLocatorState,
     ) -> tuple["_Crossed", Scalar]:
         """Which surfaces a step crosses, and the part of it that lies before the first."""
         watch = self.watch
@@ -184,12 +200,12 @@ class SwitchLocator(AbstractWrappedControl):
 
     def _landed(
         self,
-        inner: Any,
+        inner: PyTree,
         keep: Scalar,
         crossed: "_Crossed",
         scene: PyTree,
         after: PyTree,
-        y1: Any,
+        y1: PyTree,
         old: SwitchLocatorState,
     ) -> SwitchLocatorState:
         code = old.code
@@ -224,17 +240,17 @@ class _Crossed(NamedTuple):
     section: Scalar
 
 
-def plain_state(y: Any) -> PyTree:
+def plain_state(y: PyTree) -> PyTree:
     """The state without its columns."""
     return y.state if isinstance(y, Tangents) else y
 
 
-def plain_args(args: Any) -> PyTree:
+def plain_args(args: PyTree) -> PyTree:
     """The arguments without their seeds."""
     return args.args if isinstance(args, Seeded) else args
 
 
-def _surfaces(watch: Watch, peak: Any, scene: PyTree, state: PyTree) -> list[Switch]:
+def _surfaces(watch: Watch, peak: PyTree, scene: PyTree, state: PyTree) -> list[Switch]:
     """Every surface to end steps on: switches, the peak quantity's maxima, and last the section."""
     found = list(watch.switches(scene, state))
     if watch.peak is not None:
@@ -256,7 +272,7 @@ def _cubic_root(start: Scalar, end: Scalar, start_slope: Scalar, end_slope: Scal
     second = 3.0 * (end - start) - 2.0 * start_slope - end_slope
     third = 2.0 * (start - end) + start_slope + end_slope
 
-    def halve(_: Any, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
+    def halve(_: Scalar, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
         lower, upper = ends
         middle = 0.5 * (lower + upper)
         value = start + middle * (start_slope + middle * (second + middle * third))

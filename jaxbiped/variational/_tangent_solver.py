@@ -5,7 +5,7 @@ A state within its tolerance does not make its derivatives accurate: they have a
 
 import functools
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import diffrax
 import equinox as eqx
@@ -15,10 +15,10 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
-from jaxbiped._types import Scalar
+from jaxbiped._types import BoolScalarLike, RealScalarLike, Scalar
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._projected_solver import Projected
-from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._rosenbrock_tangents import rosenbrock_tangents
 from jaxbiped.variational._saltation import has_saltation, jump_surface_values, saltation_at
@@ -34,7 +34,7 @@ class VariationalField(eqx.Module):
 
     field: Callable[..., PyTree]
 
-    def __call__(self, t: Any, y: Tangents, args: Seeded) -> Tangents:
+    def __call__(self, t: RealScalarLike, y: Tangents, args: Seeded) -> Tangents:
         rate, columns = along_columns(lambda s, a: self.field(t, s, a), y, args)
         return Tangents(rate, as_columns(columns))
 
@@ -56,34 +56,38 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
     solver: diffrax.AbstractAdaptiveSolver
     columns_only_choose_steps: bool = eqx.field(static=True, default=False)
     term_structure: ClassVar = diffrax.AbstractTerm
-    interpolation_cls: ClassVar[Any] = diffrax.LocalLinearInterpolation
+    interpolation_cls: ClassVar[type[diffrax.LocalLinearInterpolation]] = (
+        diffrax.LocalLinearInterpolation
+    )
 
     def order(self, terms: Any) -> int | None:
         """Order of the solver."""
         return self.solver.order(terms)
 
-    def error_order(self, terms: Any) -> Any:
+    def error_order(self, terms: Any) -> RealScalarLike | None:
         """Order of the solver's error estimate."""
         return self.solver.error_order(terms)
 
-    def init(self, terms: Any, t0: Any, t1: Any, y0: Tangents, args: Seeded) -> None:
+    def init(
+        self, terms: Any, t0: RealScalarLike, t1: RealScalarLike, y0: Tangents, args: Seeded
+    ) -> None:
         """Nothing is carried from step to step."""
         return None
 
-    def func(self, terms: Any, t0: Any, y0: Tangents, args: Seeded) -> Tangents:
+    def func(self, terms: Any, t0: RealScalarLike, y0: Tangents, args: Seeded) -> Tangents:
         """The vector field at a point."""
         return terms.vf(t0, y0, args)
 
     def step(
         self,
         terms: Any,
-        t0: Any,
-        t1: Any,
+        t0: RealScalarLike,
+        t1: RealScalarLike,
         y0: Tangents,
         args: Seeded,
         solver_state: None,
-        made_jump: Any,
-    ) -> tuple[Tangents, Tangents, dict[str, Any], None, Any]:
+        made_jump: BoolScalarLike,
+    ) -> tuple[Tangents, Tangents, dict[str, Tangents], None, Any]:
         """One step, as `diffrax.AbstractSolver.step` describes it."""
         del terms, solver_state
         y0 = _apply_saltation(self.watch, y0, args, made_jump)
@@ -96,7 +100,9 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
         return new, error, dict(y0=y0, y1=new), None, diffrax.RESULTS.successful
 
 
-def _apply_saltation(watch: Watch, y: Tangents, args: Seeded, made_jump: Any) -> Tangents:
+def _apply_saltation(
+    watch: Watch, y: Tangents, args: Seeded, made_jump: BoolScalarLike
+) -> Tangents:
     """The columns behind a jump of the field, where one has just been passed.
 
     The state stays what it is, but JAX's own derivatives of it jump as well.
@@ -116,7 +122,7 @@ def _apply_saltation(watch: Watch, y: Tangents, args: Seeded, made_jump: Any) ->
 
 
 def _plain_step(
-    solver: TangentSolver, t0: Any, t1: Any, state: PyTree, args: PyTree
+    solver: TangentSolver, t0: RealScalarLike, t1: RealScalarLike, state: PyTree, args: PyTree
 ) -> tuple[PyTree, PyTree]:
     term = diffrax.ODETerm(solver.watch.field)
     y1, error, *_ = solver.solver.step(term, t0, t1, state, args, None, False)
@@ -125,11 +131,12 @@ def _plain_step(
 
 @cached_jit  # for its trace cache
 def _tangent_step(
-    solver: TangentSolver, t0: Any, t1: Any, y0: Tangents, args: Seeded
+    solver: TangentSolver, t0: RealScalarLike, t1: RealScalarLike, y0: Tangents, args: Seeded
 ) -> tuple[Tangents, Tangents]:
     inner = solver.solver
     if isinstance(inner, Projected):
-        bare = TangentSolver(solver.watch, inner.solver, solver.columns_only_choose_steps)
+        adaptive = cast(diffrax.AbstractAdaptiveSolver, inner.solver)
+        bare = TangentSolver(solver.watch, adaptive, solver.columns_only_choose_steps)
         stepped, errors = _tangent_step(bare, t0, t1, y0, args)
         state, columns = along_columns(lambda s, a: inner.project(a, s), stepped, args)
         return Tangents(state, as_columns(columns)), errors
@@ -155,9 +162,9 @@ class TangentControl(AbstractWrappedControl):
         inverse_units: of the state's leaves, shape (c,).
     """
 
-    controller: Any
-    tangent_rtol: Any
-    inverse_units: Any
+    controller: StepControl
+    tangent_rtol: RealScalarLike
+    inverse_units: Scalar
 
     def init(self, *request: Any) -> Any:
         """The first step's end and the controller's state, as diffrax asks."""
@@ -165,15 +172,15 @@ class TangentControl(AbstractWrappedControl):
 
     def adapt_step_size(
         self,
-        t0: Any,
-        t1: Any,
+        t0: RealScalarLike,
+        t1: RealScalarLike,
         y0: Tangents,
         y1_candidate: Tangents,
         args: Seeded,
-        y_error: Any,
-        error_order: Any,
+        y_error: PyTree,
+        error_order: RealScalarLike | None,
         controller_state: Any,
-    ) -> Any:
+    ) -> Adapted:
         """Accepts or rejects a step, as diffrax asks."""
         inverse = self.inverse_units[:, None]
         size = jnp.maximum(jnp.abs(y0.columns), jnp.abs(y1_candidate.columns)) * inverse
@@ -193,7 +200,7 @@ class TangentControl(AbstractWrappedControl):
         )
 
 
-def worst_norm(error: Any) -> Scalar:
+def worst_norm(error: PyTree) -> Scalar:
     """The largest root mean square among the state and each of its columns."""
     if not isinstance(error, Tangents):
         return rms_norm(error)

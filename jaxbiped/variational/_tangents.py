@@ -1,7 +1,7 @@
 """Tangents: a state together with its derivatives in chosen directions."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -55,15 +55,15 @@ def with_active(args: Seeded, values: Sequence[Scalar]) -> PyTree:
 
 
 def along_columns(
-    function: Callable[[PyTree, PyTree], Any], y: Tangents, args: Seeded
-) -> tuple[Any, Any]:
+    function: Callable[[PyTree, PyTree], PyTree], y: Tangents, args: Seeded
+) -> tuple[PyTree, PyTree]:
     """`function(state, args)` and its derivatives along the columns, leaves of shape (n, …)."""
     state, structure = jtu.tree_flatten(y.state)
 
-    def of_leaves(state: list[Scalar], parameters: list[Scalar]) -> Any:
+    def of_leaves(state: list[Scalar], parameters: list[Scalar]) -> PyTree:
         return function(jtu.tree_unflatten(structure, state), with_active(args, parameters))
 
-    def along(column: Scalar, seed: Scalar) -> Any:
+    def along(column: Scalar, seed: Scalar) -> PyTree:
         tangents = (list(column), list(seed))
         return jax.jvp(of_leaves, (state, active_leaves(args)), tangents)
 

@@ -5,7 +5,7 @@ The twin for lanes of what `_solve_to_section` does through diffrax.
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import diffrax
 import jax
@@ -33,9 +33,9 @@ class _Now(NamedTuple):
     t: Scalar
     next_t: Scalar
     state: PyTree
-    columns: tuple[Any, Any]
+    columns: tuple[Scalar, ...]
     landed: SwitchLocatorState
-    peak_columns: tuple[Any, Any]
+    peak_columns: tuple[Scalar, ...]
     attempted: Scalar
     kept: Scalar
     lost: Scalar
@@ -65,7 +65,7 @@ class AdaptiveColumns:
         once = {name: jax.jit(function) for name, function in whole if function is not None}
         self.watch = dataclasses.replace(watch, **once)
         self.save_nodes = save_nodes
-        self.term: Any = diffrax.ODETerm(watch.field)
+        self.term: diffrax.ODETerm = diffrax.ODETerm(watch.field)
 
     def program(self) -> Program:
         """The program."""
@@ -172,7 +172,7 @@ class AdaptiveColumns:
             self.watch, now.state, self._seeded(given), now.landed.saltation_pending
         )
 
-        def step_column(column: Any, forcing: Any) -> Any:
+        def step_column(column: Scalar, forcing: Scalar | float) -> Scalar:
             return column + saltation.change * (jnp.sum(saltation.by_state * column) + forcing)
 
         by_state, by_parameter = now.columns
@@ -199,12 +199,14 @@ class AdaptiveColumns:
 
     def _columns(
         self, given: VariationalProblem, now: _Now, step: Differentiated
-    ) -> tuple[list[Any], Scalar]:
+    ) -> tuple[list[Scalar], Scalar]:
         """The columns after the step, and the largest norm of their errors."""
 
         inverse = jnp.stack(jtu.tree_leaves(given.units.inverse))
 
-        def step_column(column: Any, floor: Scalar, forcing: Any | None) -> tuple[Any, Scalar]:
+        def step_column(
+            column: Scalar, floor: Scalar, forcing: Scalar | None
+        ) -> tuple[Scalar, Scalar]:
             end, error = column_step(step, column, forcing)
             sizes = jnp.maximum(jnp.abs(column), jnp.abs(end)) * inverse
             least = SHARE * jnp.max(sizes) + floor
@@ -225,7 +227,7 @@ class AdaptiveColumns:
         if by_parameter.shape[0]:
             rows = jnp.moveaxis(step.by_parameter, -1, 0)
 
-            def carried() -> tuple[Any, Scalar]:
+            def carried() -> tuple[Scalar, Scalar]:
                 columns, squares = jax.lax.map(
                     lambda each: step_column(each[0], each[1], each[2] * each[3]),
                     (by_parameter, given.parameter_floors, rows, given.sizes),
@@ -252,24 +254,26 @@ class AdaptiveColumns:
         return SwitchLocator(control, self.watch)
 
 
-def _select(keep: Scalar, new: Any, old: Any) -> Any:
+def _select(keep: Scalar, new: Scalar, old: Scalar) -> Scalar:
     return jax.lax.map(lambda each: jnp.where(keep, *each), (new, old))
 
 
-def _row(keep: Scalar, highest: Scalar, new: Any, old: Any, peak: Any) -> tuple[Any, Any]:
+def _row(
+    keep: Scalar, highest: Scalar, new: Scalar, old: Scalar, peak: Scalar
+) -> tuple[Scalar, Scalar]:
     return jnp.where(keep, new, old), jnp.where(highest, new, peak)
 
 
 def _along_columns_in_turn(
-    function: Callable[[PyTree, PyTree], Any], y: Tangents, args: Seeded
-) -> tuple[Any, Any]:
+    function: Callable[[PyTree, PyTree], PyTree], y: Tangents, args: Seeded
+) -> tuple[PyTree, PyTree]:
     """`along_columns`, one column after the other."""
     state, structure = jtu.tree_flatten(y.state)
 
-    def of_leaves(state: list[Scalar], parameters: list[Scalar]) -> Any:
+    def of_leaves(state: list[Scalar], parameters: list[Scalar]) -> PyTree:
         return function(jtu.tree_unflatten(structure, state), with_active(args, parameters))
 
-    def along(each: tuple[Any, Any]) -> Any:
+    def along(each: tuple[Scalar, Scalar]) -> PyTree:
         tangents = tuple([part[i] for i in range(part.shape[0])] for part in each)
         return jax.jvp(of_leaves, (state, active_leaves(args)), tangents)[1]
 

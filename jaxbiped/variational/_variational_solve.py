@@ -1,12 +1,10 @@
 """Variational solves by lanes."""
 
-from typing import Any
-
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.compiler import LANES, Program, Recording, Request
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._final_step import just_before_end
@@ -29,9 +27,9 @@ def solve_variational(
     sizes: Scalar,
     *,
     precision: Precision,
-    max_time: Any,
+    max_time: RealScalarLike,
     max_solver_steps: int,
-    carries_parameters: Any = True,
+    carries_parameters: Scalar | bool = True,
     save_nodes: bool = False,
 ) -> tuple[VariationalSolution, Recording | None]:
     """Solves from `y0` to the section, a failure or `max_time` [s].
@@ -77,5 +75,5 @@ def _program(
     return AdaptiveColumns(solver, watch, active, save_nodes=save_nodes).program()
 
 
-def _number(value: Any) -> Scalar:
+def _number(value: RealScalarLike) -> Scalar:
     return jnp.asarray(value, dtype=jnp.float64)

@@ -1,9 +1,10 @@
 """Variational problem and solution: what a solve with derivatives takes and gives."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from jaxtyping import PyTree
 
+from jaxbiped._types import Scalar
 from jaxbiped.solve._units import Units
 
 
@@ -25,18 +26,18 @@ class VariationalProblem(NamedTuple):
 
     args: PyTree
     state: PyTree
-    by_state: Any
-    by_parameter: Any
-    sizes: Any
-    carries_parameters: Any
-    state_floors: Any
-    parameter_floors: Any
-    rtol: Any
-    tangent_rtol: Any
+    by_state: Scalar
+    by_parameter: Scalar
+    sizes: Scalar
+    carries_parameters: Scalar
+    state_floors: Scalar
+    parameter_floors: Scalar
+    rtol: Scalar
+    tangent_rtol: Scalar
     units: Units
-    max_time: Any
-    almost: Any
-    max_attempts: Any
+    max_time: Scalar
+    almost: Scalar
+    max_attempts: Scalar
 
 
 class VariationalSolution(NamedTuple):
@@ -48,14 +49,14 @@ class VariationalSolution(NamedTuple):
         accepted: number of steps accepted.
     """
 
-    t: Any
+    t: Scalar
     state: PyTree
-    columns: Any
-    time_columns: Any
-    code: Any
-    attempted: Any
-    accepted: Any
-    jumps: Any
-    missed: Any
-    peak: Any
-    peak_columns: Any
+    columns: Scalar
+    time_columns: Scalar
+    code: Scalar
+    attempted: Scalar
+    accepted: Scalar
+    jumps: Scalar
+    missed: Scalar
+    peak: Scalar
+    peak_columns: Scalar
