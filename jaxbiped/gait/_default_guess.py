@@ -1,7 +1,5 @@
 """Default initial guess of a search."""
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 
@@ -10,14 +8,15 @@ from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._formulation import state_type
-from jaxbiped.dynamics._rigid_state import rigid_state
+from jaxbiped.dynamics._rigid_state import WalkerState, rigid_state
 from jaxbiped.dynamics._state import State, seed_state
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
 
 
-def default_guess(scene: Any) -> Any:
+def default_guess(scene: AbstractScene) -> WalkerState:
     """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight."""
     seed, own = _seed()
     if not scene.compliant:

@@ -1,13 +1,14 @@
 """Choice of the engine that follows the orbits of a search."""
 
-from typing import Any
-
+import diffrax
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._gradient_modes import AbstractGradient, Reverse
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -17,9 +18,9 @@ from jaxbiped.variational._hybrid_system import AbstractSystem
 def orbit_engine(
     engine: str,
     *,
-    solver: Any,
-    section: Any,
-    leaves: Any,
+    solver: diffrax.AbstractSolver,
+    section: AbstractSection,
+    leaves: PyTree,
     system: AbstractSystem | None = None,
     redundant: bool = False,
 ) -> str:
@@ -43,7 +44,9 @@ def orbit_engine(
     return engine_for(engine, obstacle=obstacle, prefers_xla=system is not None)
 
 
-def check_holds_none(gradient: AbstractGradient, system: Any, section: Any) -> None:
+def check_holds_none(
+    gradient: AbstractGradient, system: AbstractSystem | None, section: AbstractSection
+) -> None:
     """Raises `ArgumentError` for reverse mode where a system or section holds arrays."""
     holder = next((each for each in (system, section) if holds_arrays(each)), None)
     if isinstance(gradient, Reverse) and holder is not None:
@@ -53,12 +56,14 @@ def check_holds_none(gradient: AbstractGradient, system: Any, section: Any) -> N
         )
 
 
-def holds_arrays(tree: Any) -> bool:
+def holds_arrays(tree: PyTree) -> bool:
     """Whether there are arrays, known or traced, among the leaves."""
     return any(isinstance(leaf, jax.Array | np.ndarray) for leaf in jtu.tree_leaves(tree))
 
 
-def _hindrance(solver: Any, section: Any, leaves: Any) -> str | None:
+def _hindrance(
+    solver: diffrax.AbstractSolver, section: AbstractSection, leaves: PyTree
+) -> str | None:
     if not isinstance(solver, AbstractRosenbrock):
         return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
     if jtu.tree_leaves(section):

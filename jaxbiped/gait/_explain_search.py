@@ -1,10 +1,9 @@
 """Explanation of a search for a gait, in a sentence."""
 
-from typing import Any
-
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameters import parameter_values
 from jaxbiped.solve._ending import Ending
 
@@ -12,7 +11,7 @@ _MOST_NAMED = 4
 """Parameters that are named; of more, how many there are."""
 
 
-def explain_search(scene: Any, gait: Gait) -> str:
+def explain_search(scene: AbstractScene, gait: Gait) -> str:
     """How a gait was found, which others were seen, or where the seed's gait ended on the way.
 
     Args:
@@ -44,7 +43,7 @@ def _search_sentence(gait: Gait) -> str:
     return "the search from the start does not converge"
 
 
-def _branch(scene: Any, gait: Gait) -> str:
+def _branch(scene: AbstractScene, gait: Gait) -> str:
     """Where the branch of the seed's gait ended, after a semicolon; nothing where it came here."""
     end = BranchEnd(int(gait.origin.branch_end))
     modelled = scene.minimal
@@ -83,7 +82,7 @@ _HOW = {
 }
 
 
-def _differing_parameters(scene: Any, nearest: Any) -> str:
+def _differing_parameters(scene: AbstractScene, nearest: AbstractScene) -> str:
     """The parameters of `nearest` that are not those of `scene`."""
     asked, there = parameter_values(scene), parameter_values(nearest)
     different = [name for name in asked if float(asked[name]) != float(there[name])]

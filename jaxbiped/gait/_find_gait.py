@@ -1,8 +1,9 @@
 """Search for a periodic gait of a scene."""
 
 import dataclasses
+from collections.abc import Hashable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, Literal
+from typing import Literal, TypeAlias, cast
 
 import diffrax
 import equinox as eqx
@@ -20,8 +21,8 @@ from jaxbiped._types import as_float
 from jaxbiped.compiler import deferred_checks
 from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._consistent_state import consistent_state
-from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
+from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import check_state
 from jaxbiped.gait._default_guess import default_guess
@@ -34,11 +35,12 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of
+from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, Precision, precision_of
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.variational._hybrid_system import RedundantWalking, section_of, system_of
 
@@ -47,10 +49,17 @@ _RESIDUAL_SHARE = 0.3
 _PATIENCE = 50.0
 """Time allowed to the next arrival, in units of √(l/g)."""
 
+_Searching: TypeAlias = tuple[
+    ReturnMapSpec, AbstractScene, tuple[int, ...], WalkerState, Precision, Method
+]
+"""What `search` takes."""
+_Described: TypeAlias = tuple[tuple[str, ...], tuple[int, ...], bool]
+"""Names and positions of the parameters, and whether the radius is differentiated."""
+
 
 def find_gait(
     scene: Scene | RigidScene | RedundantScene,
-    guess: Any = None,
+    guess: WalkerState | LegsState | None = None,
     *,
     footsteps: int = 1,
     section: AbstractSection | None = None,
@@ -167,11 +176,17 @@ def find_gait(
 
 
 def _return_map_spec(
-    scene: Any, section: AbstractSection, solver: Any, engine: str, *, steps: int, most: int
+    scene: AbstractScene,
+    section: AbstractSection,
+    solver: diffrax.AbstractAdaptiveSolver,
+    engine: str,
+    *,
+    steps: int,
+    most: int,
 ) -> ReturnMapSpec:
     within = None
     if scene.redundant:
-        solver, within = with_projection(scene, solver), RedundantWalking()
+        solver, within = with_projection(cast(RedundantScene, scene), solver), RedundantWalking()
     return ReturnMapSpec(
         system=system_of(scene),
         section=section,
@@ -190,7 +205,7 @@ def _is_stable(found: Found) -> bool:
 
 
 def _search_on(
-    searching: tuple, modelled: Scene | RigidScene, first: Found, engine: str
+    searching: _Searching, modelled: Scene | RigidScene, first: Found, engine: str
 ) -> tuple[Found, Origin]:
     """The stages of a search beyond the first."""
     spec, scene, active, start, precision, how = searching
@@ -208,7 +223,9 @@ def _search_on(
         most=ACCURACIES["balanced"].max_solver_steps,
     )
 
-    def search_from(spec: ReturnMapSpec, scene: Any, start: Any, patience: int) -> Found:
+    def search_from(
+        spec: ReturnMapSpec, scene: AbstractScene, start: WalkerState, patience: int
+    ) -> Found:
         hasty = dataclasses.replace(how, patience=np.asarray(min(patience, how.max_evaluations)))
         return _search(spec, scene, active, start, precision, hasty)
 
@@ -222,12 +239,12 @@ def _search_on(
     return found, origin_of(staged, modelled, start)
 
 
-def _check_start(scene: Any, start: Any) -> Any:
+def _check_start(scene: AbstractScene, start: PyTree) -> WalkerState:
     if not scene.compliant:
         return check_state(start, RigidState, "guess")
     if scene.redundant:
-        return minimal_state(scene, consistent_state(scene, start).state)
-    return state_for(scene, start, "guess")
+        return minimal_state(scene, consistent_state(cast(RedundantScene, scene), start).state)
+    return state_for(cast(Scene, scene), start, "guess")
 
 
 @bounded_cache(1)  # the same object each time, so that nothing is compiled again
@@ -235,24 +252,24 @@ def _adam() -> optax.GradientTransformation:
     return optax.adam(1e-2)
 
 
-def _compile_once(searching: tuple, describing: tuple, origin: Origin) -> None:
+def _compile_once(searching: _Searching, describing: _Described, origin: Origin) -> None:
     """Compiles what is not compiled yet for this kind of search."""
     once = _compilation_of(_kind_of((searching, describing[0], describing[2])))
     once(lambda: _compile(searching, describing, origin))
 
 
 @bounded_cache(PROGRAMS)
-def _compilation_of(kind: Any) -> Once[None]:
+def _compilation_of(kind: Hashable) -> Once[None]:
     """What one kind of search is compiled by."""
     return Once()
 
 
-def _compile(searching: tuple, describing: tuple, origin: Origin) -> None:
+def _compile(searching: _Searching, describing: _Described, origin: Origin) -> None:
     """Compiles both programs, and what lanes run for them, at the same time."""
     spec, scene, _, start, *_ = searching
     no_result = _empty_arrays(eqx.filter_eval_shape(_search, *searching))
-    first: Any = _search
-    second: Any = summarise_gait
+    first = _search
+    second = summarise_gait
     told = stage("compiling the search (first time for this kind of scene)")
     with told, ThreadPoolExecutor() as meanwhile:
         with deferred_checks() as programs:
@@ -266,7 +283,7 @@ def _compile(searching: tuple, describing: tuple, origin: Origin) -> None:
             each.result()
 
 
-def _kind_of(tree: PyTree) -> Any:
+def _kind_of(tree: PyTree) -> Hashable:
     """What decides whether one compiled program can serve for another."""
     arrays, rest = eqx.partition(tree, eqx.is_array)
     shapes = tuple((leaf.shape, leaf.dtype) for leaf in jtu.tree_leaves(arrays))
@@ -279,7 +296,7 @@ def _is_traced(tree: PyTree) -> bool:
 
 
 @cached_jit
-def _search(*searching: Any) -> Found:
+def _search(*searching: PyTree) -> Found:
     # Without weak types, which would make the next program another one than was compiled.
     return jtu.tree_map(
         lambda leaf: jax.lax.convert_element_type(leaf, leaf.dtype), search(*searching)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxbiped._caches import cached_jit
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
@@ -82,8 +82,8 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
 
 
 @cached_jit
-def _find_each(scene: Scene | RigidScene, starts: Any, options: dict[str, Any]) -> Gait:
-    def one(start: Any) -> Gait:
+def _find_each(scene: Scene | RigidScene, starts: WalkerState, options: dict[str, Any]) -> Gait:
+    def one(start: WalkerState) -> Gait:
         return find_gait(scene, start, parameters=(), radius_sensitivities=False, **options)
 
     return jax.vmap(one)(starts)

@@ -2,7 +2,7 @@
 
 import enum
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -99,7 +99,7 @@ def search(
     guess: PyTree,
     precision: Precision,
     method: Method,
-    wanted: Any = True,
+    wanted: Scalar | bool = True,
 ) -> Found:
     """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely.
 

@@ -1,6 +1,6 @@
 """Periodic gait: its state, measures, stability and sensitivities, found or not."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -14,12 +14,14 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._summary import summary
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Recording
+from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._fixed_point_search import Found, Search
-from jaxbiped.gait._orbit import Orbit, orbit_of
+from jaxbiped.gait._orbit import Orbit, Slopes, orbit_of
 from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._stability import Bifurcation
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameters import parameter_quantities
 from jaxbiped.solve._ending import Ending
 
@@ -45,9 +47,9 @@ class Measures(NamedTuple):
     period: Scalar
     step_length: Scalar
     speed: Scalar
-    peak_normal: Any
-    spectral_radius: Any
-    state: Any
+    peak_normal: PyTree
+    spectral_radius: PyTree
+    state: PyTree
 
 
 class Gait(eqx.Module):
@@ -106,7 +108,7 @@ class Gait(eqx.Module):
     solver_steps: Scalar
     sound: Scalar
     origin: Origin
-    orbit: tuple[Scalar, Any]
+    orbit: tuple[Scalar, PyTree]
     parameters: tuple[str, ...] = eqx.field(static=True)
     engine: str = eqx.field(static=True)
     quantities: tuple[Quantity, ...] = eqx.field(static=True, default=())
@@ -151,8 +153,8 @@ class Gait(eqx.Module):
 @cached_jit
 def summarise_gait(
     spec: ReturnMapSpec,
-    scene: Any,
-    start: Any,
+    scene: AbstractScene,
+    start: WalkerState,
     found: Found,
     names: tuple[str, ...],
     active: tuple[int, ...],
@@ -213,7 +215,7 @@ def summarise_gait(
     )
 
 
-def _path(last: LinearisedReturn, like: Any) -> tuple[Scalar, Any]:
+def _path(last: LinearisedReturn, like: WalkerState) -> tuple[Scalar, PyTree]:
     """Times and states of a cycle's nodes, leaves of shape (footsteps, nodes); NaN beyond them."""
     nodes = last.nodes
     assert nodes is not None
@@ -227,7 +229,7 @@ def _path(last: LinearisedReturn, like: Any) -> tuple[Scalar, Any]:
     return times, jtu.tree_unflatten(jtu.tree_structure(like), states)
 
 
-def _by_parameter(orbit: Orbit, measures: Measures, slopes: Any, radius: Scalar) -> Measures:
+def _by_parameter(orbit: Orbit, measures: Measures, slopes: Slopes, radius: Scalar) -> Measures:
     """Derivatives of the measures with respect to parameters in their own sizes, shape (p,)."""
     length, period = slopes.advance[0], slopes.period
     speed = (length - measures.speed * period) / measures.period

@@ -1,19 +1,18 @@
 """Gait measures as a function of the scene that JAX can differentiate."""
 
 from collections.abc import Callable
-from typing import Any
 
 import equinox as eqx
 import equinox.internal as eqxi
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gradient_modes import AbstractGradient, Implicit
@@ -27,7 +26,7 @@ from jaxbiped.scene._scene import Scene
 
 def gait_measures(
     scene: Scene | RigidScene | RedundantScene,
-    guess: Any = None,
+    guess: WalkerState | None = None,
     *,
     gradient: AbstractGradient | None = None,
     footsteps: int = 1,
@@ -76,7 +75,7 @@ def gait_measures(
     if implicit:
         return _by_theorem(scene, gait)
 
-    def once_from(state: State | RigidState) -> Return:
+    def once_from(state: PyTree) -> Return:
         return return_map(
             scene,
             state,
@@ -118,7 +117,7 @@ def _attach_derivatives_jvp(primals: tuple, tangents: tuple) -> tuple[Measures, 
 _SECOND = "gait_measures by Implicit(), which has first derivatives only; a second"
 
 
-def _by_correction(gait: Gait, once_from: Callable[[Any], Return]) -> Measures:
+def _by_correction(gait: Gait, once_from: Callable[[PyTree], Return]) -> Measures:
     """Newton's correction at the gait changes nothing but has the gait's derivatives."""
     state = gait.measures.state
     once = once_from(state)

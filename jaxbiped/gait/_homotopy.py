@@ -4,8 +4,9 @@ A search that fails from its start follows a known gait along this line.
 """
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -22,6 +23,8 @@ from jaxbiped.scene.laws._catalogue import (
     normal_law_like,
 )
 
+_Law = TypeVar("_Law", bound=eqx.Module)
+
 
 class Homotopy(NamedTuple):
     """Scenes between two of one kind: geometric in what is positive in both, linear in the rest.
@@ -30,20 +33,20 @@ class Homotopy(NamedTuple):
         first, last: the scenes at s = 0 and at s = 1.
     """
 
-    first: Any
-    last: Any
+    first: AbstractScene
+    last: AbstractScene
 
-    def at(self, s: Any) -> Any:
+    def at(self, s: Scalar | float) -> AbstractScene:
         """The scene at s; beyond 1 the line goes on."""
         return jtu.tree_map(lambda a, b: _interpolate(a, b, s)[0], self.first, self.last)
 
-    def slopes(self, s: Any) -> Scalar:
+    def slopes(self, s: Scalar | float) -> Scalar:
         """Derivatives of the scene's leaves with respect to s, shape (leaves,)."""
         pairs = zip(jtu.tree_leaves(self.first), jtu.tree_leaves(self.last), strict=True)
         return jnp.stack([_interpolate(a, b, s)[1] for a, b in pairs])
 
 
-def _interpolate(a: Any, b: Any, s: Any) -> tuple[Any, Any]:
+def _interpolate(a: Scalar, b: Scalar, s: Scalar | float) -> tuple[Scalar, Scalar]:
     """The number at s between `a` and `b`, and its derivative with respect to s."""
     geometric = (a > 0.0) & (b > 0.0)
     ratio = jnp.where(geometric, b, 1.0) / jnp.where(geometric, a, 1.0)
@@ -61,7 +64,7 @@ def homotopy_to(scene: AbstractScene) -> Homotopy:
     return Homotopy(scene.with_minimal(_seed_like(scene.minimal)), scene)
 
 
-def _seed_like(scene: Scene | RigidScene) -> Any:
+def _seed_like(scene: Scene | RigidScene) -> Scene | RigidScene:
     with jax.ensure_compile_time_eval():
         own = jtu.tree_map(float, seed_scene())
         if isinstance(scene, RigidScene):
@@ -97,7 +100,7 @@ def _seed_like(scene: Scene | RigidScene) -> Any:
         return jtu.tree_map(as_float, begin)
 
 
-def _numbers_of(alike: Any, law: Any) -> Any:
+def _numbers_of(alike: eqx.Module | None, law: _Law) -> _Law:
     """`law` with the numbers of `alike`; its own static fields, and numbers that this lacks."""
     if alike is None:
         return law

@@ -6,14 +6,15 @@ Problems (2004), algorithm NLEQ-ERR.
 """
 
 import enum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import optax
+from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar, SomeTree
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.linalg._small_matrices import solve
 
@@ -36,11 +37,11 @@ class Method(eqx.Module):
 
     optimiser: optax.GradientTransformation | None = eqx.field(static=True)
     max_evaluations: int = eqx.field(static=True)
-    residual: Any
-    patience: Any = None
+    residual: RealScalarLike
+    patience: RealScalarLike | None = None
 
     @property
-    def evaluations_allowed(self) -> Any:
+    def evaluations_allowed(self) -> RealScalarLike:
         """How many evaluations of the return map a search may take."""
         return self.max_evaluations if self.patience is None else self.patience
 
@@ -81,7 +82,7 @@ class Progress(NamedTuple):
     base_return: LinearisedReturn
     damping: Scalar
     coarse: LinearisedReturn
-    optimiser: Any
+    optimiser: PyTree
     code: Scalar
     evaluations: Scalar
     history: Scalar
@@ -203,7 +204,7 @@ def _descent_step(
     slope: Scalar,
     better: Scalar,
     optimiser: optax.GradientTransformation,
-) -> tuple[Scalar, Any]:
+) -> tuple[Scalar, PyTree]:
     """A step down the gradient of the squared residual."""
     gradient = slope.T @ jnp.where(better, change, 0.0)
     step, state = optimiser.update(gradient, now.optimiser, base)
@@ -212,6 +213,6 @@ def _descent_step(
     return jnp.where(better, step, 0.5 * (now.trial - base)), state
 
 
-def select(condition: Scalar, new: Any, old: Any) -> Any:
+def select(condition: Scalar, new: SomeTree, old: SomeTree) -> SomeTree:
     """One of two trees of the same structure."""
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b), new, old)

@@ -1,13 +1,16 @@
 """Origin of a gait: how a search came to it, and what else it saw."""
 
 import enum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.scene._abstract_scene import AbstractScene
 
 MOST_OTHERS = 4
 """Other gaits that there is room for."""
@@ -46,7 +49,7 @@ class OtherGait(NamedTuple):
     period: Scalar
     step_length: Scalar
     spectral_radius: Scalar
-    state: Any
+    state: WalkerState
 
 
 class Origin(NamedTuple):
@@ -67,12 +70,12 @@ class Origin(NamedTuple):
     others: OtherGait
     branch_end: Scalar
     branch_walk_ending: Scalar
-    nearest: Any
+    nearest: AbstractScene
 
 
-def single_stage_origin(scene: Any, start: Any, found_by: FoundBy) -> Origin:
+def single_stage_origin(scene: AbstractScene, start: WalkerState, found_by: FoundBy) -> Origin:
     """Of a search that had but one stage."""
-    missing: Any = np.full(MOST_OTHERS, np.nan)
+    missing: PyTree = np.full(MOST_OTHERS, np.nan)
     return Origin(
         found_by=code_array(found_by),
         others=OtherGait(missing, missing, missing, jtu.tree_map(lambda _: missing, start)),
@@ -82,6 +85,6 @@ def single_stage_origin(scene: Any, start: Any, found_by: FoundBy) -> Origin:
     )
 
 
-def code_array(code: int) -> Any:
+def code_array(code: int) -> PyTree:
     """A code as an array, made by NumPy: JAX would take longer."""
     return np.asarray(int(code))

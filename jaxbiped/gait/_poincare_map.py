@@ -3,7 +3,7 @@
 Newton's method, multipliers and sensitivities all read this one evaluation.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple, cast
 
 import equinox as eqx
 import jax
@@ -17,6 +17,7 @@ from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import recurring_inverse_units
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._hybrid_system import AbstractSystem
 from jaxbiped.variational._section_by_lanes import solve_to_section_by_lanes
 from jaxbiped.variational._solve_to_section import (
@@ -108,9 +109,9 @@ def linearised_return(
     args: Seeded,
     y: PyTree,
     precision: Precision,
-    idle: Any,
+    idle: Scalar | bool,
     *,
-    carries_parameters: Any = True,
+    carries_parameters: Scalar | bool = True,
 ) -> LinearisedReturn:
     """Follows the orbit from `y` for one cycle, with derivatives; nothing where `idle`.
 
@@ -191,7 +192,7 @@ def _next_arrival(
     args: Seeded,
     precision: Precision,
     limit: Scalar,
-    carries_parameters: Any,
+    carries_parameters: Scalar | bool,
 ) -> SectionArrival:
     """The next arrival, by the engine that is asked for."""
     most = spec.max_solver_steps
@@ -213,7 +214,7 @@ def _next_arrival(
     sizes = jnp.diagonal(args.seeds[:, m:])
     return solve_to_section_by_lanes(
         watch,
-        spec.solver,
+        cast(AbstractRosenbrock, spec.solver),
         y0,
         args,
         sizes,

@@ -1,6 +1,6 @@
 """The return map by lanes: all directions of a derivative share one solve."""
 
-from typing import Any
+from typing import cast
 
 import equinox as eqx
 import equinox.internal as eqxi
@@ -16,6 +16,7 @@ from jaxbiped.gait._return_by_xla import NO_REVERSE, full_tangents, reset_on_arr
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._tangents import Seeded, Tangents
 from jaxbiped.variational._variational_solve import solve_variational
 from jaxbiped.variational._variational_types import VariationalSolution
@@ -30,7 +31,7 @@ def forward_by_lanes(
 
 
 @forward_by_lanes.def_jvp
-def _forward_by_lanes_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
+def _forward_by_lanes_jvp(primals: tuple, tangents: tuple) -> tuple[PyTree, PyTree]:
     spec, precision, args, state = primals
     _, _, args_dot, state_dot = tangents
     state_dots, args_dots = _leaves_with_none(state_dot, state), _leaves_with_none(args_dot, args)
@@ -70,8 +71,8 @@ def reverse_by_lanes(
 
 @_reversible.def_fwd
 def _reversible_fwd(
-    perturbed: Any, given: tuple[PyTree, PyTree], spec: ReturnMapSpec, precision: Precision
-) -> tuple[Any, VariationalSolution]:
+    perturbed: PyTree, given: tuple[PyTree, PyTree], spec: ReturnMapSpec, precision: Precision
+) -> tuple[PyTree, VariationalSolution]:
     args, state = given
     active, places = (_places(part) for part in perturbed)
     found = _solve(spec, precision, args, state, places, active)
@@ -81,8 +82,8 @@ def _reversible_fwd(
 @_reversible.def_bwd
 def _reversible_bwd(
     found: VariationalSolution,
-    cotangents: Any,
-    perturbed: Any,
+    cotangents: PyTree,
+    perturbed: PyTree,
     given: tuple[PyTree, PyTree],
     spec: ReturnMapSpec,
     precision: Precision,
@@ -134,7 +135,7 @@ def _solve(
     floors = jnp.asarray([*(STATE_FLOOR * inverse[i] for i in places), *[PARAMETER_FLOOR] * p])
     found, _ = solve_variational(
         spec.watch(args, state, peak=False),
-        spec.solver,
+        cast(AbstractRosenbrock, spec.solver),
         Tangents(state, jnp.asarray(columns)),
         Seeded(args, jnp.zeros((p, m + p)), floors, active),
         jnp.stack(_sizes(args, active)) if active else jnp.zeros(0),
@@ -151,7 +152,7 @@ def _sizes(args: PyTree, active: tuple[int, ...]) -> list[Scalar]:
     return [jnp.where(leaves[i] == 0.0, 1.0, leaves[i]) for i in active]
 
 
-def _leaves_with_none(tangents: PyTree, like: PyTree) -> list[Any]:
+def _leaves_with_none(tangents: PyTree, like: PyTree) -> list[PyTree]:
     """Tangents of every leaf, None where JAX left them out."""
     if tangents is None:
         return [None] * len(jtu.tree_leaves(like))

@@ -1,7 +1,5 @@
 """The return map by diffrax: forward with tangents of its own, and in reverse."""
 
-from typing import Any
-
 import equinox as eqx
 import equinox.internal as eqxi
 import jax
@@ -42,7 +40,7 @@ def forward_by_xla(
 
 
 @forward_by_xla.def_jvp
-def _by_xla_forward_jvp(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
+def _by_xla_forward_jvp(primals: tuple, tangents: tuple) -> tuple[PyTree, PyTree]:
     spec, precision, args, state = primals
     spec_dot, _, args_dot, state_dot = tangents
     if jtu.tree_leaves((spec_dot.system, spec_dot.section)):
@@ -109,12 +107,12 @@ def reverse_by_xla(
 
 
 def reset_on_arrival(
-    spec: ReturnMapSpec, args: PyTree, state: PyTree, time: Any, code: Any
-) -> tuple:
+    spec: ReturnMapSpec, args: PyTree, state: PyTree, time: Scalar, code: Scalar
+) -> tuple[PyTree, Scalar, Scalar]:
     return select(code == 0, spec.system.reset_map(args, state), state), time, code
 
 
-def select(condition: Any, a: PyTree, b: PyTree) -> PyTree:
+def select(condition: Scalar, a: PyTree, b: PyTree) -> PyTree:
     return jtu.tree_map(lambda x, y: jnp.where(condition, x, y), a, b)
 
 
@@ -124,7 +122,7 @@ def _dense(tangents: PyTree, like: PyTree) -> list[Scalar]:
 
 
 def full_tangents(tangents: PyTree, like: PyTree) -> PyTree:
-    def full(leaf: Any, dot: Any) -> Any:
+    def full(leaf: Scalar | None, dot: Scalar | None) -> Scalar | None:
         # A part that there is not, as bristles may be, has no tangent either.
         return jnp.zeros_like(leaf) if dot is None and leaf is not None else dot
 

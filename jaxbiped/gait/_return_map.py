@@ -1,7 +1,7 @@
 """The return map as a function that JAX can differentiate."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import diffrax
 import jax.numpy as jnp
@@ -9,7 +9,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice, check_positive
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import RealScalarLike, Scalar, as_float
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._engine import check_holds_none, orbit_engine
@@ -56,7 +56,7 @@ def return_map(
     accuracy: str = "balanced",
     system: AbstractSystem | None = None,
     solver: str | diffrax.AbstractSolver | None = None,
-    max_time: Any = 10.0,
+    max_time: RealScalarLike = 10.0,
     engine: str = "auto",
 ) -> Return:
     """Follows a motion to its next arrival at a section, differentiably.
@@ -129,7 +129,7 @@ def return_map(
     return Return(minimal_state(args, state) if enters else state, time, code)
 
 
-_FOLLOW: dict[tuple[str, type[AbstractGradient]], Callable[..., Any]] = {
+_FOLLOW: dict[tuple[str, type[AbstractGradient]], Callable[..., tuple[PyTree, Scalar, Scalar]]] = {
     ("xla", Forward): forward_by_xla,
     ("xla", Reverse): reverse_by_xla,
     ("lanes", Forward): forward_by_lanes,

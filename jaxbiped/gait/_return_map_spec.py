@@ -1,11 +1,10 @@
 """Specification of a return map: whose it is, and how it is solved."""
 
-from typing import Any
-
+import diffrax
 import equinox as eqx
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.variational._hybrid_system import AbstractSystem
@@ -28,8 +27,8 @@ class ReturnMapSpec(eqx.Module):
 
     system: AbstractSystem
     section: AbstractSection
-    solver: Any
-    max_time: Any
+    solver: diffrax.AbstractAdaptiveSolver
+    max_time: RealScalarLike
     steps: int = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)

@@ -1,6 +1,6 @@
 """Scattered starts about the seed's, the stance foot rolling."""
 
-from typing import Any
+from typing import cast
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +10,7 @@ from jaxbiped._checks import check_positive, check_type
 from jaxbiped._types import as_float
 from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._feet import standing_height
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -19,7 +19,7 @@ from jaxbiped.scene._scene import Scene
 
 def rolling_starts(
     scene: Scene | RigidScene, count: int, *, spread: float = 0.3, seed: int = 0
-) -> Any:
+) -> WalkerState:
     """Starts about the seed's: its angles and leg rates scattered, the stance foot rolling.
 
     Args:
@@ -46,7 +46,7 @@ def rolling_starts(
     omega_1, omega_2 = middle.omega_1 * factors[2], middle.omega_2 * factors[3]
     if isinstance(scene, RigidScene):
         return RigidState(jnp.zeros_like(theta_1), theta_1, theta_2, omega_1, omega_2)
-    depth = standing_height(scene, middle.theta_2) - middle.hip_z
+    depth = standing_height(scene, middle.theta_2) - cast(State, middle).hip_z
     reach = scene.walker.hip_to_foot
     plain = State(
         hip_x=jnp.zeros_like(theta_1),

@@ -4,12 +4,13 @@ The fitted start is tried first. Where no stable gait comes of it, the seed scen
 to the scene along the line between them, each search beginning where those before point to.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._fixed_point_search import Found, Search, search
@@ -19,6 +20,7 @@ from jaxbiped.gait._origin import FoundBy, Origin
 from jaxbiped.gait._poincare_map import recurring_components, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.linalg._small_matrices import eigenpairs
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.solve._accuracy import Precision
 
 _FIRST, _LARGEST, _SMALLEST = 0.05, 0.3, 1e-3
@@ -61,9 +63,9 @@ class _Way(NamedTuple):
 
 def search_along(
     spec: ReturnMapSpec,
-    scene: Any,
+    scene: AbstractScene,
     active: tuple[int, ...],
-    start: Any,
+    start: WalkerState,
     precision: Precision,
     method: Method,
     origin: Origin,
@@ -166,7 +168,7 @@ def _is_ahead(way: _Way, point: Scalar) -> Scalar:
     return jnp.where(way.at[1] > way.at[0], aside < _ASIDE * length + 0.01, length < _JUMP)
 
 
-def _nearest(kept: Any, line: Homotopy, s: Scalar, wanted: Scalar) -> Any:
+def _nearest(kept: AbstractScene, line: Homotopy, s: Scalar, wanted: Scalar) -> AbstractScene:
     scene = line.at(s)
     return select(wanted, scene.minimal, kept)
 

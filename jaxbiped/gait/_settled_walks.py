@@ -1,16 +1,19 @@
 """Settled walks: where walking forwards from many starts ends that does not fall."""
 
-from typing import Any
+from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import exchange_legs
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._rigid_walk import rigid_walk
@@ -23,7 +26,7 @@ _DEPTH = 4
 """Longest cycle [footsteps] that is looked for in a walk's last arrivals."""
 
 
-def settle_walks(scene: Scene | RigidScene, starts: Any, *, most: int = 4) -> list[np.ndarray]:
+def settle_walks(scene: Scene | RigidScene, starts: PyTree, *, most: int = 4) -> list[np.ndarray]:
     """Where walks from the starts are after many footsteps, the most settled first.
 
     Args:
@@ -34,7 +37,9 @@ def settle_walks(scene: Scene | RigidScene, starts: Any, *, most: int = 4) -> li
     Returns:
         States on the section without hip_x, each of shape (m,), apart from each other.
     """
-    walked: Any = _arrivals if scene.compliant else _rigid_arrivals
+    walked: Callable[..., tuple[Scalar | None, PyTree]] = (
+        _arrivals if scene.compliant else _rigid_arrivals
+    )
     counts, last = walked(scene, starts)
     points = np.stack([np.asarray(leaf) for leaf in last[1:]], axis=-1)
     walking = np.flatnonzero(np.asarray(counts) >= _FOOTSTEPS)
@@ -51,7 +56,7 @@ def settle_walks(scene: Scene | RigidScene, starts: Any, *, most: int = 4) -> li
     return [latest[i] * sizes for i in chosen]
 
 
-def component_sizes(scene: Scene | RigidScene, state: Any) -> np.ndarray:
+def component_sizes(scene: AbstractScene, state: WalkerState) -> np.ndarray:
     """Size of each component of a state without hip_x, shape (m,), SI units.
 
     Angles 1, lengths l, velocities √(g l), rates √(g/l).
@@ -66,10 +71,10 @@ def component_sizes(scene: Scene | RigidScene, state: Any) -> np.ndarray:
 
 
 @cached_jit
-def _arrivals(scene: Scene, starts: Any) -> tuple[Any, Any]:
+def _arrivals(scene: Scene, starts: PyTree) -> tuple[Scalar | None, PyTree]:
     """Arrivals at mid-stance of each walk, and the states at the last ones, leg 2 standing."""
 
-    def one(start: Any) -> tuple[Any, Any]:
+    def one(start: PyTree) -> tuple[Scalar | None, PyTree]:
         walk = simulate(
             scene,
             start,
@@ -88,10 +93,10 @@ def _arrivals(scene: Scene, starts: Any) -> tuple[Any, Any]:
 
 
 @cached_jit
-def _rigid_arrivals(scene: RigidScene, starts: Any) -> tuple[Scalar, Any]:
+def _rigid_arrivals(scene: RigidScene, starts: PyTree) -> tuple[Scalar | None, PyTree]:
     """Heel strikes of each walk, and the states just after the last ones."""
 
-    def one(start: Any) -> tuple[Scalar, Any]:
+    def one(start: PyTree) -> tuple[Scalar | None, PyTree]:
         walk = rigid_walk(scene, start, footsteps=_FOOTSTEPS, max_arrivals=_FOOTSTEPS)
         return walk.footsteps, jtu.tree_map(lambda leaf: leaf[-1 - _DEPTH :], walk.strikes[1])
 

@@ -4,9 +4,8 @@ The return map has fixed points that no walk reaches: under the clearance rule a
 deep underground and be caught there. Stability does not tell them from gaits, so depth does.
 """
 
-from typing import Any
-
 import jax.numpy as jnp
+from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet, touches
@@ -19,7 +18,7 @@ _DEEPEST = 3.0
 """Elastic force of a standing foot, in units of the walker's weight: about 1 where it stands."""
 
 
-def is_sound(scene: Any, state: Any, step_length: Scalar, period: Scalar) -> Scalar:
+def is_sound(scene: object, state: PyTree, step_length: Scalar, period: Scalar) -> Scalar:
     """Whether an orbit through a state on its section steps downhill and on the ground (boolean).
 
     Args:

@@ -1,15 +1,17 @@
 """Staged search without a guess: each stage only where those before found no stable gait."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._continuation import Branch, BranchEnd, Change, follow_branch
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._fixed_point_search import ROUGH, Found, Search
@@ -30,6 +32,7 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._rolling_starts import rolling_starts
 from jaxbiped.gait._settled_walks import component_sizes, settle_walks
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
@@ -47,7 +50,7 @@ _SAME = 1e-5
 """Relative difference of period and length up to which two finds are of one gait."""
 
 
-Searching = Callable[[ReturnMapSpec, Any, Any, int], Found]
+Searching = Callable[[ReturnMapSpec, AbstractScene, WalkerState, int], Found]
 """Newton's method on the return map of a scene, from a start, in at most so many evaluations."""
 
 
@@ -85,7 +88,7 @@ def search_in_stages(
     search: Searching,
     spec: ReturnMapSpec,
     scout: ReturnMapSpec,
-    scene: Any,
+    scene: AbstractScene,
     modelled: Scene | RigidScene,
     first: Found,
 ) -> Staged:
@@ -145,11 +148,11 @@ def search_in_stages(
     return Staged(ordered[0] if ordered else None, tuple(ordered[1:]), branch, line)
 
 
-def origin_of(staged: Staged, scene: Scene | RigidScene, start: Any) -> Origin:
+def origin_of(staged: Staged, scene: Scene | RigidScene, start: WalkerState) -> Origin:
     """What a search in stages tells of itself; `scene` in minimal coordinates."""
     by = FoundBy.START if staged.best is None else staged.best.by
     plain = single_stage_origin(scene, start, by)
-    columns: Any = np.full((MOST_OTHERS, 3 + len(start)), np.nan)
+    columns: PyTree = np.full((MOST_OTHERS, 3 + len(start)), np.nan)
     for row, each in zip(columns, staged.others, strict=False):
         last = each.found.last
         row[:3] = float(last.period), float(last.advance[0]), each.radius
@@ -187,17 +190,17 @@ def _same(a: Found, b: Seen) -> bool:
     return bool(np.allclose(measures(a), measures(b.found), rtol=_SAME, atol=0.0))
 
 
-def _state(like: Any, point: np.ndarray) -> Any:
+def _state(like: PyTree, point: np.ndarray) -> WalkerState:
     """The state with these components besides hip_x, of numbers that take no time to make."""
     return jtu.tree_map(as_float, type(like)(0.0, *point.tolist()))
 
 
-def _columns(starts: Any) -> np.ndarray:
+def _columns(starts: WalkerState) -> np.ndarray:
     """States without hip_x as rows, shape (n, m)."""
     return np.stack([np.asarray(leaf) for leaf in starts[1:]], axis=1)
 
 
-def _starts(scene: Scene | RigidScene, seen: list[Seen], count: int) -> Any:
+def _starts(scene: Scene | RigidScene, seen: list[Seen], count: int) -> WalkerState:
     """Starts of walks: rolling ones, and states just off the gaits that were seen."""
     halves = [
         rolling_starts(scene, count // 2, spread=spread, seed=k)
@@ -221,7 +224,9 @@ def _push_off_unstable(found: Found, sizes: np.ndarray) -> list[np.ndarray]:
     return [point + push * unit for push in _PUSHES]
 
 
-def _follow_from_seed(search: Searching, scout: ReturnMapSpec, line: Homotopy, like: Any) -> Branch:
+def _follow_from_seed(
+    search: Searching, scout: ReturnMapSpec, line: Homotopy, like: WalkerState
+) -> Branch:
     """The branch of gaits from the seed's scene."""
     first = search(scout, line.first, default_guess(line.first), _TURNS)
     point = np.asarray(first.recurring)
@@ -229,7 +234,7 @@ def _follow_from_seed(search: Searching, scout: ReturnMapSpec, line: Homotopy, l
         return Branch(point[None], np.zeros(1), BranchEnd.NO_BEGINNING, int(first.code))
 
     def change(point: np.ndarray, s: float) -> Change:
-        given: Any = point, np.float64(s)
+        given: PyTree = point, np.float64(s)
         value, by_point, by_s, code = map(np.asarray, _scene_along(scout, line, like, *given))
         return Change(value, by_point, by_s, int(code))
 
@@ -238,7 +243,7 @@ def _follow_from_seed(search: Searching, scout: ReturnMapSpec, line: Homotopy, l
 
 @cached_jit
 def _scene_along(
-    scout: ReturnMapSpec, line: Homotopy, like: Any, point: Scalar, s: Scalar
+    scout: ReturnMapSpec, line: Homotopy, like: WalkerState, point: Scalar, s: Scalar
 ) -> tuple[Scalar, Scalar, Scalar, Scalar]:
     """What a return changes in a point, and how that depends on the point and on s."""
     m, scene = point.shape[0], line.at(s)
