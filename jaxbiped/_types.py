@@ -4,6 +4,7 @@ from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from jaxbiped._checks import is_number
@@ -11,11 +12,17 @@ from jaxbiped._checks import is_number
 Scalar: TypeAlias = Float[Array, "..."]
 """A number: one scalar leaf, or one such leaf for each entry of a batch or a time series."""
 
+Numbers: TypeAlias = Array | np.ndarray
+"""An array, of JAX or of NumPy."""
+
+JsonObject: TypeAlias = dict[str, Any]
+"""Numbers and words by name, ready for JSON: what a command writes, settings of a store."""
+
 Parameter: TypeAlias = Any
 """A number that a constructor turns into a floating-point array: a float, an array, a tracer."""
 
 
-def as_float(value: Any) -> Any:
+def as_float(value: Parameter) -> Scalar:
     """A floating-point array of JAX's default width (64 bits unless changed) or its own.
 
     What is no number is returned as it is, for the check that follows to refuse by name.
