@@ -1,13 +1,13 @@
 """Simulation by lanes."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import diffrax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, ArrayLike
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
@@ -117,7 +117,7 @@ def _setting(run: "Simulation") -> Setting:
 
 
 def _solve(run: "Simulation") -> Solve:
-    def number(value: Any) -> Scalar:
+    def number(value: ArrayLike) -> Scalar:
         return jnp.asarray(value, dtype=jnp.float64)
 
     assert isinstance(run.scene, Scene)

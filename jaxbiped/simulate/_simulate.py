@@ -1,7 +1,7 @@
 """Simulation of a scene from a start."""
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import diffrax
 import equinox as eqx
@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Array, PyTree
+from jaxtyping import Array, ArrayLike, PyTree
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -19,7 +19,7 @@ from jaxbiped._checks import (
     check_type,
     check_unbatched,
 )
-from jaxbiped._types import Scalar
+from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
@@ -43,11 +43,11 @@ from jaxbiped.solve.solvers import solver_named
 
 def simulate(
     scene: Scene | RedundantScene,
-    state: Any,
+    state: PyTree,
     *,
     duration: float | None = None,
     footsteps: int | None = None,
-    solver: str | diffrax.AbstractSolver = "rodas4",
+    solver: str | diffrax.AbstractSolver[PyTree] = "rodas4",
     accuracy: str = "balanced",
     rtol: float | None = None,
     atol: float | None = None,
@@ -151,7 +151,7 @@ class Simulation(eqx.Module):
     """
 
     scene: Scene | RedundantScene
-    state: Any
+    state: PyTree
     correction: Consistent | None
     duration: Scalar
     times: Array | None
@@ -159,7 +159,7 @@ class Simulation(eqx.Module):
     atol: Scalar
     units: Units
     dt: Scalar | None
-    solver: diffrax.AbstractSolver
+    solver: diffrax.AbstractSolver[PyTree]
     adjoint: diffrax.AbstractAdjoint
     footsteps: int | None = eqx.field(static=True)
     save_steps: bool = eqx.field(static=True)
@@ -174,16 +174,16 @@ class Simulation(eqx.Module):
     @staticmethod
     def prepare(
         scene: Scene | RedundantScene,
-        state: Any,
+        state: PyTree,
         *,
         duration: float | None = None,
         footsteps: int | None = None,
-        solver: str | diffrax.AbstractSolver = "rodas4",
+        solver: str | diffrax.AbstractSolver[PyTree] = "rodas4",
         accuracy: str = "balanced",
         rtol: float | None = None,
         atol: float | None = None,
         dt: float | None = None,
-        save: Any = "steps",
+        save: PyTree = "steps",
         max_arrivals: int = 64,
         extremes: Callable[..., PyTree] | None = None,
         watch: tuple[str, ...] = WATCHES,
@@ -224,10 +224,10 @@ class Simulation(eqx.Module):
         if isinstance(scene, RedundantScene):
             check_adjoint(scene.method, adjoint)
 
-        def cast(leaf: Any) -> Array:
+        def cast(leaf: ArrayLike) -> Array:
             return jnp.asarray(leaf, dtype=dtype)
 
-        def known(leaf: Any) -> Any:
+        def known(leaf: ArrayLike) -> Numbers:
             # As it is where nothing is traced: each array of JAX's costs 0.1 ms.
             return cast(leaf) if isinstance(leaf, jax.core.Tracer) else np.asarray(leaf, dtype)
 
@@ -288,7 +288,7 @@ class Simulation(eqx.Module):
 class CompiledSimulation:
     """A compiled request; call it to run."""
 
-    def __init__(self, program: Any, request: Simulation) -> None:
+    def __init__(self, program: Callable[[Simulation], Trajectory], request: Simulation) -> None:
         self._program = program
         self._request = request
 
