@@ -40,7 +40,7 @@ def failure_kind(error: OSError) -> type[ArgumentError] | type[ResourceError]:
 def is_number(value: object) -> bool:
     """Whether a value may stand for a number or many; texts and truth values may not."""
     if hasattr(value, "dtype"):
-        return bool(jax.dtypes.issubdtype(value.dtype, np.number))
+        return bool(jax.dtypes.issubdtype(value.dtype, np.number))  # type: ignore[attr-defined]
     if isinstance(value, list | tuple):
         return all(map(is_number, value))
     return not isinstance(value, str | bytes | bool)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset":
+def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) -> "xarray.Dataset":
     """States, foot forces, penetrations and energies along a trajectory, labelled, in SI units.
 
     Variables have the dimension `time` [s]; forces and penetrations also `leg` (1, 2). Attributes
@@ -45,7 +45,8 @@ def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset"
     if np.ndim(trajectory.t) != 1:
         raise ValueError("This is a batch of trajectories: take one of them at a time.")
     state = trajectory.state
-    both, forces, held = feet(scene, state), foot_forces(scene, state), energies(scene, state)
+    both, forces = feet(scene, state), foot_forces(scene, state)
+    held = energies(scene, state)  # type: ignore[arg-type]
     variables = {
         name: ("time", np.asarray(value), {"units": STATE_QUANTITIES[name].unit or "1"})
         for name, value in minimal_state(scene, state)._asdict().items()

@@ -76,10 +76,11 @@ class Block:
 
     def lineage(self) -> "list[Block]":
         """This block, the one around it, and so on."""
-        blocks, block = [], self
+        blocks: list[Block] = []
+        block: Block | None = self
         while block is not None:
             blocks.append(block)
-            block = block.parent  # type: ignore[assignment]
+            block = block.parent
         return blocks
 
     def const(self, number: float, kind: Kind) -> Value:
