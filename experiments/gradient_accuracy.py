@@ -25,7 +25,7 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._stability import stability_of
 from jaxbiped.scene._parameters import select_parameters
-from jaxbiped.variational._solve_to_section import Precision
+from jaxbiped.solve._accuracy import Precision
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 QUICK_TOLERANCES = (1e-5, 1e-6)

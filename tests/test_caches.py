@@ -15,11 +15,15 @@ import jaxbiped as jb
 from jaxbiped import _caches
 from jaxbiped._caches import Once, bounded_cache, cached_jit
 from jaxbiped.compiler.runtime import _compiled_program, _recorder
+from jaxbiped.compiler.runtime._engine import Request
+from jaxbiped.compiler.runtime._lane_engine import LaneEngine
 from jaxbiped.compiler.runtime._machine_code import _LOADED
 from jaxbiped.compiler.runtime._primitive import call_recording
 from jaxbiped.compiler.runtime._program import Program
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.solve._ending import WATCHES, ending_events
+from jaxbiped.solve._rigid_program import rigid_program
+from jaxbiped.solve._rigid_steps import RigidWalk
 from tests.compiler.one_shot import compiled
 from tests.sweep.walkers import same
 
@@ -208,3 +212,15 @@ def test_nothing_is_left_when_caches_are_cleared_and_results_stay():
     jb.clear_caches()
     assert not {name for name, info in jb.cache_info().items() if info.size}
     same(walk(), first)
+
+
+def test_a_compiled_program_that_somebody_has_is_found_again():
+    rigid = jb.ladder()["rigid"]
+    walk = RigidWalk(rigid, default_guess(rigid), *[jnp.ones(())] * 4)
+
+    def program():
+        return LaneEngine().compile(Request(rigid_program(True, False), walk))
+
+    held = program()
+    jb.clear_caches()
+    assert program() is held

@@ -19,8 +19,8 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import Simulation
 from jaxbiped.solve._ending import Ending
+from jaxbiped.solve._solvers import SOLVERS
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve.solvers import SOLVERS
 
 ASTRAY = 0.05
 """Error of the state (SI units) from which a run that came to its end has still failed."""

@@ -30,7 +30,6 @@ from jaxbiped.gait._fixed_point_search import Found, Search, search
 from jaxbiped.gait._gait import Gait, summarise_gait
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._origin import FoundBy, Origin, single_stage_origin
-from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._solver import orbit_solver
@@ -39,6 +38,7 @@ from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.variational._hybrid_system import RedundantWalking, section_of, system_of
 
@@ -140,7 +140,7 @@ def find_gait(
         method_of_steps,
         runs_on,
         steps=int(footsteps),
-        most=MOST_SOLVER_STEPS[accuracy],
+        most=ACCURACIES[accuracy].max_solver_steps,
     )
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
@@ -200,7 +200,12 @@ def _search_on(
         engine = "auto"
     scout_engine = orbit_engine(engine, solver=solver, section=section, leaves=(modelled, start))
     scout = _return_map_spec(
-        modelled, section, solver, scout_engine, steps=1, most=MOST_SOLVER_STEPS["balanced"]
+        modelled,
+        section,
+        solver,
+        scout_engine,
+        steps=1,
+        most=ACCURACIES["balanced"].max_solver_steps,
     )
 
     def search_from(spec: ReturnMapSpec, scene: Any, start: Any, patience: int) -> Found:

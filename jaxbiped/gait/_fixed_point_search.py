@@ -26,7 +26,7 @@ from jaxbiped.gait._poincare_map import (
 )
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._soundness import is_sound
-from jaxbiped.variational._solve_to_section import Precision
+from jaxbiped.solve._accuracy import Precision
 
 LOOSER = 10.0
 """How much looser the search is solved before its end, and the witness of its error."""

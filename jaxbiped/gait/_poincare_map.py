@@ -15,12 +15,12 @@ from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import recurring_inverse_units
 from jaxbiped.variational._hybrid_system import AbstractSystem
 from jaxbiped.variational._section_by_lanes import solve_to_section_by_lanes
 from jaxbiped.variational._solve_to_section import (
     Nodes,
-    Precision,
     SectionArrival,
     solve_to_section,
 )

@@ -14,8 +14,8 @@ from jaxbiped._types import Scalar
 from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR
 from jaxbiped.gait._return_by_xla import NO_REVERSE, full_tangents, reset_on_arrival
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
-from jaxbiped.variational._solve_to_section import Precision
 from jaxbiped.variational._tangents import Seeded, Tangents
 from jaxbiped.variational._variational_solve import solve_variational
 from jaxbiped.variational._variational_types import VariationalSolution

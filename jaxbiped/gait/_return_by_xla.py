@@ -13,8 +13,9 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
-from jaxbiped.variational._solve_to_section import Precision, solve_to_section
+from jaxbiped.variational._solve_to_section import solve_to_section
 from jaxbiped.variational._tangents import Seeded, Tangents
 
 NO_REVERSE = (

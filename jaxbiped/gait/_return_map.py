@@ -14,13 +14,13 @@ from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redu
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._engine import check_holds_none, orbit_engine
 from jaxbiped.gait._gradient_modes import AbstractGradient, Forward, Reverse, check_anywhere
-from jaxbiped.gait._precision import GAIT_ACCURACIES, MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._return_by_lanes import forward_by_lanes, reverse_by_lanes
 from jaxbiped.gait._return_by_xla import forward_by_xla, reverse_by_xla, select
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.scene._abstract_scene import is_rigid
 from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.variational._hybrid_system import (
     AbstractSystem,
@@ -115,7 +115,7 @@ def return_map(
         solver=method,
         max_time=max_time,
         steps=1,
-        max_solver_steps=MOST_SOLVER_STEPS[accuracy],
+        max_solver_steps=ACCURACIES[accuracy].max_solver_steps,
         engine=by,
     )
     follow = _FOLLOW[by, type(gradient)]

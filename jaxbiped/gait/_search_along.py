@@ -19,7 +19,7 @@ from jaxbiped.gait._origin import FoundBy, Origin
 from jaxbiped.gait._poincare_map import recurring_components, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.linalg._small_matrices import eigenpairs
-from jaxbiped.variational._solve_to_section import Precision
+from jaxbiped.solve._accuracy import Precision
 
 _FIRST, _LARGEST, _SMALLEST = 0.05, 0.3, 1e-3
 """Steps along the line: the first, at most, and at which it is given up."""

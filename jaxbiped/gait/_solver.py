@@ -3,7 +3,7 @@
 import diffrax
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.solve.solvers import solver_named
+from jaxbiped.solve._solvers import solver_named
 
 
 def orbit_solver(

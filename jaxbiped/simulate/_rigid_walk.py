@@ -19,6 +19,7 @@ from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import check_state
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._start import check_single_scene, in_one_precision, in_own_precision
+from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve._rigid_program import rigid_program
@@ -26,8 +27,6 @@ from jaxbiped.solve._rigid_steps import (
     RigidWalk,
 )
 
-RIGID_ACCURACIES = {"fast": 1e-4, "balanced": 1e-6, "tight": 1e-11}
-"""Relative tolerance of each named accuracy; the absolute one (SI) is a hundredth of it."""
 _PATIENCE = 50.0
 """Time allowed for each footstep, in units of √(l/g)."""
 
@@ -122,8 +121,8 @@ def rigid_walk(
     if max_arrivals:
         check_count("max_arrivals", max_arrivals)
     check_count("max_solver_steps", max_solver_steps)
-    check_choice("accuracy", accuracy, RIGID_ACCURACIES)
-    tolerance = RIGID_ACCURACIES[accuracy] if rtol is None else rtol
+    check_choice("accuracy", accuracy, ACCURACIES)
+    tolerance = ACCURACIES[accuracy].rigid_walk if rtol is None else rtol
     check_positive("rtol", tolerance)
     leaves = jtu.tree_leaves((scene, state))
     narrow = any(jnp.result_type(leaf) != jnp.float64 for leaf in leaves)

@@ -35,10 +35,10 @@ from jaxbiped.simulate._start_height import check_start_height
 from jaxbiped.solve._accuracy import check_precision, tolerances
 from jaxbiped.solve._ending import WATCHES
 from jaxbiped.solve._projected_solver import check_adjoint
+from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import Units, si_units, units_of
 from jaxbiped.solve.controllers._footstep_limit import PATIENCE
-from jaxbiped.solve.solvers import solver_named
 
 
 def simulate(

@@ -18,8 +18,8 @@ from jaxbiped.scene._linkage_scene import LinkageScene
 from jaxbiped.simulate._start import check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
 from jaxbiped.solve._projected_solver import check_adjoint, wrap_projected
+from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.controllers._step_control import first_step, step_control
-from jaxbiped.solve.solvers import solver_named
 
 
 class Swing(eqx.Module):

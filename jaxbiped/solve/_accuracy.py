@@ -10,6 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_positive
 from jaxbiped._types import Scalar
+from jaxbiped.scene._abstract_scene import is_rigid
 
 
 class Tolerances(NamedTuple):
@@ -23,11 +24,46 @@ class Tolerances(NamedTuple):
     atol: float
 
 
-ACCURACIES = {"fast": 1e-5, "balanced": 1e-6, "tight": 2e-9}
-"""Relative tolerance of each named accuracy, at most.
+class Precision(NamedTuple):
+    """How exactly to solve for derivatives.
 
-Looser than "fast" is no faster: the tolerance of a velocity comes near v0, and steps chatter.
-"""
+    Attributes:
+        rtol: relative tolerance of the state; the absolute one is a hundredth of it in the
+            scene's units.
+        tangent_rtol: relative tolerance of the columns.
+    """
+
+    rtol: Any
+    tangent_rtol: Any
+
+
+class Accuracy(NamedTuple):
+    """What a named accuracy stands for, in relative tolerances.
+
+    Attributes:
+        walk: of a walk with laws of contact, at most: looser than "fast" is no faster, for the
+            tolerance of a velocity comes near the speed over which friction builds up.
+        rigid_walk: of the rigid walker.
+        gait, rigid_gait: of gaits and return maps; None where derivatives cannot be asked for.
+            Rolling is smooth, and a gait of it costs little at any precision.
+        max_solver_steps: cap on the attempted steps of a gait to its next arrival.
+    """
+
+    walk: float
+    rigid_walk: float
+    gait: Precision | None = None
+    rigid_gait: Precision | None = None
+    max_solver_steps: int = 0
+
+
+ACCURACIES = {
+    "fast": Accuracy(1e-5, 1e-4),
+    "balanced": Accuracy(1e-6, 1e-6, Precision(3e-7, 3e-6), Precision(1e-9, 1e-8), 4096),
+    "tight": Accuracy(2e-9, 1e-11, Precision(1e-9, 1e-8), Precision(1e-12, 1e-11), 32768),
+}
+"""Named accuracies; the absolute tolerance is a hundredth of the relative one."""
+GAIT_ACCURACIES = tuple(name for name, each in ACCURACIES.items() if each.gait is not None)
+"""The accuracies that derivatives can be asked for."""
 
 
 _RESOLVED = 0.5
@@ -44,11 +80,19 @@ def tolerances(
         ArgumentError: an unknown name, or a tolerance that is not above zero.
     """
     check_choice("accuracy", accuracy, ACCURACIES)
-    relative = resolve_slip_speed(ACCURACIES[accuracy], scene) if rtol is None else rtol
+    relative = resolve_slip_speed(ACCURACIES[accuracy].walk, scene) if rtol is None else rtol
     check_positive("rtol", relative)
     absolute = 1e-2 * relative if atol is None else atol
     check_positive("atol", absolute)
     return Tolerances(relative, absolute)
+
+
+def precision_of(accuracy: str, scene: Any = None) -> Precision:
+    """Tolerances of state and derivatives of a gait; one of `GAIT_ACCURACIES`."""
+    named = ACCURACIES[accuracy]
+    found = named.rigid_gait if is_rigid(scene) else named.gait
+    assert found is not None
+    return found
 
 
 def resolve_slip_speed(rtol: float, scene: Any) -> Any:

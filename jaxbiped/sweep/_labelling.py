@@ -25,11 +25,10 @@ from jaxbiped.dynamics._state import State
 from jaxbiped.scene._parameters import parameter_values, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.simulate._rigid_walk import RIGID_ACCURACIES
 from jaxbiped.solve._accuracy import ACCURACIES, resolve_slip_speed
 from jaxbiped.solve._engine import engine_for
+from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.solve.solvers import solver_named
 from jaxbiped.sweep._broadcast import broadcast_leaves
 from jaxbiped.sweep._family import Family
 from jaxbiped.sweep._follow_start import Effort, follow_starts
@@ -184,9 +183,10 @@ def effort_of(
             "scene has parameters that are arrays: give one scene, and name what differs from "
             "start to start among the parameters."
         )
-    names = ACCURACIES if scene.compliant else RIGID_ACCURACIES
-    check_choice("accuracy", accuracy, names)
-    tolerance = resolve_slip_speed(names[accuracy], scene) if rtol is None else rtol
+    check_choice("accuracy", accuracy, ACCURACIES)
+    named = ACCURACIES[accuracy]
+    own = named.walk if scene.compliant else named.rigid_walk
+    tolerance = resolve_slip_speed(own, scene) if rtol is None else rtol
     check_positive("rtol", tolerance)
     method = solver_named(solver)
     if not isinstance(method, AbstractRosenbrock):

@@ -18,11 +18,11 @@ from jaxbiped.compiler import LANES, Program, Recorded, Request
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._state import State
 from jaxbiped.dynamics._switches import switches
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved
 from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._solve_to_section import Precision
 from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents
 from jaxbiped.variational._variational_solve import solve_variational

@@ -8,8 +8,9 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Recording
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._solve_to_section import Nodes, Precision, SectionArrival
+from jaxbiped.variational._solve_to_section import Nodes, SectionArrival
 from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents
 from jaxbiped.variational._variational_solve import solve_variational

@@ -10,7 +10,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve._accuracy import Precision, rms_norm
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._step_control import first_step, step_control
@@ -31,19 +31,6 @@ from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_c
 
 Along: TypeAlias = Callable[[Callable[[PyTree, PyTree], Any], Tangents, Seeded], tuple[Any, Any]]
 """Values of a function of state and arguments, and their derivatives along columns."""
-
-
-class Precision(NamedTuple):
-    """How exactly to solve.
-
-    Attributes:
-        rtol: relative tolerance of the state; the absolute one is a hundredth of it in the
-            scene's units.
-        tangent_rtol: relative tolerance of the columns.
-    """
-
-    rtol: Any
-    tangent_rtol: Any
 
 
 class Nodes(NamedTuple):

@@ -8,10 +8,10 @@ import jax.tree_util as jtu
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import LANES, Program, Recording, Request
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._solve_to_section import Precision
 from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents
 from jaxbiped.variational._variational_program import AdaptiveColumns

@@ -16,8 +16,8 @@ from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._fixed_point_search import search
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._orbit import orbit_of
-from jaxbiped.gait._precision import MOST_SOLVER_STEPS, precision_of
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.solve._accuracy import ACCURACIES, precision_of
 
 pytestmark = pytest.mark.slow
 
@@ -258,7 +258,8 @@ def test_what_does_not_return_says_so(monkeypatch):
     args = (0.3, 0.8, 1.0)
     state = (jnp.asarray(0.0), jnp.asarray(3.0))
     for most, ending in ((4096, jb.Ending.TIMED_OUT), (2, jb.Ending.OUT_OF_STEPS)):
-        monkeypatch.setitem(MOST_SOLVER_STEPS, "balanced", most)
+        named = ACCURACIES["balanced"]._replace(max_solver_steps=most)
+        monkeypatch.setitem(ACCURACIES, "balanced", named)
         for engine in ("lanes", "xla"):
             options = dict(section=up, system=Ball(), max_time=1.0, engine=engine)
             found = jb.return_map(args, state, **options)

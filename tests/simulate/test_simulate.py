@@ -203,7 +203,7 @@ def test_a_bad_lane_ends_alone():
 
     def run(angles):
         more = [good[0]] * (8 - len(angles))
-        return _batch(jnp.array(angles + more), contact, 0.5, ACCURACIES["fast"])
+        return _batch(jnp.array(angles + more), contact, 0.5, ACCURACIES["fast"].walk)
 
     alone, mixed = run(good), run(good + bad)
     kept = np.array(alone.final)[:, :3]
@@ -275,7 +275,7 @@ def test_extremes_of_the_contact_parameters():
     }
 
     angles = jnp.full(len(cases), jb.seed_state().theta_1)
-    ends = _batch(angles, jnp.array([*cases.values()]), 2.0, ACCURACIES["balanced"])
+    ends = _batch(angles, jnp.array([*cases.values()]), 2.0, ACCURACIES["balanced"].walk)
     for name, ending, attempts in zip(
         cases, ends.ending, ends.accepted + ends.rejected, strict=True
     ):

@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import dataclasses
 import functools
 import threading
 from collections.abc import Sequence
@@ -59,7 +60,8 @@ class CompiledProgram:
     def __init__(self, program: Program, inputs: PyTree) -> None:
         """A program is traced when it is needed; `inputs` are one simulation's, or their shapes."""
         # The outline and the graph need these: compiled by themselves, they are traced once.
-        self._program = program._replace(
+        self._program = dataclasses.replace(
+            program,
             start=jax.jit(program.start),
             finish=jax.jit(program.finish),
             record=None if program.record is None else jax.jit(program.record),

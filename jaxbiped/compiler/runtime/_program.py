@@ -1,5 +1,6 @@
 """Program of a simulation: four functions of JAX, and their graph."""
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -16,7 +17,8 @@ from jaxbiped.compiler.ir._lower_jaxpr import lower_jaxpr
 from jaxbiped.compiler.passes._code_sinking import sink_code
 
 
-class Program(NamedTuple):
+@dataclasses.dataclass(frozen=True)
+class Program:
     """What every lane does, from taking a simulation to giving it back.
 
     Leaves of inputs, of what is carried and of outputs are numbers or arrays of static shape.

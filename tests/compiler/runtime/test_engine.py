@@ -1,5 +1,7 @@
 """Engines as twins: the same programs, the same numbers, and what each says that it cannot do."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,9 +20,9 @@ def _attempt(x, carried):
 
 
 ROOT = Program(lambda x: (x, jnp.zeros_like(x)), _attempt, lambda x, carried: carried)
-RECORDED = ROOT._replace(record=lambda x, carried, _: (carried[1] > 2.0, [carried[0]]))
-STREAM = ROOT._replace(attempt=lambda x, c, row: _attempt(x + 0.0 * row[0], c), stream=1)
-ERF = ROOT._replace(finish=lambda x, carried: jax.scipy.special.erf(carried[0]))
+RECORDED = replace(ROOT, record=lambda x, carried, _: (carried[1] > 2.0, [carried[0]]))
+STREAM = replace(ROOT, attempt=lambda x, c, row: _attempt(x + 0.0 * row[0], c), stream=1)
+ERF = replace(ROOT, finish=lambda x, carried: jax.scipy.special.erf(carried[0]))
 
 
 @pytest.mark.parametrize("engine", ENGINES)

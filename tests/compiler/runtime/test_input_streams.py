@@ -1,5 +1,7 @@
 """Programs that read a stream, a row at each attempt."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -73,7 +75,7 @@ def test_a_stream_of_another_size_is_refused(stream, said):
 
 
 def test_a_stream_can_be_read_backwards():
-    program = _summing()._program._replace(backwards=True)
+    program = dataclasses.replace(_summing()._program, backwards=True)
     number = jax.ShapeDtypeStruct((), jnp.float64)
     backwards = CompiledProgram(program, (number, number))
     stream = [np.arange(6.0).reshape(3, 2), np.arange(4.0).reshape(2, 2)]

@@ -1,0 +1,57 @@
+"""Solvers by name: the Rosenbrock family of this project and diffrax's own."""
+
+from collections.abc import Callable
+
+import diffrax
+import optimistix
+
+from jaxbiped._checks import check_choice
+from jaxbiped.solve.rosenbrock._rodas3p import Rodas3P
+from jaxbiped.solve.rosenbrock._rodas4 import Rodas4
+from jaxbiped.solve.rosenbrock._rodas4p import Rodas4P
+from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
+
+
+def _chord() -> optimistix.AbstractRootFinder:
+    # diffrax's default, VeryChord, rejects steps that converge (diffrax 0.7.2).
+    return diffrax.with_stepsize_controller_tols(optimistix.Chord)()
+
+
+SOLVERS: dict[str, Callable[[], diffrax.AbstractSolver]] = {
+    "rodas3p": Rodas3P,
+    "rodas4": Rodas4,
+    "rodas4p": Rodas4P,
+    "rodas5p": Rodas5P,
+    "kvaerno3": lambda: diffrax.Kvaerno3(root_finder=_chord()),
+    "kvaerno4": lambda: diffrax.Kvaerno4(root_finder=_chord()),
+    "kvaerno5": lambda: diffrax.Kvaerno5(root_finder=_chord()),
+    "bosh3": diffrax.Bosh3,
+    "tsit5": diffrax.Tsit5,
+    "dopri5": diffrax.Dopri5,
+    "dopri8": diffrax.Dopri8,
+    "euler": diffrax.Euler,
+    "runge2": diffrax.Heun,
+}
+
+
+def solver_named(solver: str | diffrax.AbstractSolver) -> diffrax.AbstractSolver:
+    """The solver of that name, or the solver itself where one is given.
+
+    Args:
+        solver: a name in `SOLVERS`, or a diffrax solver.
+
+    Returns:
+        A diffrax solver.
+
+    Raises:
+        ArgumentError: an unknown name.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> jb.solvers.solver_named("rodas4")
+        Rodas4()
+    """
+    if isinstance(solver, diffrax.AbstractSolver):
+        return solver
+    check_choice("solver", solver, SOLVERS)
+    return SOLVERS[solver]()
