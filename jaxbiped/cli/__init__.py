@@ -33,7 +33,6 @@ class _Runnable(Protocol):
 
     def run(self) -> int:
         """Runs it; returns the exit code."""
-        ...
 
 
 def main(arguments: list[str] | None = None) -> None:

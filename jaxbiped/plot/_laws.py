@@ -8,7 +8,7 @@ import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import PyTree
+from jaxtyping import ArrayLike
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
@@ -187,12 +187,12 @@ def _drop(law: AbstractNormalLaw, mass: float, speed: float) -> tuple[np.ndarray
     return np.maximum(depth[saved], 0.0), rate[saved]
 
 
-def _fall(t: PyTree, y: _Drop, args: _Falling) -> _Drop:
+def _fall(t: ArrayLike, y: _Drop, args: _Falling) -> _Drop:
     law, mass = args
     return y[1], -law.force(*y) / mass
 
 
-def _is_out(t: PyTree, y: _Drop, args: _Falling, **rest: object) -> Scalar:
+def _is_out(t: ArrayLike, y: _Drop, args: _Falling, **rest: object) -> Scalar:
     return (y[0] < 0.0) | ((y[1] < 0.0) & (args[0].force(*y) <= 0.0))
 
 

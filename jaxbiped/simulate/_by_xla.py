@@ -1,6 +1,6 @@
 """Simulation by diffrax, compiled by XLA."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import diffrax
 import equinox as eqx
@@ -86,8 +86,8 @@ def _ending(
     solution: diffrax.Solution, control: PyTree, names: list[Ending], run: "Simulation"
 ) -> Array:
     results = diffrax.RESULTS
-    out_of_steps: PyTree = solution.result == results.max_steps_reached
-    done: PyTree = solution.result == results.successful
+    out_of_steps: Any = solution.result == results.max_steps_reached
+    done: Any = solution.result == results.successful
     timed_out = jnp.zeros_like(done)
     if run.footsteps is not None:
         _, _, count = control

@@ -1,7 +1,7 @@
 """Simulation of a scene from a start."""
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import diffrax
 import equinox as eqx
@@ -183,7 +183,7 @@ class Simulation(eqx.Module):
         rtol: float | None = None,
         atol: float | None = None,
         dt: float | None = None,
-        save: PyTree = "steps",
+        save: Any = "steps",
         max_arrivals: int = 64,
         extremes: Callable[..., PyTree] | None = None,
         watch: tuple[str, ...] = WATCHES,

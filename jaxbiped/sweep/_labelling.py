@@ -1,7 +1,7 @@
 """Labelling of starts: what becomes of each."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -206,7 +206,7 @@ def effort_of(
 def _check_states(scene: Scene | RigidScene, states: PyTree) -> PyTree:
     kind = state_type(scene)
     if kind is BristleState and isinstance(states, State):
-        straight: PyTree = np.zeros_like(np.asarray(states.hip_x))
+        straight: Any = np.zeros_like(np.asarray(states.hip_x))
         states = BristleState(*states, *[straight] * 2)
     check_type("states", states, kind)
     leaves = [np.asarray(leaf, dtype=np.float64) for leaf in states]
