@@ -75,7 +75,9 @@ def test_extremes_are_those_of_the_steps(seed_walk, engine):
 
 def test_extremes_by_both_engines_agree():
     """To the tolerance: rounding decides on the steps, and extremes are taken at their ends."""
-    lanes, xla = (_walk(save="end", steps=2, extremes=_heights, engine=e) for e in ("lanes", "xla"))
+    lanes, xla = (
+        _walk(save="end", footsteps=2, extremes=_heights, engine=e) for e in ("lanes", "xla")
+    )
     for ours, theirs in zip(
         jax.tree.leaves((lanes.lowest, lanes.highest)),
         jax.tree.leaves((xla.lowest, xla.highest)),

@@ -32,14 +32,17 @@ def test_the_seed_start_on_other_slopes(slope, ending):
 
 
 def test_it_still_walks_after_a_hundred_footsteps():
-    walk = _walk(0.02, duration=None, steps=100)
+    walk = _walk(0.02, duration=None, footsteps=100)
     assert walk.outcome == Ending.WALKING
     assert float(walk.t[-1]) == pytest.approx(0.3932 + 99 * 0.44083, abs=0.05)
 
 
 def test_out_of_steps():
     assert _walk(0.02, max_solver_steps=50).outcome == Ending.OUT_OF_STEPS
-    assert _walk(0.02, duration=None, steps=100, max_solver_steps=50).outcome == Ending.OUT_OF_STEPS
+    assert (
+        _walk(0.02, duration=None, footsteps=100, max_solver_steps=50).outcome
+        == Ending.OUT_OF_STEPS
+    )
 
 
 @pytest.mark.parametrize("engine", ["lanes", "xla"])
