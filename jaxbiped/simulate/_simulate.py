@@ -26,7 +26,7 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.simulate._by_lanes import by_lanes, can_by_lanes, prepare_lanes
+from jaxbiped.simulate._by_lanes import able_request, by_lanes, prepare_lanes
 from jaxbiped.simulate._by_xla import by_xla, trim
 from jaxbiped.simulate._engine_choice import choose_engine
 from jaxbiped.simulate._saved_times import check_times
@@ -271,18 +271,16 @@ class Simulation(eqx.Module):
 
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
-        return by_lanes(self) if self._lanes_can() else trim(by_xla(self))
+        request = able_request(self)
+        return trim(by_xla(self)) if request is None else by_lanes(self, request)
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
-        if self._lanes_can():
-            return CompiledSimulation(prepare_lanes(self), self)
+        request = able_request(self)
+        if request is not None:
+            return CompiledSimulation(prepare_lanes(self, request), self)
         program = by_xla.lower(self).compile()
         return CompiledSimulation(program, self)
-
-    def _lanes_can(self) -> bool:
-        """Whether lanes are to run it: not where the choice is ours and they lack an operation."""
-        return self.engine == "lanes" and (not self.replaceable or can_by_lanes(self))
 
 
 class CompiledSimulation:
