@@ -9,7 +9,7 @@ import gc
 import os
 import threading
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Any, Generic, NamedTuple, ParamSpec, Protocol, TypeVar
 
 import equinox as eqx
@@ -40,13 +40,13 @@ class CacheInfo(NamedTuple):
 
 class _Cache(NamedTuple):
     info: Callable[[], CacheInfo]
-    clear: Callable[[], Any]
+    clear: Callable[[], object]
 
 
 _CACHES: dict[str, _Cache] = {}
 
 
-def _register(name: str, info: Callable[[], CacheInfo], clear: Callable[[], Any]) -> None:
+def _register(name: str, info: Callable[[], CacheInfo], clear: Callable[[], object]) -> None:
     _CACHES[name] = _Cache(info, clear)
 
 
@@ -119,13 +119,15 @@ def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]
 
     def decorate(function: Callable[..., _T]) -> Callable[..., _T]:
         lock = threading.Lock()
-        alive: weakref.WeakValueDictionary[Any, Any] = weakref.WeakValueDictionary()
+        alive: weakref.WeakValueDictionary[tuple[Hashable, ...], Any] = (
+            weakref.WeakValueDictionary()
+        )
 
         @functools.lru_cache(maxsize=bound)
-        def result_of(*args: Any) -> Once[_T]:
+        def result_of(*args: Hashable) -> Once[_T]:
             return Once()
 
-        def make(args: tuple[Any, ...]) -> _T:
+        def make(args: tuple[Hashable, ...]) -> _T:
             with lock:
                 known = alive.get(args)
             if known is not None:
@@ -136,7 +138,7 @@ def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]
             return made
 
         @functools.wraps(function)
-        def cached(*args: Any) -> _T:
+        def cached(*args: Hashable) -> _T:
             with lock:
                 result = result_of(*args)
             return result(lambda: make(args))
@@ -184,5 +186,5 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         return CacheInfo(self._programs(), PROGRAMS, "entries")
 
 
-def _name_of(function: Callable[..., Any]) -> str:
+def _name_of(function: Callable[..., object]) -> str:
     return f"{function.__module__}.{function.__qualname__}"

@@ -5,12 +5,15 @@ Values that are being traced (inside `jit`, `vmap`, `grad`) have no number to ch
 
 import errno
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TypeAlias
 
 import jax
 import numpy as np
+from jaxtyping import ArrayLike
+
+_Test: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
 
 class ArgumentError(ValueError):
@@ -34,20 +37,20 @@ def failure_kind(error: OSError) -> type[ArgumentError] | type[ResourceError]:
     return ArgumentError if wrong else ResourceError
 
 
-def is_number(value: Any) -> bool:
+def is_number(value: object) -> bool:
     """Whether a value may stand for a number or many; texts and truth values may not."""
     if hasattr(value, "dtype"):
-        return bool(jax.dtypes.issubdtype(value.dtype, np.number))
+        return bool(jax.dtypes.issubdtype(value.dtype, np.number))  # type: ignore[attr-defined]
     if isinstance(value, list | tuple):
         return all(map(is_number, value))
     return not isinstance(value, str | bytes | bool)
 
 
-def _is_traced(value: Any) -> bool:
+def _is_traced(value: object) -> bool:
     return isinstance(value, jax.core.Tracer)
 
 
-def _numbers(name: str, value: Any) -> np.ndarray:
+def _numbers(name: str, value: object) -> np.ndarray:
     try:
         if not is_number(value):
             raise ValueError
@@ -62,7 +65,7 @@ def _shown(array: np.ndarray, bad: np.ndarray) -> str:
     return first if array.size == 1 else f"{first} (one of {int(bad.sum())} such entries)"
 
 
-def _require(name: str, value: Any, allowed: str, test: Any) -> None:
+def _require(name: str, value: object, allowed: str, test: _Test) -> None:
     if _is_traced(value):
         return
     array = _numbers(name, value)
@@ -71,27 +74,27 @@ def _require(name: str, value: Any, allowed: str, test: Any) -> None:
         raise ArgumentError(f"{name} = {_shown(array, bad)} is not allowed: it must be {allowed}.")
 
 
-def holds_somewhere(condition: Any) -> bool:
+def holds_somewhere(condition: ArrayLike) -> bool:
     """Whether a condition is known to hold in any entry; what is being traced is not known."""
     return not _is_traced(condition) and bool(np.any(condition))
 
 
-def check_finite(name: str, value: Any) -> None:
+def check_finite(name: str, value: object) -> None:
     """Raises `ArgumentError` unless every entry of `value` is a finite number."""
     _require(name, value, "a finite number", lambda x: np.ones(x.shape, bool))
 
 
-def check_positive(name: str, value: Any, unit: str = "") -> None:
+def check_positive(name: str, value: object, unit: str = "") -> None:
     """Raises `ArgumentError` unless every entry of `value` is finite and above zero."""
     _require(name, value, f"a finite number above 0{_in(unit)}", lambda x: x > 0)
 
 
-def check_not_negative(name: str, value: Any, unit: str = "") -> None:
+def check_not_negative(name: str, value: object, unit: str = "") -> None:
     """Raises `ArgumentError` unless every entry of `value` is finite and at least zero."""
     _require(name, value, f"a finite number of at least 0{_in(unit)}", lambda x: x >= 0)
 
 
-def check_count(name: str, value: Any) -> None:
+def check_count(name: str, value: ArrayLike) -> None:
     """Raises `ArgumentError` unless `value` is one whole number above zero, known beforehand."""
     allowed = "a whole number above 0"
     if _is_traced(value) or np.ndim(value):
@@ -100,7 +103,7 @@ def check_count(name: str, value: Any) -> None:
     _require(name, value, allowed, lambda x: (x > 0) & (x == np.floor(x)))
 
 
-def check_unbatched(name: str, value: Any, one: str = "one number") -> None:
+def check_unbatched(name: str, value: object, one: str = "one number") -> None:
     """Raises `ArgumentError` where any leaf of `value` is an array instead of one number."""
     leaves = jax.tree_util.tree_flatten_with_path(value, is_leaf=lambda x: type(x) in (list, tuple))
     for path, leaf in leaves[0]:
@@ -111,7 +114,7 @@ def check_unbatched(name: str, value: Any, one: str = "one number") -> None:
             )
 
 
-def check_at_least(name: str, value: Any, bound_name: str, bound: Any) -> None:
+def check_at_least(name: str, value: object, bound_name: str, bound: object) -> None:
     """Raises `ArgumentError` unless `value >= bound` in every entry.
 
     `bound_name` is the argument that sets the bound, or the bound itself in words.
@@ -124,13 +127,13 @@ def check_at_least(name: str, value: Any, bound_name: str, bound: Any) -> None:
         _require(name, value, allowed, lambda x: x >= floor)
 
 
-def check_below(name: str, value: Any, bound: float, why: str) -> None:
+def check_below(name: str, value: object, bound: float, why: str) -> None:
     """Raises `ArgumentError` unless |value| < bound in every entry."""
     _require(name, value, f"between {-bound:g} and {bound:g} ({why})", lambda x: abs(x) < bound)
 
 
 def check_within(
-    name: str, value: Any, lower: float, upper: float, *, open_below: bool = False
+    name: str, value: object, lower: float, upper: float, *, open_below: bool = False
 ) -> None:
     """Raises `ArgumentError` unless lower <= value <= upper (`open_below`: lower < value)."""
     allowed = f"{'above' if open_below else 'at least'} {lower:g} and at most {upper:g}"
@@ -142,7 +145,7 @@ def check_within(
     )
 
 
-def check_choice(name: str, value: Any, allowed: Iterable[Any]) -> None:
+def check_choice(name: str, value: object, allowed: Iterable[object]) -> None:
     """Raises `ArgumentError` unless `value` is one of the `allowed` names or numbers."""
     names = list(allowed)
     if value not in names:
@@ -151,7 +154,7 @@ def check_choice(name: str, value: Any, allowed: Iterable[Any]) -> None:
         )
 
 
-def check_type(name: str, value: Any, *kinds: type) -> None:
+def check_type(name: str, value: object, *kinds: type) -> None:
     """Raises `ArgumentError` unless `value` is an instance of one of `kinds`."""
     if not isinstance(value, kinds):
         allowed = " or a ".join(kind.__name__ for kind in kinds)

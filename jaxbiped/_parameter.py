@@ -5,6 +5,7 @@ what its parameters are in the one place where it declares them.
 """
 
 import dataclasses
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -17,7 +18,7 @@ from jaxbiped._checks import (
     check_positive,
 )
 from jaxbiped._quantity import Quantity
-from jaxbiped._types import as_float
+from jaxbiped._types import Parameter, Scalar, as_float
 
 _KEY = "parameter"
 
@@ -37,7 +38,7 @@ class ParameterInfo(NamedTuple):
     minimum: float | None
     size_below: float | None
 
-    def check(self, name: str, value: Any) -> None:
+    def check(self, name: str, value: object) -> None:
         """Raises `ArgumentError` unless every entry is a finite number that is allowed."""
         unit = self.quantity.unit
         if self.size_below is not None:
@@ -61,7 +62,7 @@ def parameter(
     minimum: float | None = None,
     size_below: float | None = None,
     pair: bool = False,
-    default: Any = dataclasses.MISSING,
+    default: Parameter | None = dataclasses.MISSING,
 ) -> Any:
     """A field for a parameter of a law of contact or of any other part of a scene.
 
@@ -89,7 +90,7 @@ def parameter(
     """
     one = _optional_float if default is None else as_float
     info = ParameterInfo(Quantity(words, symbol, unit), positive, minimum, size_below)
-    given = {} if default is dataclasses.MISSING else {"default": default}
+    given: dict[str, Any] = {} if default is dataclasses.MISSING else {"default": default}
     return eqx.field(converter=_pair if pair else one, metadata={_KEY: info}, **given)
 
 
@@ -99,7 +100,7 @@ def parameter_infos(part: Any) -> dict[str, ParameterInfo]:
     return {field.name: field.metadata[_KEY] for field in fields if _KEY in field.metadata}
 
 
-def check_parameters(part: Any) -> None:
+def check_parameters(part: object) -> None:
     """Raises `ArgumentError` for the first parameter of a part that is not allowed."""
     for name, info in parameter_infos(part).items():
         value = getattr(part, name)
@@ -108,9 +109,9 @@ def check_parameters(part: Any) -> None:
                 info.check(name, entry)
 
 
-def _optional_float(value: Any) -> Any:
+def _optional_float(value: Parameter | None) -> Scalar | None:
     return None if value is None else as_float(value)
 
 
-def _pair(values: Any) -> tuple[Any, ...]:
+def _pair(values: Iterable[Parameter]) -> tuple[Scalar, ...]:
     return tuple(map(as_float, values))

@@ -2,17 +2,21 @@
 
 import collections
 import enum
-from typing import Any
 
 import equinox as eqx
 import jax
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import ArrayLike, PyTree
+
+from jaxbiped._types import Numbers
 
 _UNITS = ("B", "kB", "MB", "GB", "TB")
 
 
-def summary(result: Any, *, like: Any, code: Any, names: type[enum.IntEnum], engine: str) -> str:
+def summary(
+    result: PyTree, *, like: Numbers, code: ArrayLike, names: type[enum.IntEnum], engine: str
+) -> str:
     """The class of a result and what is in it, as `repr` of a result prints it.
 
     Args:
@@ -29,7 +33,7 @@ def summary(result: Any, *, like: Any, code: Any, names: type[enum.IntEnum], eng
     )
 
 
-def _outcomes(code: Any, names: type[enum.IntEnum]) -> str:
+def _outcomes(code: ArrayLike, names: type[enum.IntEnum]) -> str:
     """The outcome, of a batch how many of each, the most frequent first."""
     if isinstance(code, jax.core.Tracer):
         return "traced"

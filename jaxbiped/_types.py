@@ -16,6 +16,9 @@ Scalar: TypeAlias = Float[Array, "..."]
 Numbers: TypeAlias = Array | np.ndarray
 """An array, of JAX or of NumPy."""
 
+JsonObject: TypeAlias = dict[str, Any]
+"""Numbers and words by name, ready for JSON: what a command writes, settings of a store."""
+
 SomeTree = TypeVar("SomeTree")
 """A pytree that comes back in the same structure."""
 
@@ -28,11 +31,14 @@ RealScalarLike: TypeAlias = Array | np.ndarray | float
 BoolScalarLike: TypeAlias = Array | np.ndarray | bool
 """A truth value, likewise."""
 
-VectorField: TypeAlias = Callable[[RealScalarLike, PyTree, PyTree], PyTree]
+Time: TypeAlias = RealScalarLike
+"""A time [s], likewise."""
+
+VectorField: TypeAlias = Callable[[Time, PyTree, PyTree], PyTree]
 """Rates of change f(t, state, args), in the form that `diffrax.ODETerm` takes."""
 
 
-def as_float(value: Any) -> Any:
+def as_float(value: Parameter) -> Scalar:
     """A floating-point array of JAX's default width (64 bits unless changed) or its own.
 
     What is no number is returned as it is, for the check that follows to refuse by name.

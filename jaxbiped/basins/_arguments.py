@@ -1,7 +1,5 @@
 """Checks of arguments that the analyses of basins share."""
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
@@ -9,7 +7,7 @@ from jaxbiped._checks import ArgumentError, check_finite
 from jaxbiped.basins._label import Label
 
 
-def check_whole(name: str, value: Any, least: int) -> int:
+def check_whole(name: str, value: npt.ArrayLike, least: int) -> int:
     """A whole number of at least `least`; raises `ArgumentError` for anything else."""
     array = np.asarray(value)
     if array.shape != () or array.dtype.kind not in "iu" or array < least:

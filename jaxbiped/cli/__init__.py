@@ -3,7 +3,7 @@
 import contextlib
 import io
 import sys
-from typing import Annotated, Any
+from typing import Annotated, Protocol
 
 import tyro
 from tyro.conf import subcommand
@@ -28,6 +28,13 @@ _Command = (
 )
 
 
+class _Runnable(Protocol):
+    """A command with its options."""
+
+    def run(self) -> int:
+        """Runs it; returns the exit code."""
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Runs a command and exits.
 
@@ -48,7 +55,7 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(2 if isinstance(error, ArgumentError) else 1)
 
 
-def _parse(arguments: list[str]) -> Any:
+def _parse(arguments: list[str]) -> _Runnable | None:
     """The command; exits with 2 and one sentence where there is none."""
     refusal = io.StringIO()
     try:

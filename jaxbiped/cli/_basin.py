@@ -14,11 +14,14 @@ from tyro.conf import OmitArgPrefixes
 from jaxbiped import _clock
 from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._progress import stage
+from jaxbiped._types import JsonObject
 from jaxbiped.basins._fractions import fractions as fractions_of
 from jaxbiped.basins._label import label_names
 from jaxbiped.cli._basin_options import StartsOptions
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import State
 from jaxbiped.scene._parameters import parameter_values
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -139,7 +142,7 @@ class Basin:
         return 0
 
 
-def basin_numbers(found: "xarray.Dataset", seconds: float) -> dict[str, Any]:
+def basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
     """What is known of a basin in SI units, ready for JSON."""
     fractions = fractions_of(_names(found))
     fresh = int(found.attrs["labelled_in_this_run"])
@@ -164,7 +167,7 @@ def _names(found: "xarray.Dataset") -> np.ndarray:
     return label_names(found.label.values, found.period.values)
 
 
-def _print(report: Report, numbers: dict[str, Any]) -> None:
+def _print(report: Report, numbers: JsonObject) -> None:
     rows = [
         (name, str(numbers["counts"][name]), *(f"{100 * value:.2f}" for value in values))
         for name, values in numbers["fractions"].items()
@@ -231,7 +234,7 @@ def _mark(known: Labelling, x: str, y: str) -> tuple[float, float] | None:
     return place[0], place[1]
 
 
-def _value(scene: Scene | RigidScene, state: Any, name: str) -> float:
+def _value(scene: Scene | RigidScene, state: State | RigidState, name: str) -> float:
     if name in COORDINATES:
         return float(getattr(state, COORDINATES[name]))
     return float(parameter_values(scene)[name])

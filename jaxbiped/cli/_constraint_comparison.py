@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import numpy as np
@@ -13,6 +13,7 @@ from jaxbiped._progress import stage
 from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import Simulation
@@ -90,7 +91,7 @@ class ConstraintRun(NamedTuple):
 
 def compare_constraints(
     scene: Scene,
-    state: Any,
+    state: WalkerState,
     *,
     duration: float,
     integrators: Sequence[Integrator],
@@ -125,7 +126,7 @@ def compare_constraints(
     ]
 
 
-def final_truth(scene: Scene, state: Any, duration: float) -> np.ndarray:
+def final_truth(scene: Scene, state: WalkerState, duration: float) -> np.ndarray:
     """The minimal formulation's state after a time, at a tolerance of 1e-10; (8,) or (10,)."""
     request = Simulation.prepare(
         scene, state, duration=duration, rtol=_TRUTH, save="end", max_solver_steps=_MOST_STEPS
@@ -136,7 +137,7 @@ def final_truth(scene: Scene, state: Any, duration: float) -> np.ndarray:
 def _run(
     name: str,
     scene: RedundantScene,
-    state: Any,
+    state: WalkerState,
     duration: float,
     integrator: Integrator,
     truth: np.ndarray,

@@ -3,11 +3,12 @@
 import dataclasses
 import math
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from tyro.conf import OmitArgPrefixes
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive
+from jaxbiped._types import JsonObject
 from jaxbiped.cli._constraint_comparison import ConstraintRun, Integrator, compare_constraints
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
@@ -75,7 +76,7 @@ class Constraints:
         return 0
 
 
-def write_picture(runs: list[dict[str, Any]], out: Path) -> Path:
+def write_picture(runs: list[JsonObject], out: Path) -> Path:
     """Writes the comparison as a picture; returns its path."""
     from jaxbiped import plot
 
@@ -84,7 +85,7 @@ def write_picture(runs: list[dict[str, Any]], out: Path) -> Path:
     return path
 
 
-def run_numbers(runs: list[ConstraintRun]) -> list[dict[str, Any]]:
+def run_numbers(runs: list[ConstraintRun]) -> list[JsonObject]:
     """Runs ready for JSON: None for what is not a finite number."""
     return [
         {

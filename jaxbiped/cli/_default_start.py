@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
+from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
@@ -45,7 +46,7 @@ def default_start(scene: Any) -> WalkerState:
     return start._replace(hip_z=standing_height(scene, seed.theta_2, fitted))
 
 
-def _fitted_to(*parts: Any) -> Any:
+def _fitted_to(*parts: PyTree) -> tuple[jtu.PyTreeDef, list[float]]:
     """What a start is fitted to, to be compared."""
     leaves, structure = jtu.tree_flatten(parts)
     return structure, [float(leaf) for leaf in leaves]

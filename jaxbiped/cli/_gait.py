@@ -5,13 +5,14 @@ import math
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
 from jaxbiped._checks import check_choice, check_count
+from jaxbiped._types import JsonObject
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.dynamics._rigid_checks import rigid_checks
@@ -23,6 +24,9 @@ from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._rigid_scene import RigidScene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _SECTIONS: dict[str, type[AbstractSection]] = {"mid-stance": MidStance, "heel-strike": HeelStrike}
 _UNITS = {
@@ -103,7 +107,7 @@ def write_figures(gait: Gait, out: Path) -> list[Path]:
     """Writes the figures of a gait; returns their paths."""
     from jaxbiped import plot
 
-    figures: dict[str, Callable[..., Any]] = {
+    figures: dict[str, Callable[[Gait], Figure]] = {
         "multipliers.png": plot.multipliers,
         "elasticities.png": plot.elasticities,
         "orbit.png": plot.gait_orbit,
@@ -113,7 +117,7 @@ def write_figures(gait: Gait, out: Path) -> list[Path]:
     return [out / name for name in figures]
 
 
-def gait_numbers(gait: Gait) -> dict[str, Any]:
+def gait_numbers(gait: Gait) -> JsonObject:
     """What is known of a gait in SI units, ready for JSON: None for what is not a finite number."""
     measures = gait.measures
     values = np.asarray(gait.multipliers).tolist()
@@ -200,7 +204,7 @@ def _assumption_line(known: dict[str, float]) -> str:
     )
 
 
-def _failure(numbers: dict[str, Any], gait: Gait) -> str:
+def _failure(numbers: JsonObject, gait: Gait) -> str:
     """One sentence on a search that found no gait."""
     residual, turns = numbers["residual"], int(gait.evaluations)
     returned = "no trial returned" if residual is None else f"residual {residual:.2e}"
@@ -216,7 +220,7 @@ def _failure(numbers: dict[str, Any], gait: Gait) -> str:
     )
 
 
-def _print(report: Report, numbers: dict[str, Any], gait: Gait) -> None:
+def _print(report: Report, numbers: JsonObject, gait: Gait) -> None:
     report.say(_gait_table(numbers, int(gait.evaluations)))
     report.say()
     report.say(_multiplier_table(numbers))
@@ -238,7 +242,7 @@ def _print(report: Report, numbers: dict[str, Any], gait: Gait) -> None:
     report.say(f"import {wall['import']:.1f} s, total {wall['total']:.1f} s")
 
 
-def _gait_table(numbers: dict[str, Any], turns: int) -> str:
+def _gait_table(numbers: JsonObject, turns: int) -> str:
     rows = [
         ("period s", _format(numbers["period_s"], ".7f")),
         ("step length m", _format(numbers["step_length_m"], ".7f")),
@@ -252,7 +256,7 @@ def _gait_table(numbers: dict[str, Any], turns: int) -> str:
     return table(("gait", "value"), rows, most=_MOST_ROWS)
 
 
-def _multiplier_table(numbers: dict[str, Any]) -> str:
+def _multiplier_table(numbers: JsonObject) -> str:
     rows = []
     pairs = zip(numbers["multipliers"], numbers["multiplier_errors"], strict=True)
     for k, ((real, imaginary), error) in enumerate(pairs):

@@ -1,9 +1,10 @@
 """Constraint report of `jaxbiped walk`: violations of the hip's constraints."""
 
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
+from jaxbiped._types import JsonObject
 from jaxbiped.constraints._constraint_methods import name_of
 from jaxbiped.dynamics._redundant_motion import hip_force, violation
 from jaxbiped.dynamics._redundant_state import LegsState
@@ -11,7 +12,7 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._trajectory import Trajectory
 
 
-def constraint_numbers(scene: RedundantScene, trajectory: Trajectory) -> dict[str, Any]:
+def constraint_numbers(scene: RedundantScene, trajectory: Trajectory) -> JsonObject:
     """Largest violations at the ends of the steps and what was corrected at the start (SI)."""
     off = violation(scene, cast(LegsState, trajectory.state))
     force = hip_force(scene, trajectory.state)
@@ -28,7 +29,7 @@ def constraint_numbers(scene: RedundantScene, trajectory: Trajectory) -> dict[st
     }
 
 
-def constraint_sentence(numbers: dict[str, Any]) -> str:
+def constraint_sentence(numbers: JsonObject) -> str:
     """The same for people."""
     return (
         f"{numbers['method']}: the hip opens by at most {numbers['max_violation_m']:.1e} m and "

@@ -2,11 +2,11 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Any
 
 from jaxbiped._checks import check_writable_file
 from jaxbiped._parameter import parameter_infos
 from jaxbiped._progress import stage
+from jaxbiped._types import JsonObject
 from jaxbiped.cli._report import Report, table
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.measure._operation_counts import operation_counts
@@ -14,6 +14,7 @@ from jaxbiped.scene._ladder import ladder
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene.laws import AbstractBristleLaw, AbstractFrictionLaw, AbstractNormalLaw
 from jaxbiped.scene.laws._catalogue import (
     FRICTION_LAWS,
     NORMAL_LAWS,
@@ -57,7 +58,9 @@ class Models:
         return 0
 
 
-def _law(name: str, scene: Scene, law: Any) -> dict[str, Any]:
+def _law(
+    name: str, scene: Scene, law: AbstractNormalLaw | AbstractFrictionLaw | AbstractBristleLaw
+) -> JsonObject:
     """A law that stands in the seed's scene, with the value of each parameter there."""
     return {
         "name": name,
@@ -71,7 +74,7 @@ def _law(name: str, scene: Scene, law: Any) -> dict[str, Any]:
     }
 
 
-def _rung(name: str, scene: Scene | RigidScene) -> dict[str, Any]:
+def _rung(name: str, scene: Scene | RigidScene) -> JsonObject:
     return {
         "name": name,
         "states": len(state_type(scene)._fields),
@@ -79,7 +82,7 @@ def _rung(name: str, scene: Scene | RigidScene) -> dict[str, Any]:
     }
 
 
-def _print(report: Report, numbers: dict[str, Any]) -> None:
+def _print(report: Report, numbers: JsonObject) -> None:
     for kind in ("normal", "friction"):
         rows = [
             (law["name"], str(law["operations"]), _format(law["parameters"]))
@@ -95,7 +98,7 @@ def _print(report: Report, numbers: dict[str, Any]) -> None:
     report.say("operations: of one evaluation of the vector field, equal ones shared")
 
 
-def _format(parameters: dict[str, Any]) -> str:
+def _format(parameters: JsonObject) -> str:
     if not parameters:
         return "none"
     return ", ".join(

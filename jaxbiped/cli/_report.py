@@ -5,7 +5,8 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+
+from jaxbiped._types import JsonObject
 
 
 class Report:
@@ -20,7 +21,7 @@ class Report:
         if not self._only_json:
             _write(text + "\n")
 
-    def finish(self, numbers: dict[str, Any]) -> None:
+    def finish(self, numbers: JsonObject) -> None:
         """Writes the numbers."""
         text = json.dumps(numbers, indent=2) + "\n"
         if self._only_json:

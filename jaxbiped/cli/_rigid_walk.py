@@ -8,6 +8,7 @@ import numpy as np
 from jaxbiped import _clock
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
+from jaxbiped._types import JsonObject
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SolveOptions
 from jaxbiped.cli._warnings import cut_short
@@ -59,7 +60,7 @@ def run_rigid_walk(
         "compile": 2.0 * compiled - prepared - finished,
         "run": finished - compiled,
     }
-    numbers: dict[str, Any] = {
+    numbers: JsonObject = {
         "model": "rigid",
         "ending": str(walk.outcome),
         "slope_rad": float(scene.ground.slope),
@@ -110,7 +111,7 @@ def _footsteps(scene: RigidScene, walk: RigidWalked) -> list[dict[str, float]]:
     ]
 
 
-def _print(report: Report, numbers: dict[str, Any]) -> None:
+def _print(report: Report, numbers: JsonObject) -> None:
     names = ("time_s", "period_s", "length_m", "speed_m_s")
     rows = [
         (str(k + 1), *(f"{row[name]:.4f}" for name in names))

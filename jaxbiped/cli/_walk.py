@@ -4,7 +4,7 @@ import dataclasses
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import jax.tree_util as jtu
 import numpy as np
@@ -12,6 +12,7 @@ from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
 from jaxbiped._progress import stage
+from jaxbiped._types import JsonObject
 from jaxbiped.cli._held import constraint_numbers, constraint_sentence
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._rigid_walk import run_rigid_walk
@@ -21,10 +22,15 @@ from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._footsteps import Footsteps, footsteps
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import Simulation
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _MOST_ROWS = 24
 _ROOM = 1 << 17
@@ -72,7 +78,7 @@ class Walk:
         self._report(scene, trajectory, wall)
         return 1 if trajectory.outcome == Ending.SOLVER_FAILED else 0
 
-    def _request(self, scene: Any, state: State) -> Simulation:
+    def _request(self, scene: Scene | RedundantScene, state: State) -> Simulation:
         return Simulation.prepare(
             scene,
             state,
@@ -90,7 +96,7 @@ class Walk:
             steps = footsteps(scene, trajectory)
             ledger = energy_ledger(scene, trajectory)
         rtol = self.solve.rtol if self.solve.dt is None else None
-        numbers: dict[str, Any] = {
+        numbers: JsonObject = {
             "ending": ending_name(scene, trajectory),
             "slope_rad": float(scene.ground.slope),
             "duration_s": float(trajectory.t[-1]),
@@ -153,7 +159,7 @@ def write_outputs(scene: Any, trajectory: Trajectory, out: Path) -> list[Path]:
     from jaxbiped import plot
     from jaxbiped.measure._dataset import trajectory_dataset
 
-    figures: dict[str, Callable[..., Any]] = {
+    figures: dict[str, Callable[[Scene, Trajectory], Figure]] = {
         "strobe.png": plot.gait_strobe,
         "phase_portrait.png": plot.phase_portrait,
         "leg_angles.png": plot.leg_angles,
@@ -189,7 +195,7 @@ def _step_list(steps: Footsteps) -> list[dict[str, float]]:
     return [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns, strict=True)]
 
 
-def _print(report: Report, numbers: dict[str, Any]) -> None:
+def _print(report: Report, numbers: JsonObject) -> None:
     rows = [
         (
             str(k + 1),

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Iterable
 from inspect import signature
 from pathlib import Path
-from typing import Any
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -198,7 +197,7 @@ class StartOptions:
         """The numbers that were said."""
         return {name: x for name, x in dataclasses.asdict(self).items() if x is not None}
 
-    def state(self, scene: Any) -> WalkerState:
+    def state(self, scene: Scene | RigidScene | RedundantScene) -> WalkerState:
         """The start, of the kind that the scene needs; raises `ArgumentError`.
 
         A rigid walker takes the place and the legs' angles and rates.

@@ -4,9 +4,12 @@ from typing import Any
 
 import numpy as np
 
+from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._energy_ledger import EnergyLedger
 from jaxbiped.measure._samples import at_steps
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -38,7 +41,9 @@ def relative_residual(ledger: EnergyLedger) -> float | None:
     return share if np.isfinite(share) else None
 
 
-def walk_warnings(scene: Any, numbers: dict[str, Any], *, rtol: float | None) -> list[str]:
+def walk_warnings(
+    scene: Scene | RedundantScene, numbers: JsonObject, *, rtol: float | None
+) -> list[str]:
     """One sentence for each thing to know before relying on a walk's numbers."""
     found = []
     if numbers["ending"] == AIRBORNE:
@@ -68,7 +73,7 @@ def cut_short(ending: str, steps: int) -> list[str]:
     ]
 
 
-def friction_warnings(scene: Any) -> list[str]:
+def friction_warnings(scene: Scene | RedundantScene) -> list[str]:
     """A sentence where friction grows with slip instead of falling."""
     law = scene.friction
     static, kinetic = (getattr(law, name, None) for name in ("mu_static", "mu_kinetic"))

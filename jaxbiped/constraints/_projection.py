@@ -1,7 +1,6 @@
 """Projection of coordinates and rates onto the constraints."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import jax
 
@@ -59,7 +58,7 @@ def nearest_consistent(
             rows, weights, solve(factorise(gram(rows, weights, shift)), residual)
         )
 
-    def nearer(_: Any, q: list[Scalar]) -> list[Scalar]:
+    def nearer(_: Scalar, q: list[Scalar]) -> list[Scalar]:
         at = constraints_of(linkage, q, v)
         gone = [a - b for a, b in zip(q, origin, strict=True)]
         left = [off - row_times(row, gone) for off, row in zip(at.violation, at.rows, strict=True)]

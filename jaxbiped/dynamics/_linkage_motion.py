@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped._types import Scalar, Time
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
 from jaxbiped.constraints._linkage import Linkage
 from jaxbiped.constraints._linkage_constraints import Heading, constraints_of, masses_of
@@ -77,7 +77,7 @@ def linkage_motion(scene: LinkageScene, state: LinkageState) -> LinkageMotion:
     return motion_under(linkage, scene.method, state.q, state.v, applied)
 
 
-def linkage_field(t: RealScalarLike, state: LinkageState, scene: LinkageScene) -> LinkageState:
+def linkage_field(t: Time, state: LinkageState, scene: LinkageScene) -> LinkageState:
     """Time derivative of a linkage's state, in the form that `diffrax.ODETerm` takes.
 
     Args:

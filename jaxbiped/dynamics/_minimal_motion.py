@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._circular import sine_cosine
-from jaxbiped._types import RealScalarLike, Scalar, VectorField
+from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._forces import foot_force
 from jaxbiped.dynamics._formulation import field_of
@@ -125,7 +125,7 @@ def bristle_rates(
     return rates
 
 
-def vector_field(t: RealScalarLike, state: State, scene: Scene) -> State:
+def vector_field(t: Time, state: State, scene: Scene) -> State:
     """Time derivative of the state, in the form that `diffrax.ODETerm` takes.
 
     Args:

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._circular import sine_cosine
-from jaxbiped._types import RealScalarLike, Scalar, VectorField
+from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
 from jaxbiped.constraints._linkage_constraints import (
     constraints_of,
     headings_of,
@@ -99,7 +99,7 @@ def redundant_motion(scene: RedundantScene, state: LegsState) -> RedundantMotion
     return RedundantMotion(moved.accelerations, force, minimal)
 
 
-def redundant_field(t: RealScalarLike, state: LegsState, scene: RedundantScene) -> LegsState:
+def redundant_field(t: Time, state: LegsState, scene: RedundantScene) -> LegsState:
     """Time derivative of a redundant state, in the form that `diffrax.ODETerm` takes.
 
     Args:

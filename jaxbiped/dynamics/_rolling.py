@@ -5,7 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._circular import sine_cosine
-from jaxbiped._types import RealScalarLike, Scalar, VectorField
+from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.dynamics._forces import FootForce
 from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.dynamics._rigid_state import RigidState
@@ -164,7 +164,7 @@ def rolling(scene: RigidScene, state: RigidState) -> RollingMotion:
     return RollingMotion(alpha_1, alpha_2, force)
 
 
-def rolling_field(t: RealScalarLike, state: RigidState, scene: RigidScene) -> RigidState:
+def rolling_field(t: Time, state: RigidState, scene: RigidScene) -> RigidState:
     """Time derivative of the state, in the form that `diffrax.ODETerm` takes.
 
     Args:

@@ -18,7 +18,7 @@ from jaxbiped.variational._hybrid_system import AbstractSystem
 def orbit_engine(
     engine: str,
     *,
-    solver: diffrax.AbstractSolver,
+    solver: diffrax.AbstractSolver[PyTree],
     section: AbstractSection,
     leaves: PyTree,
     system: AbstractSystem | None = None,
@@ -62,7 +62,7 @@ def holds_arrays(tree: PyTree) -> bool:
 
 
 def _hindrance(
-    solver: diffrax.AbstractSolver, section: AbstractSection, leaves: PyTree
+    solver: diffrax.AbstractSolver[PyTree], section: AbstractSection, leaves: PyTree
 ) -> str | None:
     if not isinstance(solver, AbstractRosenbrock):
         return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"

@@ -1,9 +1,8 @@
 """Search for a periodic gait of a scene."""
 
 import dataclasses
-from collections.abc import Hashable
 from concurrent.futures import ThreadPoolExecutor
-from typing import Literal, TypeAlias, cast
+from typing import Literal, cast
 
 import diffrax
 import equinox as eqx
@@ -27,8 +26,8 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import check_state
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._engine import orbit_engine
-from jaxbiped.gait._fixed_point_search import Found, Search, search
-from jaxbiped.gait._gait import Gait, summarise_gait
+from jaxbiped.gait._fixed_point_search import Found, Search, SearchArguments, search
+from jaxbiped.gait._gait import Described, Gait, summarise_gait
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._origin import FoundBy, Origin, single_stage_origin
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
@@ -40,7 +39,7 @@ from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, Precision, precision_of
+from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.variational._hybrid_system import RedundantWalking, section_of, system_of
 
@@ -48,13 +47,6 @@ _RESIDUAL_SHARE = 0.3
 """Residual that counts as none, in units of the state's tolerance."""
 _PATIENCE = 50.0
 """Time allowed to the next arrival, in units of √(l/g)."""
-
-_Searching: TypeAlias = tuple[
-    ReturnMapSpec, AbstractScene, tuple[int, ...], WalkerState, Precision, Method
-]
-"""What `search` takes."""
-_Described: TypeAlias = tuple[tuple[str, ...], tuple[int, ...], bool]
-"""Names and positions of the parameters, and whether the radius is differentiated."""
 
 
 def find_gait(
@@ -69,7 +61,7 @@ def find_gait(
     optimiser: optax.GradientTransformation | None = None,
     max_evaluations: int | None = None,
     radius_sensitivities: bool = True,
-    solver: str | diffrax.AbstractSolver | None = None,
+    solver: str | diffrax.AbstractSolver[PyTree] | None = None,
     engine: str = "auto",
 ) -> Gait:
     """Finds a periodic gait, its Floquet multipliers and its sensitivities to the parameters.
@@ -162,7 +154,7 @@ def find_gait(
     by = FoundBy.GUESS if guess is not None else FoundBy.START
     origin = single_stage_origin(modelled, start, by)
     staged = guess is None and max_evaluations is None and method == "newton"
-    if _is_traced(searching):
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(searching)):
         if staged:
             found, origin = search_along(*searching, origin)
         else:
@@ -178,7 +170,7 @@ def find_gait(
 def _return_map_spec(
     scene: AbstractScene,
     section: AbstractSection,
-    solver: diffrax.AbstractAdaptiveSolver,
+    solver: diffrax.AbstractAdaptiveSolver[PyTree],
     engine: str,
     *,
     steps: int,
@@ -205,7 +197,7 @@ def _is_stable(found: Found) -> bool:
 
 
 def _search_on(
-    searching: _Searching, modelled: Scene | RigidScene, first: Found, engine: str
+    searching: SearchArguments, modelled: Scene | RigidScene, first: Found, engine: str
 ) -> tuple[Found, Origin]:
     """The stages of a search beyond the first."""
     spec, scene, active, start, precision, how = searching
@@ -223,9 +215,7 @@ def _search_on(
         most=ACCURACIES["balanced"].max_solver_steps,
     )
 
-    def search_from(
-        spec: ReturnMapSpec, scene: AbstractScene, start: WalkerState, patience: int
-    ) -> Found:
+    def search_from(spec: ReturnMapSpec, scene: PyTree, start: PyTree, patience: int) -> Found:
         hasty = dataclasses.replace(how, patience=np.asarray(min(patience, how.max_evaluations)))
         return _search(spec, scene, active, start, precision, hasty)
 
@@ -252,47 +242,41 @@ def _adam() -> optax.GradientTransformation:
     return optax.adam(1e-2)
 
 
-def _compile_once(searching: _Searching, describing: _Described, origin: Origin) -> None:
+def _compile_once(searching: SearchArguments, describing: Described, origin: Origin) -> None:
     """Compiles what is not compiled yet for this kind of search."""
     once = _compilation_of(_kind_of((searching, describing[0], describing[2])))
     once(lambda: _compile(searching, describing, origin))
 
 
 @bounded_cache(PROGRAMS)
-def _compilation_of(kind: Hashable) -> Once[None]:
+def _compilation_of(kind: tuple[object, ...]) -> Once[None]:
     """What one kind of search is compiled by."""
     return Once()
 
 
-def _compile(searching: _Searching, describing: _Described, origin: Origin) -> None:
+def _compile(searching: SearchArguments, describing: Described, origin: Origin) -> None:
     """Compiles both programs, and what lanes run for them, at the same time."""
     spec, scene, _, start, *_ = searching
     no_result = _empty_arrays(eqx.filter_eval_shape(_search, *searching))
-    first = _search
-    second = summarise_gait
     told = stage("compiling the search (first time for this kind of scene)")
     with told, ThreadPoolExecutor() as meanwhile:
         with deferred_checks() as programs:
             # What takes lanes longest begins first.
-            lowered = second.lower(spec, scene, start, no_result, *describing, origin)
+            lowered = summarise_gait.lower(spec, scene, start, no_result, *describing, origin)
             ready = [meanwhile.submit(lowered.compile)]
-            ready.append(meanwhile.submit(first.lower(*searching).compile))
+            ready.append(meanwhile.submit(_search.lower(*searching).compile))
         for program in programs:
             program.check()
         for each in ready:
             each.result()
 
 
-def _kind_of(tree: PyTree) -> Hashable:
+def _kind_of(tree: PyTree) -> tuple[object, ...]:
     """What decides whether one compiled program can serve for another."""
     arrays, rest = eqx.partition(tree, eqx.is_array)
     shapes = tuple((leaf.shape, leaf.dtype) for leaf in jtu.tree_leaves(arrays))
     leaves, structure = jtu.tree_flatten(rest)
     return jtu.tree_structure(arrays), shapes, tuple(leaves), structure
-
-
-def _is_traced(tree: PyTree) -> bool:
-    return any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(tree))
 
 
 @cached_jit

@@ -2,7 +2,7 @@
 
 import enum
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -90,6 +90,11 @@ class Found(NamedTuple):
 
 Run = Callable[[Scalar, Scalar, Scalar], LinearisedReturn]
 """The return from recurring components, as exactly as a stage wants, or none where idle."""
+
+SearchArguments: TypeAlias = tuple[
+    ReturnMapSpec, PyTree, tuple[int, ...], PyTree, Precision, Method
+]
+"""Those of `search`, for a scene and a guess."""
 
 
 def search(

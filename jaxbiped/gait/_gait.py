@@ -1,6 +1,6 @@
 """Periodic gait: its state, measures, stability and sensitivities, found or not."""
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax
@@ -148,6 +148,10 @@ class Gait(eqx.Module):
     def stable(self) -> Scalar:
         """Whether a gait was found and all its multipliers lie inside the unit circle."""
         return (self.ending == int(Search.FOUND)) & (self.measures.spectral_radius < 1.0)
+
+
+Described: TypeAlias = tuple[tuple[str, ...], tuple[int, ...], bool]
+"""Names and positions of the parameters, and whether the radius is differentiated."""
 
 
 @cached_jit

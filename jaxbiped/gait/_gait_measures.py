@@ -106,7 +106,9 @@ def _attach_derivatives(values: Measures, slopes: Measures, parameters: Scalar) 
 
 
 @_attach_derivatives.def_jvp
-def _attach_derivatives_jvp(primals: tuple, tangents: tuple) -> tuple[Measures, Measures]:
+def _attach_derivatives_jvp(
+    primals: tuple[PyTree, ...], tangents: tuple[PyTree, ...]
+) -> tuple[Measures, Measures]:
     values, slopes, _ = primals
     state_dot = tangents[2]
     # A second derivative would need slopes that are themselves differentiated.

@@ -31,7 +31,9 @@ def forward_by_lanes(
 
 
 @forward_by_lanes.def_jvp
-def _forward_by_lanes_jvp(primals: tuple, tangents: tuple) -> tuple[PyTree, PyTree]:
+def _forward_by_lanes_jvp(
+    primals: tuple[PyTree, ...], tangents: tuple[PyTree, ...]
+) -> tuple[PyTree, PyTree]:
     spec, precision, args, state = primals
     _, _, args_dot, state_dot = tangents
     state_dots, args_dots = _leaves_with_none(state_dot, state), _leaves_with_none(args_dot, args)

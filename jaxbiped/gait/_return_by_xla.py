@@ -40,7 +40,9 @@ def forward_by_xla(
 
 
 @forward_by_xla.def_jvp
-def _by_xla_forward_jvp(primals: tuple, tangents: tuple) -> tuple[PyTree, PyTree]:
+def _by_xla_forward_jvp(
+    primals: tuple[PyTree, ...], tangents: tuple[PyTree, ...]
+) -> tuple[PyTree, PyTree]:
     spec, precision, args, state = primals
     spec_dot, _, args_dot, state_dot = tangents
     if jtu.tree_leaves((spec_dot.system, spec_dot.section)):

@@ -9,7 +9,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice, check_positive
-from jaxbiped._types import RealScalarLike, Scalar, as_float
+from jaxbiped._types import Scalar, Time, as_float
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._engine import check_holds_none, orbit_engine
@@ -55,8 +55,8 @@ def return_map(
     gradient: AbstractGradient | None = None,
     accuracy: str = "balanced",
     system: AbstractSystem | None = None,
-    solver: str | diffrax.AbstractSolver | None = None,
-    max_time: RealScalarLike = 10.0,
+    solver: str | diffrax.AbstractSolver[PyTree] | None = None,
+    max_time: Time = 10.0,
     engine: str = "auto",
 ) -> Return:
     """Follows a motion to its next arrival at a section, differentiably.

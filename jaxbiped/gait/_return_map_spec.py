@@ -4,7 +4,7 @@ import diffrax
 import equinox as eqx
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.variational._hybrid_system import AbstractSystem
@@ -27,8 +27,8 @@ class ReturnMapSpec(eqx.Module):
 
     system: AbstractSystem
     section: AbstractSection
-    solver: diffrax.AbstractAdaptiveSolver
-    max_time: RealScalarLike
+    solver: diffrax.AbstractAdaptiveSolver[PyTree]
+    max_time: Time
     steps: int = eqx.field(static=True)
     max_solver_steps: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)

@@ -1,14 +1,15 @@
 """Choice of the solver that follows the orbits of a search."""
 
 import diffrax
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.solve._solvers import solver_named
 
 
 def orbit_solver(
-    solver: str | diffrax.AbstractSolver | None, *, rigid: bool
-) -> diffrax.AbstractAdaptiveSolver:
+    solver: str | diffrax.AbstractSolver[PyTree] | None, *, rigid: bool
+) -> diffrax.AbstractAdaptiveSolver[PyTree]:
     """The solver of that name, the one given, or the usual one: "rodas4", and "rodas5p" if rigid.
 
     Raises:

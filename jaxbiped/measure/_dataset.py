@@ -1,17 +1,19 @@
 """Dataset of a trajectory: labelled, for files and for other programs."""
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from jaxbiped._parameter import parameter_infos
+from jaxbiped._types import Scalar
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import feet, touches
 from jaxbiped.dynamics._forces import foot_forces
 from jaxbiped.dynamics._redundant_motion import violation
-from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     import xarray
 
 
-def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset":
+def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) -> "xarray.Dataset":
     """States, foot forces, penetrations and energies along a trajectory, labelled, in SI units.
 
     Variables have the dimension `time` [s]; forces and penetrations also `leg` (1, 2). Attributes
@@ -43,18 +45,19 @@ def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset"
     if np.ndim(trajectory.t) != 1:
         raise ValueError("This is a batch of trajectories: take one of them at a time.")
     state = trajectory.state
-    both, forces, held = feet(scene, state), foot_forces(scene, state), energies(scene, state)
+    both, forces = feet(scene, state), foot_forces(scene, state)
+    held = energies(scene, state)  # type: ignore[arg-type]
     variables = {
         name: ("time", np.asarray(value), {"units": STATE_QUANTITIES[name].unit or "1"})
         for name, value in minimal_state(scene, state)._asdict().items()
     }
     if isinstance(scene, RedundantScene):
-        off = np.asarray(violation(scene, state).position)
+        off = np.asarray(violation(scene, cast(LegsState, state)).position)
         variables["violation"] = ("time", off, {"units": "m"})
     for name, value in held._asdict().items():
         variables[f"{name}_energy"] = ("time", np.asarray(value), {"units": "J"})
 
-    def legs(values: list) -> np.ndarray:
+    def legs(values: list[Scalar | None]) -> np.ndarray:
         return np.stack([np.asarray(value) for value in values])
 
     per_leg = {
@@ -75,7 +78,7 @@ def trajectory_dataset(scene: Scene, trajectory: Trajectory) -> "xarray.Dataset"
     return dataset.assign_attrs(ending=str(trajectory.outcome), **_parameters(scene))
 
 
-def _parameters(scene: Any) -> dict[str, float | str]:
+def _parameters(scene: AbstractScene) -> dict[str, float | str]:
     """Every parameter of a scene, and the names of its laws, by dotted path."""
     found: dict[str, float | str] = {}
     units: dict[str, str] = {}

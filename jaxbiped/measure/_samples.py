@@ -1,7 +1,7 @@
 """Samples of a trajectory between its steps: values, integrals and moments of change."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -109,7 +109,7 @@ def moments_of_change(
 
 
 @cached_jit
-def _apply(function: Any, scene: Scene, states: State) -> PyTree:
+def _apply(function: Callable[..., PyTree], scene: Scene, states: State) -> PyTree:
     values = function(scene, states)
     shape = jnp.shape(jtu.tree_leaves(states)[0])
     return jtu.tree_map(lambda leaf: jnp.broadcast_to(leaf, shape), values)

@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.animation import FuncAnimation
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from jaxbiped._checks import check_positive
@@ -94,7 +96,7 @@ class _Picture:
         radius = float(scene.walker.r)
         self._half_width = 1.2 * length
         self._draw_ground(scene, length)
-        self._legs: list[Any] = []
+        self._legs: list[Line2D] = []
         self._feet: list[Circle] = []
         for colour, style, name in zip(LEG_COLOURS, LEG_STYLES, LEG_NAMES, strict=True):
             look: dict[str, Any] = {"linestyle": style}
@@ -124,7 +126,7 @@ class _Picture:
         marks = np.stack([surface, below, gap], axis=1).reshape(-1, 2)
         self._ax.plot(*marks.T, color=GROUND_COLOUR, linewidth=1.0)
 
-    def draw(self, frame: int) -> list[Any]:
+    def draw(self, frame: int) -> list[Artist]:
         """Moves everything to a frame, and the camera with it."""
         hip_x, hip_z = self._shown.hip[frame]
         for line, circle, centres in zip(self._legs, self._feet, self._shown.feet, strict=True):

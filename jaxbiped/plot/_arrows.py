@@ -1,15 +1,14 @@
 """Arrows along a curve, in the direction in which it is run through."""
 
-from typing import Any
-
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 
 _PLACES = (0.12, 0.37, 0.62, 0.87)
 """Of the arrows, in parts of the curve's length."""
 
 
-def direction_arrows(ax: Axes, x: Any, y: Any, colour: str) -> None:
+def direction_arrows(ax: Axes, x: npt.ArrayLike, y: npt.ArrayLike, colour: str) -> None:
     """Puts arrow heads along a curve, evenly over its length as it is seen."""
     points = np.stack([np.asarray(x, dtype=float), np.asarray(y, dtype=float)], axis=-1)
     spans = np.ptp(points, axis=0)

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -163,7 +164,7 @@ def finish(
     units: tuple[str, str],
     mark: tuple[float, float] | None,
     title: str,
-    more: tuple[Any, ...] = (),
+    more: tuple[Artist, ...] = (),
 ) -> None:
     """Names of the axes, the gait's mark, and the legend with fractions right of the axes."""
     handles = [*_patches(words), *more]

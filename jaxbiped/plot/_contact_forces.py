@@ -81,7 +81,7 @@ def contact_forces(
     return whole
 
 
-def _draw_column(axes: Any, t: np.ndarray, found: Contacts) -> None:
+def _draw_column(axes: np.ndarray, t: np.ndarray, found: Contacts) -> None:
     for k, force in enumerate(found.forces):
         look: dict[str, Any] = {
             "color": LEG_COLOURS[k],
@@ -94,7 +94,9 @@ def _draw_column(axes: Any, t: np.ndarray, found: Contacts) -> None:
             axes[1].plot(t, force.tangential, **look)
 
 
-def _draw_strike(axes: Any, scene: Scene, trajectory: Trajectory, time: float, leg: int) -> None:
+def _draw_strike(
+    axes: np.ndarray, scene: Scene, trajectory: Trajectory, time: float, leg: int
+) -> None:
     t, found = sampled_forces(scene, trajectory, start=time - _BEFORE, stop=time + _AFTER)
     milliseconds = (t - time) * 1e3
     _draw_column(axes, milliseconds, found)

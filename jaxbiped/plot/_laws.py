@@ -2,16 +2,18 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import ArrayLike
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from jaxbiped._checks import check_positive, check_type
+from jaxbiped._types import Scalar
 from jaxbiped.plot._symbols import (
     FORCE_RATIO,
     NORMAL_FORCE,
@@ -33,6 +35,8 @@ _RATE_COLOURS = ("#56B4E9", GROUND_COLOUR, "#E69F00", LEG_COLOURS[1])
 """One rate each, from the slowest; the fifth begins anew."""
 _MOST_STEPS = 16384
 _LONGEST = 2.0
+_Drop: TypeAlias = tuple[Scalar, Scalar]
+_Falling: TypeAlias = tuple[AbstractNormalLaw, float]
 """How long a drop is followed [s]: a strongly damped foot may creep for ever."""
 
 
@@ -183,12 +187,12 @@ def _drop(law: AbstractNormalLaw, mass: float, speed: float) -> tuple[np.ndarray
     return np.maximum(depth[saved], 0.0), rate[saved]
 
 
-def _fall(t: Any, y: Any, args: Any) -> Any:
+def _fall(t: ArrayLike, y: _Drop, args: _Falling) -> _Drop:
     law, mass = args
     return y[1], -law.force(*y) / mass
 
 
-def _is_out(t: Any, y: Any, args: Any, **rest: Any) -> Any:
+def _is_out(t: ArrayLike, y: _Drop, args: _Falling, **rest: object) -> Scalar:
     return (y[0] < 0.0) | ((y[1] < 0.0) & (args[0].force(*y) <= 0.0))
 
 

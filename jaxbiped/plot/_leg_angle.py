@@ -1,7 +1,6 @@
 """Leg angles over time (paper, figure 6)."""
 
-from typing import Any
-
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -38,7 +37,9 @@ def leg_angles(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None) 
     return draw_leg_angles(t, (state.theta_1, state.theta_2), "Leg angles", ax)
 
 
-def draw_leg_angles(t: Any, angles: tuple[Any, Any], title: str, ax: Axes | None) -> Figure:
+def draw_leg_angles(
+    t: npt.ArrayLike, angles: tuple[npt.ArrayLike, npt.ArrayLike], title: str, ax: Axes | None
+) -> Figure:
     """Draws the angles of leg 1 and leg 2 [rad] at times [s]."""
     ax = axes_or_new(ax, 7.2, 3.4)
     for k, angle in enumerate(angles):

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._types import Numbers
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.plot._arrows import direction_arrows
 from jaxbiped.plot._samples import sample
@@ -74,7 +75,7 @@ def phase_portrait(
     return figure_of(ax)
 
 
-def _draw_leg(ax: Axes, k: int, t: np.ndarray, angle: Any, rate: Any, since: float) -> None:
+def _draw_leg(ax: Axes, k: int, t: np.ndarray, angle: Numbers, rate: Numbers, since: float) -> None:
     """The whole walk, faint where a last stride is drawn over it."""
     look: dict[str, Any] = {"color": LEG_COLOURS[k], "linestyle": LEG_STYLES[k]}
     whole: dict[str, Any] = {"linewidth": 1.3, "label": LEG_NAMES[k]}

@@ -1,9 +1,10 @@
 """Samples of a trajectory on times fit for drawing: the solver's own steps and even ones."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
+import numpy.typing as npt
 
 from jaxbiped.dynamics._state import State
 from jaxbiped.solve._trajectory import Trajectory
@@ -29,7 +30,7 @@ def end_time(trajectory: Trajectory) -> float:
     return float(trajectory.t[-1])
 
 
-def state_at(trajectory: Trajectory, t: Any) -> State:
+def state_at(trajectory: Trajectory, t: npt.ArrayLike) -> State:
     """States at times [s], as NumPy arrays.
 
     Raises:

@@ -3,8 +3,6 @@
 Symbols are the paper's; those of laws that it does not have are the ones of their sources.
 """
 
-from typing import Any
-
 from jaxbiped._parameter import parameter_infos
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
@@ -81,7 +79,7 @@ def _own_name(name: str) -> str:
     return name.rpartition(".")[2]
 
 
-def law_name(law: Any) -> str:
+def law_name(law: object) -> str:
     """The name of a law of contact in words."""
     name = type(law).__name__
     return _LAWS.get(name, name)

@@ -55,11 +55,11 @@ class AbstractScene(eqx.Module):
         """Whether the friction has states of its own."""
 
 
-def is_compliant(args: Any) -> bool:
+def is_compliant(args: object) -> bool:
     """Whether the parameters of a system are a scene with laws of contact."""
     return isinstance(args, AbstractScene) and args.compliant
 
 
-def is_rigid(args: Any) -> bool:
+def is_rigid(args: object) -> bool:
     """Whether the parameters of a system are a scene whose feet roll and strike."""
     return isinstance(args, AbstractScene) and not args.compliant

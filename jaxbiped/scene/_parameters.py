@@ -2,16 +2,21 @@
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
+import equinox as eqx
 import jax.tree_util as jtu
 
 from jaxbiped._checks import check_choice
 from jaxbiped._parameter import parameter_infos
 from jaxbiped._quantity import Quantity
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene._abstract_scene import AbstractScene
 
 SomeScene = TypeVar("SomeScene", bound=AbstractScene)
+_Part = TypeVar("_Part", bound=eqx.Module)
+_Path: TypeAlias = tuple[Any, ...]
+"""Keys of a leaf, as JAX gives them."""
 
 _FIRST = ("K", "c", "xi")
 """The parameters that sensitivities are first asked for."""
@@ -39,7 +44,7 @@ def parameter_names(scene: AbstractScene) -> tuple[str, ...]:
     return (*first, *(name for name in names if name not in first))
 
 
-def parameter_values(scene: AbstractScene) -> dict[str, Any]:
+def parameter_values(scene: AbstractScene) -> dict[str, Scalar]:
     """A scene's parameters by name (see `parameter_names`), their own leaves.
 
     Args:
@@ -73,7 +78,7 @@ def parameter_quantities(scene: AbstractScene) -> dict[str, Quantity]:
     return {name: _quantity(scene.minimal, name, by_leaf[name]) for name in parameter_names(scene)}
 
 
-def _quantity(part: Any, name: str, path: tuple[Any, ...]) -> Quantity:
+def _quantity(part: object, name: str, path: _Path) -> Quantity:
     for key in path:
         if not dataclasses.is_dataclass(part):
             break  # an entry of a user's own list, or of a dictionary
@@ -99,7 +104,7 @@ def select_parameters(
     return names, tuple(by_leaf.index(name) for name in names)
 
 
-def with_parameters(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
+def with_parameters(scene: SomeScene, values: Mapping[str, Parameter]) -> SomeScene:
     """The scene with other values of these parameters (see `parameter_names`), checked anew.
 
     Args:
@@ -127,7 +132,7 @@ def with_parameters(scene: SomeScene, values: Mapping[str, Any]) -> SomeScene:
     return scene.with_minimal(changed)
 
 
-def _replace(part: Any, path: tuple[Any, ...], value: Any) -> Any:
+def _replace(part: _Part, path: _Path, value: Parameter) -> _Part:
     name, rest = path[0].name, path[1:]
     new = _replace(getattr(part, name), rest, value) if rest else value
     return dataclasses.replace(part, **{name: new})
@@ -142,5 +147,5 @@ def _names_by_leaf(scene: AbstractScene) -> list[str]:
     ]
 
 
-def _format(path: tuple[Any, ...]) -> str:
+def _format(path: _Path) -> str:
     return ".".join(str(getattr(key, "name", key)) for key in path)

@@ -1,7 +1,7 @@
 """A scene whose legs have coordinates of their own."""
 
 import dataclasses
-from typing import Any, ClassVar, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import equinox as eqx
 
@@ -16,7 +16,8 @@ from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene._walker_linkage import walker_linkage
-from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
+from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, AbstractNormalLaw
+from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 
 class RedundantScene(AbstractScene):
@@ -73,7 +74,7 @@ class RedundantScene(AbstractScene):
         return self.scene.normal
 
     @property
-    def friction(self) -> Any:
+    def friction(self) -> AbstractFrictionLaw | AbstractBristleLaw:
         """The scene's law of friction."""
         return self.scene.friction
 

@@ -1,13 +1,13 @@
 """Simulation by lanes."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import diffrax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, ArrayLike
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
@@ -37,22 +37,23 @@ _QUICK = 100_000
 """Attempted steps that take less than a second."""
 
 
-def by_lanes(run: "Simulation") -> Trajectory:
-    """Runs a request; see `simulate`."""
+def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
+    """Runs a request; see `simulate`. What it asks of lanes may be known, see `lane_request`."""
     dense, recorded, setting = None, None, _setting(run)
+    solve: Solve = (lane_request(run) if request is None else request).inputs
     if run.save_steps:
-        ended, t, state, dense = _step_by_step(run, setting)
+        ended, t, state, dense = _step_by_step(run, solve, setting)
     elif not setting.saved.within:
         if run.extremes is None:
-            ended = solve_scene(_solve(run), setting)
+            ended = solve_scene(solve, setting)
         else:
-            ended, _ = solve_and_save(_solve(run), setting)
+            ended, _ = solve_and_save(solve, setting)
         t = jnp.reshape(ended.t, (1,))
         state = jtu.tree_map(lambda leaf: jnp.reshape(leaf, (1,)), ended.state)
     else:
         times = None if run.times is None else np.asarray(run.times)
         room = 0 if run.section is None else run.max_arrivals
-        ended, recorded = solve_and_save(_solve(run), setting, times=times, room=room)
+        ended, recorded = solve_and_save(solve, setting, times=times, room=room)
         assert recorded is not None
         # As diffrax has it: infinite where the solve ended before.
         reached = jnp.arange(recorded.values.shape[0]) < recorded.counts
@@ -73,33 +74,36 @@ def by_lanes(run: "Simulation") -> Trajectory:
     )
 
 
-def can_by_lanes(run: "Simulation") -> bool:
-    """Whether lanes have all operations that a request needs."""
-    return LANES.can(lane_request(run)) is None
-
-
 def lane_request(run: "Simulation") -> Request:
     """What a request asks of lanes."""
     return request_of(_solve(run), _setting(run))
 
 
-def prepare_lanes(run: "Simulation") -> Callable[["Simulation"], Trajectory]:
+def able_request(run: "Simulation") -> Request | None:
+    """What is asked of lanes; None where XLA runs it, also for what they lack by "auto"."""
+    if run.engine != "lanes":
+        return None
+    request = lane_request(run)
+    hindered = run.replaceable and LANES.can(request) is not None
+    return None if hindered else request
+
+
+def prepare_lanes(run: "Simulation", request: Request) -> Callable[["Simulation"], Trajectory]:
     """`by_lanes`, with all compiled that it needs for one simulation.
 
     Where only the end is asked for, what JAX does around it is compiled as well.
     """
-    setting = _setting(run)
-    LANES.compile(lane_request(run)).code(1)
-    return by_lanes if setting.saved.within else _compiled
+    LANES.compile(request).code(1)
+    return by_lanes if _setting(run).saved.within else _compiled
 
 
 _compiled = cached_jit(by_lanes)
 
 
 def _step_by_step(
-    run: "Simulation", setting: Setting
+    run: "Simulation", solve: Solve, setting: Setting
 ) -> tuple[Solved, Array, State, diffrax.DenseInterpolation]:
-    ended, rows = solve_step_by_step(_solve(run), setting, most=run.max_solver_steps)
+    ended, rows = solve_step_by_step(solve, setting, most=run.max_solver_steps)
     ended = jtu.tree_map(jnp.asarray, ended)
     return ended, *recorded_steps(run.state, rows, setting.solver)
 
@@ -117,7 +121,7 @@ def _setting(run: "Simulation") -> Setting:
 
 
 def _solve(run: "Simulation") -> Solve:
-    def number(value: Any) -> Scalar:
+    def number(value: ArrayLike) -> Scalar:
         return jnp.asarray(value, dtype=jnp.float64)
 
     assert isinstance(run.scene, Scene)

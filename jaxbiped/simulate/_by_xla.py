@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-from jaxtyping import Array
+from jaxtyping import Array, PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped.dynamics._formulation import field_of
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @cached_jit
 def by_xla(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`. A trajectory saved step by step keeps its full length."""
-    controller: Any = step_control(run.rtol, run.atol, rms_norm, run.units)
+    controller: PyTree = step_control(run.rtol, run.atol, rms_norm, run.units)
     if run.dt is not None:
         controller = diffrax.ConstantStepSize()
     if run.footsteps is not None:
@@ -36,7 +36,7 @@ def by_xla(run: "Simulation") -> Trajectory:
         controller = Extremes(controller, run.extremes)
     events = ending_events(run.watch)
     zero = jnp.zeros_like(run.duration)
-    solver: Any = run.solver
+    solver: diffrax.AbstractSolver[PyTree] = run.solver
     if isinstance(run.scene, RedundantScene):
         solver = with_projection(run.scene, solver, run.adjoint)
     solution = diffrax.diffeqsolve(
@@ -56,7 +56,7 @@ def by_xla(run: "Simulation") -> Trajectory:
     )
     control, lowest, highest = solution.controller_state, None, None
     if run.extremes is not None:
-        watched: Any = control
+        watched: PyTree = control
         control, lowest, highest = watched
     return Trajectory(
         t=solution.ts,
@@ -81,7 +81,7 @@ def _saveat(run: "Simulation") -> diffrax.SaveAt:
 
 
 def _ending(
-    solution: diffrax.Solution, control: Any, names: list[Ending], run: "Simulation"
+    solution: diffrax.Solution, control: PyTree, names: list[Ending], run: "Simulation"
 ) -> Array:
     results = diffrax.RESULTS
     out_of_steps: Any = solution.result == results.max_steps_reached
@@ -92,7 +92,7 @@ def _ending(
         # Time ran out before the footsteps came, where only footsteps were asked for.
         timed_out = done & (count < run.footsteps) & (run.duration >= PATIENCE * run.footsteps)
         done = (done & ~timed_out) | (solution.result == results.event_occurred)
-    masks: Any = solution.event_mask
+    masks: PyTree = solution.event_mask
     events = dict(zip(names, masks or [], strict=True))
     return ending_code(events, done=done, out_of_steps=out_of_steps, timed_out=timed_out)
 

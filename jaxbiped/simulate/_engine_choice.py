@@ -1,10 +1,10 @@
 """Choice of the engine that runs a simulation."""
 
-from typing import Any
-
+import diffrax
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+from jaxtyping import ArrayLike, PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped.dynamics._section import AbstractSection
@@ -15,13 +15,13 @@ from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 def choose_engine(
     engine: str,
     *,
-    solver: Any,
+    solver: diffrax.AbstractSolver[PyTree],
     save_steps: bool,
-    adjoint: Any,
-    leaves: Any,
-    times: Any,
+    adjoint: diffrax.AbstractAdjoint | None,
+    leaves: PyTree,
+    times: str | ArrayLike | AbstractSection,
     section: AbstractSection | None,
-    dt: Any = None,
+    dt: ArrayLike | None = None,
     redundant: bool = False,
 ) -> str:
     """The engine that "auto" stands for, or the one that is asked for.
@@ -46,7 +46,13 @@ def choose_engine(
 
 
 def _hindrance(
-    solver: Any, save_steps: bool, adjoint: Any, leaves: Any, times: Any, *, traced: bool
+    solver: diffrax.AbstractSolver[PyTree],
+    save_steps: bool,
+    adjoint: diffrax.AbstractAdjoint | None,
+    leaves: PyTree,
+    times: str | ArrayLike | AbstractSection,
+    *,
+    traced: bool,
 ) -> str | None:
     """Why lanes cannot do what is asked."""
     if not isinstance(solver, AbstractRosenbrock):

@@ -1,6 +1,7 @@
 """Recorded steps of a solve by lanes, as a trajectory's."""
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import diffrax
 import jax
@@ -22,7 +23,7 @@ class RecordedSteps(NamedTuple):
 
 def recorded_steps(start: State, rows: np.ndarray, solver: AbstractRosenbrock) -> RecordedSteps:
     """From the records of `Saved(steps=True)`, shape (n, numbers), as diffrax would have them."""
-    kind: Any = type(start)
+    kind: Callable[..., State] = type(start)
     size = len(start)
     first = np.array([0.0, *(float(leaf) for leaf in start)])
     ends = np.vstack([first, rows[:, : 1 + size]]).T.copy()

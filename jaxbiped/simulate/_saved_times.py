@@ -1,14 +1,14 @@
 """Saved times of a simulation."""
 
-from typing import Any
-
 import jax
 import numpy as np
+from jaxtyping import ArrayLike
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._types import Scalar
 
 
-def check_times(times: Any, duration: Any) -> None:
+def check_times(times: ArrayLike, duration: Scalar | float) -> None:
     """Raises `ArgumentError` unless they increase and lie within the duration [s]."""
     if isinstance(times, jax.core.Tracer) or isinstance(duration, jax.core.Tracer):
         return

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Array, PyTree
+from jaxtyping import Array, ArrayLike, PyTree
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -19,14 +19,14 @@ from jaxbiped._checks import (
     check_type,
     check_unbatched,
 )
-from jaxbiped._types import Scalar
+from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.simulate._by_lanes import by_lanes, can_by_lanes, prepare_lanes
+from jaxbiped.simulate._by_lanes import able_request, by_lanes, prepare_lanes
 from jaxbiped.simulate._by_xla import by_xla, trim
 from jaxbiped.simulate._engine_choice import choose_engine
 from jaxbiped.simulate._saved_times import check_times
@@ -43,11 +43,11 @@ from jaxbiped.solve.controllers._footstep_limit import PATIENCE
 
 def simulate(
     scene: Scene | RedundantScene,
-    state: Any,
+    state: PyTree,
     *,
     duration: float | None = None,
     footsteps: int | None = None,
-    solver: str | diffrax.AbstractSolver = "rodas4",
+    solver: str | diffrax.AbstractSolver[PyTree] = "rodas4",
     accuracy: str = "balanced",
     rtol: float | None = None,
     atol: float | None = None,
@@ -151,7 +151,7 @@ class Simulation(eqx.Module):
     """
 
     scene: Scene | RedundantScene
-    state: Any
+    state: PyTree
     correction: Consistent | None
     duration: Scalar
     times: Array | None
@@ -159,7 +159,7 @@ class Simulation(eqx.Module):
     atol: Scalar
     units: Units
     dt: Scalar | None
-    solver: diffrax.AbstractSolver
+    solver: diffrax.AbstractSolver[PyTree]
     adjoint: diffrax.AbstractAdjoint
     footsteps: int | None = eqx.field(static=True)
     save_steps: bool = eqx.field(static=True)
@@ -174,11 +174,11 @@ class Simulation(eqx.Module):
     @staticmethod
     def prepare(
         scene: Scene | RedundantScene,
-        state: Any,
+        state: PyTree,
         *,
         duration: float | None = None,
         footsteps: int | None = None,
-        solver: str | diffrax.AbstractSolver = "rodas4",
+        solver: str | diffrax.AbstractSolver[PyTree] = "rodas4",
         accuracy: str = "balanced",
         rtol: float | None = None,
         atol: float | None = None,
@@ -224,10 +224,10 @@ class Simulation(eqx.Module):
         if isinstance(scene, RedundantScene):
             check_adjoint(scene.method, adjoint)
 
-        def cast(leaf: Any) -> Array:
+        def cast(leaf: ArrayLike) -> Array:
             return jnp.asarray(leaf, dtype=dtype)
 
-        def known(leaf: Any) -> Any:
+        def known(leaf: ArrayLike) -> Numbers:
             # As it is where nothing is traced: each array of JAX's costs 0.1 ms.
             return cast(leaf) if isinstance(leaf, jax.core.Tracer) else np.asarray(leaf, dtype)
 
@@ -271,24 +271,22 @@ class Simulation(eqx.Module):
 
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
-        return by_lanes(self) if self._lanes_can() else trim(by_xla(self))
+        request = able_request(self)
+        return trim(by_xla(self)) if request is None else by_lanes(self, request)
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
-        if self._lanes_can():
-            return CompiledSimulation(prepare_lanes(self), self)
+        request = able_request(self)
+        if request is not None:
+            return CompiledSimulation(prepare_lanes(self, request), self)
         program = by_xla.lower(self).compile()
         return CompiledSimulation(program, self)
-
-    def _lanes_can(self) -> bool:
-        """Whether lanes are to run it: not where the choice is ours and they lack an operation."""
-        return self.engine == "lanes" and (not self.replaceable or can_by_lanes(self))
 
 
 class CompiledSimulation:
     """A compiled request; call it to run."""
 
-    def __init__(self, program: Any, request: Simulation) -> None:
+    def __init__(self, program: Callable[[Simulation], Trajectory], request: Simulation) -> None:
         self._program = program
         self._request = request
 

@@ -1,13 +1,13 @@
 """Checks of how a simulation starts and steps."""
 
-from typing import Any
-
 import diffrax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_positive, check_unbatched, holds_somewhere
+from jaxbiped._types import Scalar
 from jaxbiped.constraints._independence import check_independent
 from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._consistent_state import Consistent, consistent_state
@@ -20,7 +20,7 @@ from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS
 
 
-def start_for(scene: Scene | RedundantScene, state: Any) -> tuple[Any, Consistent | None]:
+def start_for(scene: Scene | RedundantScene, state: PyTree) -> tuple[PyTree, Consistent | None]:
     """A checked start of the kind that a scene needs, and how it was put on its constraints.
 
     Raises:
@@ -39,17 +39,17 @@ def start_for(scene: Scene | RedundantScene, state: Any) -> tuple[Any, Consisten
     return correction.state, correction
 
 
-def in_own_precision(state: Any) -> Any:
+def in_own_precision(state: PyTree) -> PyTree:
     """A start with NumPy's floating-point leaves as arrays of JAX, which keep their precision."""
 
-    def kept(leaf: Any) -> Any:
+    def kept(leaf: object) -> object:
         own = isinstance(leaf, np.ndarray | np.generic) and np.issubdtype(leaf.dtype, np.floating)
         return jnp.asarray(leaf) if own else leaf
 
     return jtu.tree_map(kept, state)
 
 
-def in_one_precision(state: Any) -> Any:
+def in_one_precision(state: PyTree) -> PyTree:
     """A start with all leaves as precise as the most precise one."""
     kinds = {leaf.dtype for leaf in jtu.tree_leaves(state)}
     if len(kinds) == 1:
@@ -69,7 +69,13 @@ def check_single_scene(scene: Scene | RigidScene | RedundantScene) -> None:
             check_unbatched(f"scene.{name}", part, "one scene")
 
 
-def check_steps(solver: Any, dt: float | None, *, most_steps: int, duration: Any) -> None:
+def check_steps(
+    solver: diffrax.AbstractSolver[PyTree],
+    dt: float | None,
+    *,
+    most_steps: int,
+    duration: Scalar | float,
+) -> None:
     """Raises `ArgumentError` for steps that a solver cannot make or the cap on steps forbids."""
     if dt is None:
         if isinstance(solver, diffrax.Euler):

@@ -1,7 +1,7 @@
 """Height of a start: on the ground, or so deep in it that no contact law means it."""
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
@@ -11,7 +11,11 @@ import numpy as np
 from jaxbiped._caches import cached_jit
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._bristle_state import BristleState
+from jaxbiped.dynamics._state import State
 from jaxbiped.scene._clearance import AbstractClearance
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 _DEEPEST = 0.25
@@ -20,7 +24,7 @@ _HIGHEST = 100.0
 """Energy stored in a foot's contact, in units of m g l, from which it does."""
 
 
-def check_start_height(scene: Any, state: Any) -> None:
+def check_start_height(scene: Scene | RedundantScene, state: State | BristleState) -> None:
     """Refuses a start below the ground, where all values are known.
 
     The deepest that is allowed is l/4, and so deep that the contact stores what would throw the
@@ -57,7 +61,10 @@ def check_start_height(scene: Any, state: Any) -> None:
 
 @cached_jit
 def _contact_energies(
-    clearance: AbstractClearance, law: AbstractNormalLaw, depths: Any, rates: Any
+    clearance: AbstractClearance,
+    law: AbstractNormalLaw,
+    depths: Sequence[Scalar],
+    rates: Sequence[Scalar],
 ) -> list[Scalar]:
     """The energy in the contact of each foot, 0 where it does not touch [J]."""
 

@@ -1,15 +1,14 @@
 """Swing of a linkage in gravity."""
 
-from typing import Any
-
 import diffrax
 import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
+from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._checks import ArgumentError, check_count, check_finite, check_positive, check_type
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
 from jaxbiped.constraints._independence import check_independent
 from jaxbiped.constraints._linkage_constraints import Constraints, constraints_of
@@ -21,6 +20,7 @@ from jaxbiped.solve._accuracy import rms_norm, tolerances
 from jaxbiped.solve._projected_solver import check_adjoint, wrap_projected
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.controllers._step_control import first_step, step_control
+from jaxbiped.solve.controllers._wrapped_control import StepControl
 
 
 class Swing(eqx.Module):
@@ -47,8 +47,8 @@ def swing(
     scene: LinkageScene,
     state: LinkageState,
     *,
-    times: Any,
-    solver: str | diffrax.AbstractSolver = "rodas4",
+    times: Parameter,
+    solver: str | diffrax.AbstractSolver[PyTree] = "rodas4",
     accuracy: str = "balanced",
     rtol: float | None = None,
     atol: float | None = None,
@@ -105,11 +105,11 @@ def _solve(
     scene: LinkageScene,
     state: LinkageState,
     times: Scalar,
-    solver: Any,
-    control: Any,
-    dt: Any,
+    solver: diffrax.AbstractSolver[PyTree],
+    control: StepControl | None,
+    dt: float | None,
     most: int,
-    adjoint: Any,
+    adjoint: diffrax.AbstractAdjoint,
 ) -> Swing:
     if isinstance(scene.method, AbstractProjectingMethod):
         solver = wrap_projected(solver, _correct_step, adjoint)
@@ -129,7 +129,7 @@ def _solve(
         adjoint=adjoint,
         throw=False,
     )
-    found: Any = solution.ys
+    found: PyTree = solution.ys
     finite = jnp.isfinite(sum(leaf[-1] for leaf in jtu.tree_leaves(found)))
     return Swing(
         t=jnp.asarray(solution.ts),

@@ -2,14 +2,13 @@
 
 import enum
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
-from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._minimal_motion import accelerations
@@ -151,27 +150,27 @@ def rigid_ending(state: RigidState) -> Scalar:
     return jnp.where(jnp.isfinite(sum(state)), code, int(Ending.SOLVER_FAILED))
 
 
-def _failed(t: RealScalarLike, y: PyTree, args: PyTree, **kwargs: Any) -> Scalar:
+def _failed(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
     return ~jnp.isfinite(sum(jtu.tree_leaves(y)))
 
 
-def _fell_forward(t: RealScalarLike, y: PyTree, args: PyTree, **kwargs: Any) -> Scalar:
+def _fell_forward(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
     y = minimal_state(args, y)
     too_late, _ = is_barred(args, y)
     return too_late | (has_fallen(args, y) & (y.hip_vx >= 0.0))
 
 
-def _fell_back(t: RealScalarLike, y: PyTree, args: PyTree, **kwargs: Any) -> Scalar:
+def _fell_back(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
     y = minimal_state(args, y)
     return has_fallen(args, y) & (y.hip_vx < 0.0)
 
 
-def _stopped(t: RealScalarLike, y: PyTree, args: PyTree, **kwargs: Any) -> Scalar:
+def _stopped(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
     y = minimal_state(args, y)
     return has_stopped(args, y)
 
 
-def _stumbled(t: RealScalarLike, y: PyTree, args: PyTree, **kwargs: Any) -> Scalar:
+def _stumbled(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
     y = minimal_state(args, y)
     _, too_short = is_barred(args, y)
     return too_short | has_stumbled(args, y)

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._types import BoolScalarLike, RealScalarLike
+from jaxbiped._types import BoolScalarLike, RealScalarLike, Time
 from jaxbiped.constraints._constraint_method import (
     AbstractConstraintMethod,
     AbstractProjectingMethod,
@@ -18,7 +18,7 @@ from jaxbiped.constraints._constraint_method import (
 from jaxbiped.dynamics._consistent_state import project
 from jaxbiped.scene._redundant_scene import RedundantScene
 
-_Solver = TypeVar("_Solver", bound=diffrax.AbstractSolver)
+_Solver = TypeVar("_Solver", bound=diffrax.AbstractSolver[PyTree])
 
 _SCAN_KINDS: dict[type, str | None] = {
     diffrax.RecursiveCheckpointAdjoint: None,
@@ -41,7 +41,7 @@ def check_adjoint(
         )
 
 
-class Projected(diffrax.AbstractWrappedSolver):
+class Projected(diffrax.AbstractWrappedSolver):  # type: ignore[type-arg]
     """Wraps a solver: what a step arrives at is projected before anything else sees it.
 
     The error estimate is the solver's own. A solver that keeps a slope from its last step finds it
@@ -52,11 +52,11 @@ class Projected(diffrax.AbstractWrappedSolver):
         project: `project(args, y)`, the state on the constraints.
     """
 
-    solver: diffrax.AbstractSolver  # type: ignore[misc]
+    solver: diffrax.AbstractSolver[PyTree]  # type: ignore[misc]
     project: Callable[[PyTree, PyTree], PyTree] = eqx.field(static=True)
 
     @property
-    def term_structure(self) -> Any:
+    def term_structure(self) -> PyTree:
         """The solver's."""
         return self.solver.term_structure
 
@@ -78,21 +78,19 @@ class Projected(diffrax.AbstractWrappedSolver):
         """The solver's."""
         return self.solver.error_order(terms)
 
-    def init(
-        self, terms: Any, t0: RealScalarLike, t1: RealScalarLike, y0: PyTree, args: PyTree
-    ) -> Any:
+    def init(self, terms: Any, t0: Time, t1: Time, y0: PyTree, args: PyTree) -> Any:
         """The solver's."""
         return self.solver.init(terms, t0, t1, y0, args)
 
-    def func(self, terms: Any, t0: RealScalarLike, y0: PyTree, args: PyTree) -> PyTree:
+    def func(self, terms: Any, t0: Time, y0: PyTree, args: PyTree) -> PyTree:
         """The vector field at a point."""
         return self.solver.func(terms, t0, y0, args)
 
     def step(
         self,
         terms: Any,
-        t0: RealScalarLike,
-        t1: RealScalarLike,
+        t0: Time,
+        t1: Time,
         y0: PyTree,
         args: PyTree,
         solver_state: Any,
@@ -121,9 +119,7 @@ def wrap_projected(
 
 
 def with_projection(
-    scene: RedundantScene,
-    solver: _Solver,
-    adjoint: diffrax.AbstractAdjoint | None = None,
+    scene: RedundantScene, solver: _Solver, adjoint: diffrax.AbstractAdjoint | None = None
 ) -> _Solver:
     """The solver, wrapped where the scene's method projects after each step."""
     projects = isinstance(scene.method, AbstractProjectingMethod)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import diffrax
 import optimistix
+from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice
 from jaxbiped.solve.rosenbrock._rodas3p import Rodas3P
@@ -12,12 +13,12 @@ from jaxbiped.solve.rosenbrock._rodas4p import Rodas4P
 from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
 
 
-def _chord() -> optimistix.AbstractRootFinder:
+def _chord() -> optimistix.AbstractRootFinder[PyTree, PyTree, PyTree, PyTree]:
     # diffrax's default, VeryChord, rejects steps that converge (diffrax 0.7.2).
     return diffrax.with_stepsize_controller_tols(optimistix.Chord)()
 
 
-SOLVERS: dict[str, Callable[[], diffrax.AbstractSolver]] = {
+SOLVERS: dict[str, Callable[[], diffrax.AbstractSolver[PyTree]]] = {
     "rodas3p": Rodas3P,
     "rodas4": Rodas4,
     "rodas4p": Rodas4P,
@@ -34,7 +35,7 @@ SOLVERS: dict[str, Callable[[], diffrax.AbstractSolver]] = {
 }
 
 
-def solver_named(solver: str | diffrax.AbstractSolver) -> diffrax.AbstractSolver:
+def solver_named(solver: str | diffrax.AbstractSolver[PyTree]) -> diffrax.AbstractSolver[PyTree]:
     """The solver of that name, or the solver itself where one is given.
 
     Args:

@@ -6,7 +6,8 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Array, ArrayLike, Float, Int, PyTree
+import numpy.typing as npt
+from jaxtyping import Array, Float, Int, PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._summary import summary
@@ -56,7 +57,7 @@ class Trajectory(eqx.Module):
         """How it ended, by name; for one simulation, not a batch."""
         return Ending(int(self.ending))
 
-    def at(self, t: ArrayLike) -> State:
+    def at(self, t: npt.ArrayLike) -> State:
         """States at times `t` [s] of any shape, to the order of the solver's dense output.
 
         Under `jit`, `vmap` or derivatives, where it cannot raise, they are NaN outside of the

@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from jaxbiped._types import JsonObject
 from jaxbiped.basins._label import Label
 from jaxbiped.sweep._labelling import Labelled
 from jaxbiped.sweep.starts._starts import AbstractStarts, Batch
@@ -13,7 +14,7 @@ from jaxbiped.sweep.starts._starts import AbstractStarts, Batch
 if TYPE_CHECKING:
     import xarray
 
-FIELDS: dict[str, tuple[str, Any, str, str]] = {
+FIELDS: dict[str, tuple[str, float, str, str]] = {
     "label": ("i1", int(Label.PENDING), "", "what became of the start"),
     "gait": ("i2", -1, "", "position of the gait that it converges to"),
     "period": ("i2", 0, "footsteps", "cycle of the gait that it converges to"),
@@ -118,7 +119,7 @@ def empty_dataset(layout: Layout) -> "xarray.Dataset":
         kinds[f"start_{name}"] = ("f8", np.nan, layout.units.get(name, ""), f"the start's {name}")
     variables = {}
     for name, (dtype, nothing, unit, what) in kinds.items():
-        attributes: dict[str, Any] = {"long_name": what}
+        attributes: JsonObject = {"long_name": what}
         if unit:
             attributes["units"] = unit
         if name == "label":

@@ -1,11 +1,12 @@
 """Attractors: the metric in which a gait draws starts in, and how far that reaches."""
 
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._feet import feet
@@ -34,7 +35,7 @@ class Attractor(NamedTuple):
     period: int
     duration: float
     step_length: float
-    state: Any
+    state: PyTree
     multipliers: np.ndarray
     metric: np.ndarray
     contraction: float
@@ -87,7 +88,7 @@ def attractor_without_radius(scene: Scene | RigidScene, gait: Gait, period: int)
     )
 
 
-def section_tangents(scene: Scene | RigidScene, state: Any) -> np.ndarray:
+def section_tangents(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
     """Orthonormal directions in which the section extends at a state, shape (m, m − 1)."""
     import scipy.linalg
 
@@ -97,7 +98,7 @@ def section_tangents(scene: Scene | RigidScene, state: Any) -> np.ndarray:
     return scipy.linalg.null_space(normal[None])
 
 
-def component_scales(scene: Scene | RigidScene, state: Any) -> np.ndarray:
+def component_scales(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
     """Size of each component of a state without hip_x, shape (m,), SI units.
 
     Angles 1, velocities √(g l), rates √(g/l), the hip's height the stance foot's penetration.

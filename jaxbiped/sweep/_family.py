@@ -2,11 +2,13 @@
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._types import JsonObject
 from jaxbiped.sweep._attractor import Attractor
 from jaxbiped.sweep._broadcast import broadcast_leaves
 from jaxbiped.sweep._goals import NO_GAIT, Goals
@@ -27,7 +29,7 @@ class Family(NamedTuple):
     names: tuple[str, ...]
     table: np.ndarray
     rows: tuple[tuple[Attractor, ...], ...]
-    states: tuple[Any, ...]
+    states: tuple[PyTree, ...]
     scales: np.ndarray
 
     @property
@@ -90,7 +92,7 @@ class Family(NamedTuple):
             ) from None
         return np.asarray(places[which.reshape(-1)])
 
-    def described(self) -> list[dict[str, Any]]:
+    def described(self) -> list[JsonObject]:
         """Each row's parameters and gaits, ready for JSON."""
         return [
             {

@@ -1,14 +1,14 @@
 """Search for the gaits that starts may converge to."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._parameters import SomeScene, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._attractor import Attractor, attractor_without_radius, component_scales
@@ -25,7 +25,7 @@ def find_family(
     effort: Effort,
     *,
     parameters: Mapping[str, Sequence[float] | np.ndarray],
-    guess: Any,
+    guess: PyTree,
 ) -> Family:
     """The gait of one footstep for every combination of the parameters' values.
 
@@ -38,7 +38,7 @@ def find_family(
     spans = np.where(np.ptp(table, axis=0) > 0.0, np.ptp(table, axis=0), 1.0)
     rows: list[tuple[Attractor, ...]] = [()] * len(table)
 
-    def near(k: int) -> list[Any]:
+    def near(k: int) -> list[PyTree]:
         """The state of the nearest gait that is known."""
         known = [j for j, row in enumerate(rows) if row]
         off = [float(np.linalg.norm((table[j] - table[k]) / spans)) for j in known]
@@ -57,7 +57,7 @@ def with_gaits(
     scene: Scene | RigidScene,
     family: Family,
     effort: Effort,
-    found: Mapping[int, Sequence[tuple[int, Any]]],
+    found: Mapping[int, Sequence[tuple[int, PyTree]]],
 ) -> Family:
     """The family with more gaits in some rows, searched from these periods and states."""
     rows = list(family.rows)
@@ -75,14 +75,14 @@ def with_gaits(
     return family._replace(rows=tuple(rows))
 
 
-def scene_with(scene: Any, names: Sequence[str], values: np.ndarray) -> Any:
+def scene_with(scene: SomeScene, names: Sequence[str], values: np.ndarray) -> SomeScene:
     """The scene of one combination of parameters."""
     changed = with_parameters(scene, dict(zip(names, values, strict=True)))
     return jtu.tree_map(as_float, changed)
 
 
 def _found(
-    scene: Scene | RigidScene, guesses: Sequence[Any], period: int, effort: Effort
+    scene: Scene | RigidScene, guesses: Sequence[PyTree], period: int, effort: Effort
 ) -> tuple[Attractor, ...]:
     """The stable gait that the first successful guess leads to, or none."""
     for guess in guesses:
@@ -103,7 +103,7 @@ def _family(
     names: tuple[str, ...],
     table: np.ndarray,
     rows: tuple[tuple[Attractor, ...], ...],
-    guess: Any,
+    guess: PyTree,
 ) -> Family:
     known = [k for k, row in enumerate(rows) if row]
     states, scales = [], []

@@ -1,10 +1,12 @@
 """Following of starts until each is certain, by either engine."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
+import numpy.typing as npt
+from jaxtyping import PyTree
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import LANES, XLA, Program, Request
@@ -51,12 +53,16 @@ class Effort(NamedTuple):
 
 
 def follow_starts(
-    scene: Scene | RigidScene, states: Any, goals: Goals, periods: tuple[int, ...], effort: Effort
-) -> Outcome:
+    scene: Scene | RigidScene,
+    states: PyTree,
+    goals: Goals,
+    periods: tuple[int, ...],
+    effort: Effort,
+) -> Outcome[np.ndarray]:
     """Follows n starts; leaves of scene, states and goals are NumPy's arrays (n, …)."""
     count = len(states.hip_x)
 
-    def same(value: Any) -> np.ndarray:
+    def same(value: npt.ArrayLike) -> np.ndarray:
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
 
     common = dict(
@@ -67,7 +73,7 @@ def follow_starts(
         rtol=same(effort.rtol),
         max_attempts=same(effort.max_attempts),
     )
-    solve: Any = None
+    solve: Solve | RigidWalk | None = None
     if not scene.compliant:
         solve = RigidWalk(**common)
     else:
@@ -82,7 +88,7 @@ def follow_starts(
     program = _program(scene.compliant, effort.solver, periods, effort.engine)
     engine = LANES if effort.engine == "lanes" else XLA
     given = jtu.tree_map(np.asarray, starts)
-    outcome: Outcome = engine.run(Request(program, given, batch=True)).outputs
+    outcome: Outcome[np.ndarray] = engine.run(Request(program, given, batch=True)).outputs
     return outcome
 
 
@@ -96,7 +102,7 @@ def _program(
     return Program(loop.begin, loop.attempt, loop.finish)
 
 
-def _empty_outcome(size: int) -> Outcome:
+def _empty_outcome(size: int) -> Outcome[np.ndarray]:
     whole, real = np.zeros(0, dtype=np.int64), np.zeros(0)
     return Outcome(
         label=whole,

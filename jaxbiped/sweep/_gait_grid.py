@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
+from jaxtyping import PyTree
 
+from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
@@ -50,7 +53,7 @@ class GaitGrid:
         done = bool(self._dataset[_DONE].data[place])
         return done and (not found or self._dataset["ending"].data[place] == int(Search.FOUND))
 
-    def state(self, place: tuple[int, ...]) -> Any:
+    def state(self, place: tuple[int, ...]) -> PyTree:
         """The gait's state on the section, None where there is none."""
         if self._dataset["ending"].data[place] != int(Search.FOUND):
             return None
@@ -91,7 +94,7 @@ def open_gait_grid(
     first: Gait,
     values: Mapping[str, np.ndarray],
     units: Mapping[str, str],
-    settings: dict[str, Any],
+    settings: JsonObject,
     writer: Mapping[str, str],
     path: Path | None,
     *,
@@ -134,7 +137,7 @@ def open_gait_grid(
     return GaitGrid(dataset, state, path)
 
 
-def _note(path: Path, attributes: dict[str, Any]) -> None:
+def _note(path: Path, attributes: JsonObject) -> None:
     import zarr
 
     zarr.open_group(str(path), mode="r+", use_consolidated=False).attrs.update(attributes)
@@ -159,12 +162,12 @@ def _empty(
     return xarray.Dataset(variables, coordinates)
 
 
-def _variables(gait: Gait) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
+def _variables(gait: Gait) -> dict[str, tuple[tuple[str, ...], np.ndarray, JsonObject]]:
     """Of each variable its own dimensions, its value at a point, and its attributes."""
     found = gait.outcome is Search.FOUND
-    rows: dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]] = {}
+    rows: dict[str, tuple[tuple[str, ...], np.ndarray, JsonObject]] = {}
 
-    def add(name: str, value: Any, unit: str, *own: str) -> None:
+    def add(name: str, value: npt.ArrayLike, unit: str, *own: str) -> None:
         number = np.asarray(value, dtype=np.float64)
         rows[name] = (own, number if found else np.full_like(number, np.nan), {"units": unit})
 

@@ -3,10 +3,11 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import PyTree
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type
@@ -31,9 +32,11 @@ from jaxbiped.sweep._zarr_store import check_store
 if TYPE_CHECKING:
     import xarray
 
+AnyScene: TypeAlias = Scene | RigidScene | RedundantScene
+
 
 def gait_sweep(
-    scene: Scene | RigidScene | RedundantScene,
+    scene: AnyScene,
     over: Mapping[str, Sequence[float] | np.ndarray],
     *,
     parameters: tuple[str, ...] | None = None,
@@ -88,7 +91,7 @@ def gait_sweep(
         "options": {**options, "parameters": None if parameters is None else list(parameters)},
     }
     shape = tuple(map(len, values.values()))
-    states: dict[tuple[int, ...], Any] = {}
+    states: dict[tuple[int, ...], PyTree] = {}
     order = list(_outwards(shape, _nearest(scene, values)))
 
     def search(place: tuple[int, ...], *, again: bool) -> Gait | None:
@@ -120,7 +123,7 @@ def gait_sweep(
     return grid.dataset()
 
 
-def _find(scene: Any, near: list[Any], options: dict[str, Any], *, alone: bool) -> Gait:
+def _find(scene: AnyScene, near: list[PyTree], options: dict[str, Any], *, alone: bool) -> Gait:
     """The gait that a neighbour's leads to; the search's own where that is none or not stable."""
     best: Gait | None = None
     for state in near[:2]:
@@ -136,7 +139,9 @@ def _find(scene: Any, near: list[Any], options: dict[str, Any], *, alone: bool) 
     return best
 
 
-def _check_values(scene: Any, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
+def _check_values(
+    scene: AnyScene, over: Mapping[str, Sequence[float] | np.ndarray]
+) -> dict[str, np.ndarray]:
     if not over:
         raise ArgumentError("over = {} is not allowed: name at least one parameter.")
     values = {}
@@ -152,7 +157,7 @@ def _check_values(scene: Any, over: Mapping[str, Any]) -> dict[str, np.ndarray]:
     return values
 
 
-def _nearest(scene: Any, values: dict[str, np.ndarray]) -> tuple[int, ...]:
+def _nearest(scene: AnyScene, values: dict[str, np.ndarray]) -> tuple[int, ...]:
     """The point of the grid nearest to the scene's own parameters."""
     own = parameter_values(scene)
     return tuple(int(np.argmin(np.abs(v - float(own[name])))) for name, v in values.items())

@@ -1,7 +1,9 @@
 """Goals: gaits that starts may converge to, as numbers that a labelling loop reads."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from jaxbiped._types import Numbers
 
 NO_GAIT = -math.inf
 """Radius of a place for a gait that holds none."""
@@ -18,7 +20,7 @@ class Goals(NamedTuple):
         scales: size of each component, by which recurrences are measured; shape (m,).
     """
 
-    points: Any
-    metrics: Any
-    radii: Any
-    scales: Any
+    points: Numbers
+    metrics: Numbers
+    radii: Numbers
+    scales: Numbers

@@ -28,7 +28,7 @@ def qualified_name(thing: Any) -> str:
     return f"{module}.{thing.__qualname__}"
 
 
-def identity(value: Any) -> Any:
+def identity(value: object) -> Any:
     """What a value is, ready for JSON; equal for two values that do the same.
 
     A dataclass (so every model and law) is told by its class's qualified name, its static fields
@@ -58,7 +58,7 @@ def identity(value: Any) -> Any:
     return repr(value)
 
 
-def code_digests(*values: Any) -> dict[str, str]:
+def code_digests(*values: object) -> dict[str, str]:
     """Digest of the source of every class and function among these that is a user's own.
 
     By qualified name; "unknown" for source that cannot be read, as of an interactive session.
@@ -73,7 +73,7 @@ def code_digests(*values: Any) -> dict[str, str]:
     return dict(sorted(found.items()))
 
 
-def _telling(value: Any) -> Iterator[tuple[str, Any]]:
+def _telling(value: Any) -> Iterator[tuple[str, object]]:
     """Static fields, and parts that have such."""
     for field in dataclasses.fields(value):
         part = getattr(value, field.name)
@@ -82,7 +82,7 @@ def _telling(value: Any) -> Iterator[tuple[str, Any]]:
             yield field.name, part
 
 
-def _own_code(value: Any) -> Iterator[Any]:
+def _own_code(value: object) -> Iterator[Any]:
     if isinstance(value, list | tuple):
         for each in value:
             yield from _own_code(each)

@@ -1,7 +1,6 @@
 """Labels as a function of coordinates, as the analyses of basins ask for them."""
 
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from jaxbiped.basins._label import Label
 from jaxbiped.basins._label_oracle import LabelOf
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._coordinates import check_coordinates
-from jaxbiped.sweep.starts._starts import batch_at
+from jaxbiped.sweep.starts._starts import Completion, batch_at
 
 
 def label_at(
@@ -19,7 +18,7 @@ def label_at(
     *,
     failing: bool = False,
     place: bool = False,
-    follow: Callable[[Any, Any], Any] | None = None,
+    follow: Completion | None = None,
 ) -> LabelOf:
     """The labelling as a function of points, for the analyses in `jaxbiped.basins`.
 

@@ -7,6 +7,8 @@ import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
+import numpy.typing as npt
+from jaxtyping import PyTree
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -14,7 +16,7 @@ from jaxbiped._checks import (
     check_positive,
     check_type,
 )
-from jaxbiped._types import as_float
+from jaxbiped._types import JsonObject, as_float
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label import Label, label_names
 from jaxbiped.dynamics._bristle_state import BristleState
@@ -85,7 +87,7 @@ class Labelling(eqx.Module):
     effort: Effort = eqx.field(static=True)
 
     def __call__(
-        self, states: Any, *, parameters: Mapping[str, np.ndarray] | None = None
+        self, states: PyTree, *, parameters: Mapping[str, np.ndarray] | None = None
     ) -> Labelled:
         """Labels n starts.
 
@@ -130,7 +132,7 @@ class Labelling(eqx.Module):
             final=np.stack(outcome.final, axis=1),
         )
 
-    def base(self, parameters: Mapping[str, np.ndarray], count: int) -> Any:
+    def base(self, parameters: Mapping[str, np.ndarray], count: int) -> PyTree:
         """For n starts with these parameters, the gait's state: what they do not name themselves.
 
         Where there is no gait it is that of the nearest combination that has one.
@@ -143,9 +145,9 @@ class Labelling(eqx.Module):
         leaves = [np.array([float(leaf) for leaf in column]) for column in columns]
         return type(states[0])(*[leaf[rows] for leaf in leaves])
 
-    def settings(self) -> dict[str, Any]:
+    def settings(self) -> JsonObject:
         """Everything that the labels depend on, ready for JSON."""
-        scene: dict[str, Any] = {k: float(v) for k, v in parameter_values(self.scene).items()}
+        scene: JsonObject = {k: float(v) for k, v in parameter_values(self.scene).items()}
         effort = self.effort._asdict() | {"solver": type(self.effort.solver).__name__}
         # Both engines give the same labels; the gap follows from the tolerance.
         del effort["engine"], effort["gap"]
@@ -201,7 +203,7 @@ def effort_of(
     )
 
 
-def _check_states(scene: Scene | RigidScene, states: Any) -> Any:
+def _check_states(scene: Scene | RigidScene, states: PyTree) -> PyTree:
     kind = state_type(scene)
     if kind is BristleState and isinstance(states, State):
         straight: Any = np.zeros_like(np.asarray(states.hip_x))
@@ -216,7 +218,7 @@ def _check_states(scene: Scene | RigidScene, states: Any) -> Any:
     return kind(*leaves)
 
 
-def _column(name: str, value: Any, count: int) -> np.ndarray:
+def _column(name: str, value: npt.ArrayLike, count: int) -> np.ndarray:
     column = np.asarray(value, dtype=np.float64)
     if column.shape != (count,):
         raise ArgumentError(
@@ -226,6 +228,6 @@ def _column(name: str, value: Any, count: int) -> np.ndarray:
     return column
 
 
-def _spread(leaf: Any, count: int) -> np.ndarray:
+def _spread(leaf: npt.ArrayLike, count: int) -> np.ndarray:
     array = np.asarray(as_float(leaf))
     return array if array.shape == (count,) else broadcast_leaves(array, count)

@@ -5,14 +5,15 @@ Both engines run these same functions, so that labels do not depend on the engin
 
 import abc
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import equinox.internal as eqxi
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Parameter, Scalar
 from jaxbiped.basins._label import Label
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
@@ -31,6 +32,7 @@ from jaxbiped.sweep._convergence_test import UNDECIDED, ArrivalHistory, after_ar
 from jaxbiped.sweep._goals import Goals
 from jaxbiped.sweep._sliding import contact_places, slip_distances
 
+_Number = TypeVar("_Number")
 _SECANTS = 8
 """By which an arrival within a step is located, to rounding."""
 
@@ -45,25 +47,25 @@ class Start(NamedTuple):
         patience: longest time between two footsteps [s].
     """
 
-    solve: Any
+    solve: PyTree
     goals: Goals
-    gap: Any
-    patience: Any
+    gap: Parameter
+    patience: Parameter
 
 
-class Outcome(NamedTuple):
+class Outcome(NamedTuple, Generic[_Number]):
     """What became of one start; see `Labelled`. `final` is the last state on the section."""
 
-    label: Any
-    goal: Any
-    period: Any
-    footsteps: Any
-    time: Any
-    distance: Any
-    rate: Any
-    closest: Any
-    attempts: Any
-    final: tuple[Any, ...]
+    label: _Number
+    goal: _Number
+    period: _Number
+    footsteps: _Number
+    time: _Number
+    distance: _Number
+    rate: _Number
+    closest: _Number
+    attempts: _Number
+    final: tuple[_Number, ...]
 
 
 class Progress(NamedTuple):
@@ -76,7 +78,7 @@ class Progress(NamedTuple):
         landed: where each foot came down; see `slip_distances`. None for a rigid walker.
     """
 
-    solve: Any
+    solve: PyTree
     trace: ArrivalHistory
     strike: Scalar
     landed: tuple[Scalar, Scalar] | None
@@ -94,7 +96,7 @@ class AbstractLabellingLoop(abc.ABC):
         """One attempted step further, and whether the label is certain (boolean)."""
 
     @abc.abstractmethod
-    def finish(self, start: Start, now: Progress) -> Outcome:
+    def finish(self, start: Start, now: Progress) -> Outcome[Scalar]:
         """The label and what goes with it."""
 
 
@@ -136,7 +138,7 @@ class CompliantLabelling(AbstractLabellingLoop):
         trace = trace._replace(verdict=verdict)
         return Progress(after, trace, strike, landed), over | (verdict != UNDECIDED)
 
-    def finish(self, start: Start, now: Progress) -> Outcome:
+    def finish(self, start: Start, now: Progress) -> Outcome[Scalar]:
         solved = self.steps.finish(start.solve, now.solve)
         _, _, count = now.solve.control
         return _outcome(
@@ -148,7 +150,7 @@ class CompliantLabelling(AbstractLabellingLoop):
             attempts=solved.accepted + solved.rejected,
         )
 
-    def _traced(self, start: Start, now: Progress, after: Any) -> ArrivalHistory:
+    def _traced(self, start: Start, now: Progress, after: PyTree) -> ArrivalHistory:
         """After the last step, within which it may have arrived at mid-stance."""
         scene, last, section = start.solve.scene, after.last, MidStance()
 
@@ -183,7 +185,7 @@ class CompliantLabelling(AbstractLabellingLoop):
 def _root(value: Callable[[Scalar], Scalar], low: Scalar, high: Scalar) -> Scalar:
     """Where a function rises through zero between two times, by the Illinois method."""
 
-    def secant(_: Any, now: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+    def secant(_: Scalar, now: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
         a, b, at_a, at_b, side, _ = now
         rise = at_b - at_a
         middle = b - at_b * (b - a) / jnp.where(rise == 0.0, 1.0, rise)
@@ -234,7 +236,7 @@ class RigidLabelling(AbstractLabellingLoop):
         trace = trace._replace(verdict=verdict)
         return Progress(after, trace, strike, None), over | (verdict != UNDECIDED)
 
-    def finish(self, start: Start, now: Progress) -> Outcome:
+    def finish(self, start: Start, now: Progress) -> Outcome[Scalar]:
         walked: RigidProgress = now.solve
         return _outcome(
             now.trace,
@@ -254,7 +256,7 @@ def _outcome(
     time: Scalar,
     distance: Scalar,
     attempts: Scalar,
-) -> Outcome:
+) -> Outcome[Scalar]:
     """A failure is certain; all footsteps walked without a verdict are not."""
     kind = trace.verdict.dtype
     spent = (code == int(Label.WALKING)) | (code == int(Label.OUT_OF_STEPS))
@@ -288,10 +290,10 @@ def _trace_or(
     return trace
 
 
-def _recurring_components(state: Any) -> tuple[Scalar, ...]:
+def _recurring_components(state: PyTree) -> tuple[Scalar, ...]:
     """A state without the place along the slope, its first component."""
     return tuple(state[1:])
 
 
-def _with_leg_names(exchanged: bool, state: Any) -> Any:
+def _with_leg_names(exchanged: bool, state: PyTree) -> PyTree:
     return exchange_legs(state) if exchanged else state

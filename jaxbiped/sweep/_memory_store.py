@@ -2,10 +2,11 @@
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from jaxbiped._types import JsonObject
 from jaxbiped.sweep._array_layout import Layout, empty_dataset
 from jaxbiped.sweep._same_store import SETTINGS
 from jaxbiped.sweep._store import AbstractStore
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 class MemoryStore(AbstractStore):
     """Arrays for all results; without a disk none is ever complete beforehand."""
 
-    def __init__(self, layout: Layout, settings: dict[str, Any], attributes: Mapping[str, str]):
+    def __init__(self, layout: Layout, settings: JsonObject, attributes: Mapping[str, str]):
         self.layout = layout
         self._dataset = empty_dataset(layout)
         self._dataset.attrs = dict(attributes) | {SETTINGS: json.dumps(settings)}

@@ -5,6 +5,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._checks import ArgumentError, check_type
@@ -13,6 +14,8 @@ from jaxbiped.basins._label import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock, minimal_fatal_shock
 from jaxbiped.basins._ray_descent import Normal
 from jaxbiped.gait._return_map import return_map
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._attractor import Attractor
 from jaxbiped.sweep._find_family import scene_with
 from jaxbiped.sweep._labelling import Labelling
@@ -79,7 +82,7 @@ def nearest_failure(
     )
 
 
-def boundary_normal(scene: Any, attractor: Attractor) -> Normal:
+def boundary_normal(scene: Scene | RigidScene, attractor: Attractor) -> Normal:
     """Gradients of the distance from the gait after a few footsteps, at points (n, m).
 
     Starts on the boundary of the basin follow it towards an unstable gait, all to one place: so
@@ -113,10 +116,10 @@ def boundary_normal(scene: Any, attractor: Attractor) -> Normal:
 
 
 @cached_jit
-def _arrivals(scene: Any, kind: type, points: Any) -> Any:
+def _arrivals(scene: Scene | RigidScene, kind: type, points: Array) -> PyTree:
     """Derivatives of the next arrivals from points (n, m), these arrivals and their codes."""
 
-    def arrival(point: Any) -> tuple[Any, Any]:
+    def arrival(point: Array) -> tuple[Array, tuple[Array, Array]]:
         came = return_map(scene, kind(jnp.zeros(()), *point))
         after = jnp.stack(came.state[1:])
         return after, (after, came.code)

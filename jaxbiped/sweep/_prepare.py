@@ -1,9 +1,9 @@
 """Preparation of a labelling: its gaits found, from a start or from the starts themselves."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped.basins._arguments import check_whole
@@ -27,7 +27,7 @@ def labelling(
     scene: Scene | RigidScene,
     *,
     parameters: Mapping[str, Sequence[float] | np.ndarray] | None = None,
-    guess: Any = None,
+    guess: PyTree = None,
     footsteps: int = 30,
     accuracy: str = "fast",
     rtol: float | None = None,

@@ -6,7 +6,6 @@ import platform
 import subprocess
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 from jaxbiped._caches import bounded_cache
 from jaxbiped.sweep._identity import code_digests
@@ -18,7 +17,7 @@ DECISIVE = ("version_jaxbiped", "git_revision", "user_code")
 """Of the provenance, what decides on labels; other packages' versions change their rounding."""
 
 
-def provenance(*models: Any) -> dict[str, str]:
+def provenance(*models: object) -> dict[str, str]:
     """Versions and revision, by attribute name, and digests of a user's own code in the models."""
     found = {f"version_{name}": _version(name) for name in _PACKAGES}
     found |= {"version_python": platform.python_version(), "git_revision": _revision()}

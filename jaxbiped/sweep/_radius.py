@@ -3,9 +3,8 @@
 A start that comes within it need be followed no further.
 """
 
-from typing import Any
-
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped.basins._label import Label
 from jaxbiped.basins._spherical_points import spread_directions
@@ -59,7 +58,7 @@ def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort)
     return attractor._replace(radius=_SHARE * float(_SHELLS[good - 1]) if good else -1.0)
 
 
-def _displace(state: Any, offsets: np.ndarray) -> Any:
+def _displace(state: PyTree, offsets: np.ndarray) -> PyTree:
     leaves = [np.full(len(offsets), float(state[0]))]
     leaves += [float(leaf) + offsets[:, i] for i, leaf in enumerate(state[1:])]
     return type(state)(*leaves)

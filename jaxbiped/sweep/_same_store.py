@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._types import JsonObject
 from jaxbiped.sweep._provenance import DECISIVE
 
 SETTINGS = "settings"
@@ -18,7 +19,7 @@ _CLOSE = 1e-6
 """Relative difference of two gaits' numbers that counts as none."""
 
 
-def check_same(path: Path, settings: dict[str, Any], *, but: str = "") -> None:
+def check_same(path: Path, settings: JsonObject, *, but: str = "") -> None:
     """Raises `ArgumentError` unless a store that is there was made with these settings."""
     import zarr
 
@@ -62,7 +63,7 @@ def check_writers(path: Path, writer: Mapping[str, str], any_version: bool) -> b
     return here not in known
 
 
-def _difference(old: Any, new: Any, name: str) -> str | None:
+def _difference(old: object, new: object, name: str) -> str | None:
     """The first difference of two settings in words, None for none."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in dict.fromkeys([*new, *old]):
@@ -90,6 +91,6 @@ def _is_close(old: Any, new: Any, name: str) -> bool:
     return numbers and own and abs(old - new) <= _CLOSE * max(1e-3, abs(old))
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     text = json.dumps(value)
     return text if len(text) < 60 else f"{text[:57]}..."

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, ResourceError, failure_kind
+from jaxbiped._types import JsonObject
 from jaxbiped.sweep._array_layout import Layout, empty_dataset
 from jaxbiped.sweep._same_store import ALSO, GAITS, SETTINGS, check_same, check_writers
 from jaxbiped.sweep._store import AbstractStore
@@ -42,7 +43,7 @@ class ZarrStore(AbstractStore):
     def open(
         path: Path,
         layout: Layout,
-        settings: dict[str, Any],
+        settings: JsonObject,
         writer: Mapping[str, str],
         *,
         any_version: bool = False,
@@ -79,7 +80,7 @@ class ZarrStore(AbstractStore):
 
     @staticmethod
     def check(
-        path: Path, settings: dict[str, Any], writer: Mapping[str, str], *, any_version: bool
+        path: Path, settings: JsonObject, writer: Mapping[str, str], *, any_version: bool
     ) -> None:
         """Refuses early what `open` would refuse; gaits may be missing from these settings.
 
@@ -163,7 +164,7 @@ def unwritable(path: Path, error: OSError) -> ArgumentError | ResourceError:
 
 
 def _create(
-    path: Path, layout: Layout, settings: dict[str, Any], attributes: Mapping[str, Any]
+    path: Path, layout: Layout, settings: JsonObject, attributes: Mapping[str, str]
 ) -> None:
     """A store without results, complete in itself or not there at all.
 
@@ -191,7 +192,9 @@ def _create(
             )
             if not own:
                 array[:] = variable.values
-        done: Any = {"long_name": "whether the chunk is complete; 2 after gaits were found late"}
+        done: JsonObject = {
+            "long_name": "whether the chunk is complete; 2 after gaits were found late"
+        }
         group.create_array(
             _DONE,
             shape=(layout.chunks,),

@@ -138,7 +138,7 @@ def _differentiable(setting: Setting, structure: PyTreeDef) -> Callable[..., lis
     return run
 
 
-def _unflatten(like: State, found: Sequence[Scalar]) -> tuple[Any, ...]:
+def _unflatten(like: State, found: Sequence[Scalar]) -> tuple[PyTree, ...]:
     t, *rest = found
     size = len(like)
     return t, type(like)(*rest[:size]), *rest[size:]

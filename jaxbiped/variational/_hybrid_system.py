@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._forces import foot_forces
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
@@ -47,7 +47,7 @@ class AbstractSystem(eqx.Module):
     reset_is_symmetry: ClassVar[bool] = False
 
     @abc.abstractmethod
-    def vector_field(self, t: RealScalarLike, y: PyTree, args: PyTree) -> PyTree:
+    def vector_field(self, t: Time, y: PyTree, args: PyTree) -> PyTree:
         """Time derivative of the state, in the form that `diffrax.ODETerm` takes."""
 
     @abc.abstractmethod
@@ -78,7 +78,7 @@ class Walking(AbstractSystem):
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (State._fields.index("hip_x"),)
     reset_is_symmetry: ClassVar[bool] = True
 
-    def vector_field(self, t: RealScalarLike, y: State, args: Scene) -> State:
+    def vector_field(self, t: Time, y: State, args: Scene) -> State:
         return vector_field(t, y, args)
 
     def switches(self, args: Scene, y: State) -> tuple[Switch, ...]:
@@ -103,7 +103,7 @@ class RedundantWalking(AbstractSystem):
 
     reset_is_symmetry: ClassVar[bool] = True
 
-    def vector_field(self, t: RealScalarLike, y: LegsState, args: RedundantScene) -> LegsState:
+    def vector_field(self, t: Time, y: LegsState, args: RedundantScene) -> LegsState:
         return redundant_field(t, y, args)
 
     def switches(self, args: PyTree, y: PyTree) -> tuple[Switch, ...]:
@@ -153,7 +153,7 @@ class Rolling(AbstractSystem):
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (RigidState._fields.index("hip_x"),)
 
-    def vector_field(self, t: RealScalarLike, y: RigidState, args: RigidScene) -> RigidState:
+    def vector_field(self, t: Time, y: RigidState, args: RigidScene) -> RigidState:
         return rolling_field(t, y, args)
 
     def switches(self, args: RigidScene, y: RigidState) -> tuple[Switch, ...]:

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, VectorField
+from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.rosenbrock._linearisation import Components, split
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
@@ -26,8 +26,8 @@ from jaxbiped.variational._tangents import Seeded, Tangents, active_leaves, with
 def rosenbrock_tangents(
     tableau: RosenbrockTableau,
     field: VectorField,
-    t0: RealScalarLike,
-    t1: RealScalarLike,
+    t0: Time,
+    t1: Time,
     y0: Tangents,
     args: Seeded,
 ) -> tuple[Tangents, Tangents] | None:

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped._types import Scalar, Time
 from jaxbiped.compiler import Recording
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -23,7 +23,7 @@ def solve_to_section_by_lanes(
     sizes: Scalar,
     *,
     precision: Precision,
-    max_time: RealScalarLike,
+    max_time: Time,
     max_solver_steps: int,
     carries_parameters: Scalar | bool,
 ) -> SectionArrival:

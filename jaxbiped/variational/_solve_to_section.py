@@ -1,7 +1,7 @@
 """Solve to a section: from a state to the next arrival."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import diffrax
 import jax
@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, VectorField
+from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.solve._accuracy import Precision, rms_norm
 from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._units import units_of
@@ -83,12 +83,12 @@ class SectionArrival(NamedTuple):
 
 def solve_to_section(
     watch: Watch,
-    solver: diffrax.AbstractAdaptiveSolver,
+    solver: diffrax.AbstractAdaptiveSolver[PyTree],
     y0: PyTree,
     args: PyTree,
     *,
     precision: Precision,
-    max_time: RealScalarLike,
+    max_time: Time,
     max_solver_steps: int,
     columns_only_choose_steps: bool = False,
     save_nodes: bool = False,
@@ -106,7 +106,7 @@ def solve_to_section(
     if carries:
         one = jnp.ones((), y0.columns.dtype)
         carried = units._replace(inverse=Tangents(units.inverse, one))
-    controller: Any = step_control(precision.rtol, 1e-2 * precision.rtol, norm, carried)
+    controller = step_control(precision.rtol, 1e-2 * precision.rtol, norm, carried)
     field: VectorField = watch.field
     if carries:
         inverse = jnp.stack(jtu.tree_leaves(units.inverse))
@@ -130,9 +130,9 @@ def solve_to_section(
         max_steps=max_solver_steps,
         throw=False,
     )
-    times: Any = solution.ts
-    states: Any = solution.ys
-    landed: Any = solution.controller_state
+    times: PyTree = solution.ts
+    states: PyTree = solution.ys
+    landed: PyTree = solution.controller_state
     last = jtu.tree_map(lambda leaf: leaf[-1], states[0])
     y, time, time_columns = onto_section(watch, last, times[0][-1], args)
     peak, peak_columns = jnp.zeros(()), None
@@ -161,7 +161,7 @@ def _nodes(times: Scalar, states: PyTree, time: Scalar, y: PyTree) -> Nodes:
     return Nodes(rows[0], rows[1:], arrival, jnp.sum(jnp.isfinite(times)) - 1)
 
 
-def _plain_node(t: RealScalarLike, y: PyTree, args: PyTree) -> PyTree:
+def _plain_node(t: Time, y: PyTree, args: PyTree) -> PyTree:
     return y.state if isinstance(y, Tangents) else y
 
 

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, VectorField
+from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
@@ -92,8 +92,8 @@ class SwitchLocator(AbstractWrappedControl):
     def init(
         self,
         terms: Any,
-        t0: RealScalarLike,
-        t1: RealScalarLike,
+        t0: Time,
+        t1: Time,
         y0: PyTree,
         dt0: Scalar | None,
         args: PyTree,
@@ -111,8 +111,8 @@ class SwitchLocator(AbstractWrappedControl):
 
     def adapt_step_size(
         self,
-        t0: RealScalarLike,
-        t1: RealScalarLike,
+        t0: Time,
+        t1: Time,
         y0: PyTree,
         y1_candidate: PyTree,
         args: PyTree,
@@ -152,12 +152,7 @@ class SwitchLocator(AbstractWrappedControl):
         return keep, next_t0, next_t1, jump | landed.saltation_pending, landed, result
 
     def _crossings(
-        self,
-        span: Scalar,
-        scene: PyTree,
-        before: PyTree,
-        after: PyTree,
-        landed: SwitchLocatorState,
+        self, span: Scalar, scene: PyTree, before: PyTree, after: PyTree, landed: SwitchLocatorState
     ) -> tuple["_Crossed", Scalar]:
         """Which surfaces a step crosses, and the part of it that lies before the first."""
         watch = self.watch

@@ -15,7 +15,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
-from jaxbiped._types import BoolScalarLike, RealScalarLike, Scalar
+from jaxbiped._types import BoolScalarLike, RealScalarLike, Scalar, Time
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._projected_solver import Projected
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
@@ -34,12 +34,12 @@ class VariationalField(eqx.Module):
 
     field: Callable[..., PyTree]
 
-    def __call__(self, t: RealScalarLike, y: Tangents, args: Seeded) -> Tangents:
+    def __call__(self, t: Time, y: Tangents, args: Seeded) -> Tangents:
         rate, columns = along_columns(lambda s, a: self.field(t, s, a), y, args)
         return Tangents(rate, as_columns(columns))
 
 
-class TangentSolver(diffrax.AbstractAdaptiveSolver):
+class TangentSolver(diffrax.AbstractAdaptiveSolver):  # type: ignore[type-arg]
     """Steps a state and its columns: the columns by the exact derivative of the solver's step.
 
     They share the step's Jacobian and factorisation. Their error estimate is the derivative of
@@ -53,7 +53,7 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
     """
 
     watch: Watch
-    solver: diffrax.AbstractAdaptiveSolver
+    solver: diffrax.AbstractAdaptiveSolver[PyTree]
     columns_only_choose_steps: bool = eqx.field(static=True, default=False)
     term_structure: ClassVar = diffrax.AbstractTerm
     interpolation_cls: ClassVar[type[diffrax.LocalLinearInterpolation]] = (
@@ -68,21 +68,19 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):
         """Order of the solver's error estimate."""
         return self.solver.error_order(terms)
 
-    def init(
-        self, terms: Any, t0: RealScalarLike, t1: RealScalarLike, y0: Tangents, args: Seeded
-    ) -> None:
+    def init(self, terms: Any, t0: Time, t1: Time, y0: Tangents, args: Seeded) -> None:
         """Nothing is carried from step to step."""
         return None
 
-    def func(self, terms: Any, t0: RealScalarLike, y0: Tangents, args: Seeded) -> Tangents:
+    def func(self, terms: Any, t0: Time, y0: Tangents, args: Seeded) -> Tangents:
         """The vector field at a point."""
         return terms.vf(t0, y0, args)
 
     def step(
         self,
         terms: Any,
-        t0: RealScalarLike,
-        t1: RealScalarLike,
+        t0: Time,
+        t1: Time,
         y0: Tangents,
         args: Seeded,
         solver_state: None,
@@ -122,7 +120,7 @@ def _apply_saltation(
 
 
 def _plain_step(
-    solver: TangentSolver, t0: RealScalarLike, t1: RealScalarLike, state: PyTree, args: PyTree
+    solver: TangentSolver, t0: Time, t1: Time, state: PyTree, args: PyTree
 ) -> tuple[PyTree, PyTree]:
     term = diffrax.ODETerm(solver.watch.field)
     y1, error, *_ = solver.solver.step(term, t0, t1, state, args, None, False)
@@ -131,11 +129,11 @@ def _plain_step(
 
 @cached_jit  # for its trace cache
 def _tangent_step(
-    solver: TangentSolver, t0: RealScalarLike, t1: RealScalarLike, y0: Tangents, args: Seeded
+    solver: TangentSolver, t0: Time, t1: Time, y0: Tangents, args: Seeded
 ) -> tuple[Tangents, Tangents]:
     inner = solver.solver
     if isinstance(inner, Projected):
-        adaptive = cast(diffrax.AbstractAdaptiveSolver, inner.solver)
+        adaptive = cast(diffrax.AbstractAdaptiveSolver[PyTree], inner.solver)
         bare = TangentSolver(solver.watch, adaptive, solver.columns_only_choose_steps)
         stepped, errors = _tangent_step(bare, t0, t1, y0, args)
         state, columns = along_columns(lambda s, a: inner.project(a, s), stepped, args)
@@ -166,14 +164,14 @@ class TangentControl(AbstractWrappedControl):
     tangent_rtol: RealScalarLike
     inverse_units: Scalar
 
-    def init(self, *request: Any) -> Any:
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
         """The first step's end and the controller's state, as diffrax asks."""
         return self.controller.init(*request)
 
     def adapt_step_size(
         self,
-        t0: RealScalarLike,
-        t1: RealScalarLike,
+        t0: Time,
+        t1: Time,
         y0: Tangents,
         y1_candidate: Tangents,
         args: Seeded,

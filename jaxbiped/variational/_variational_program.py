@@ -65,7 +65,7 @@ class AdaptiveColumns:
         once = {name: jax.jit(function) for name, function in whole if function is not None}
         self.watch = dataclasses.replace(watch, **once)
         self.save_nodes = save_nodes
-        self.term: diffrax.ODETerm = diffrax.ODETerm(watch.field)
+        self.term: diffrax.ODETerm[PyTree] = diffrax.ODETerm(watch.field)
 
     def program(self) -> Program:
         """The program."""

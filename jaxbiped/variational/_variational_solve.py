@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
-from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped._types import RealScalarLike, Scalar, Time
 from jaxbiped.compiler import LANES, Program, Recording, Request
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._final_step import just_before_end
@@ -27,7 +27,7 @@ def solve_variational(
     sizes: Scalar,
     *,
     precision: Precision,
-    max_time: RealScalarLike,
+    max_time: Time,
     max_solver_steps: int,
     carries_parameters: Scalar | bool = True,
     save_nodes: bool = False,

@@ -1,9 +1,8 @@
 """LLVM function builder: instructions, memory and vectors as text."""
 
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
 
 from jaxbiped.compiler.ir._graph import Kind
 
@@ -11,7 +10,7 @@ _SHORT = {Kind.F64: "f64", Kind.F32: "f32", Kind.I64: "i64", Kind.I32: "i32", Ki
 BYTES = {Kind.F64: 8, Kind.F32: 4, Kind.I64: 8, Kind.I32: 4, Kind.BOOL: 1}
 
 
-def literal(number: Any, kind: Kind) -> str:
+def literal(number: float, kind: Kind) -> str:
     """A number as LLVM writes it."""
     if kind.is_float:
         return f"0x{struct.unpack('<Q', struct.pack('<d', number))[0]:016X}"
@@ -37,7 +36,7 @@ class FunctionBuilder:
         self.allocations: list[str] = []
         self.declarations: set[str] = set()
         self.label = "entry"
-        self._scopes: list[dict[Any, str]] = [{}]
+        self._scopes: list[dict[Hashable, str]] = [{}]
         self._count = 0
 
     def fresh(self, stem: str = "v") -> str:
@@ -127,7 +126,7 @@ class FunctionBuilder:
         given = ", ".join(f"{t} {o}" for t, o in zip(types[1:], operands, strict=True))
         return self.assign(f"call {types[0]} @{name}({given})")
 
-    def cached(self, key: Any, make: Callable[[], str]) -> str:
+    def cached(self, key: Hashable, make: Callable[[], str]) -> str:
         """What was made for a key in a scope around this place, or what is made now."""
         for scope in self._scopes:
             if key in scope:

@@ -3,28 +3,43 @@
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
 from jaxbiped.compiler.ir._elementwise_primitives import ELEMENTWISE, Array, array_of, elementwise
 from jaxbiped.compiler.ir._graph import Block
 
+_Axes: TypeAlias = tuple[Sequence[int], Sequence[int]]
+DotDimensions: TypeAlias = tuple[_Axes, _Axes]
+"""Axes of either array that `dot_general` sums over, and those of its batch."""
 
-def _broadcast(a: Array, *, shape: Any, broadcast_dimensions: Any, **_: Any) -> Array:
+
+def _broadcast(
+    a: Array, *, shape: tuple[int, ...], broadcast_dimensions: Sequence[int], **_: object
+) -> Array:
     places = [1] * len(shape)
     for size, axis in zip(a.shape, broadcast_dimensions, strict=True):
         places[axis] = size
     return np.broadcast_to(a.reshape(places), shape)
 
 
-def _slice(a: Array, *, start_indices: Any, limit_indices: Any, strides: Any, **_: Any) -> Array:
+def _slice(
+    a: Array,
+    *,
+    start_indices: Sequence[int],
+    limit_indices: Sequence[int],
+    strides: Sequence[int] | None,
+    **_: object,
+) -> Array:
     steps = strides or [1] * a.ndim
     parts = zip(start_indices, limit_indices, steps, strict=True)
     return a[tuple(slice(*part) for part in parts)]
 
 
-def _pad(a: Array, filler: Array, *, padding_config: Any, **_: Any) -> Array:
+def _pad(
+    a: Array, filler: Array, *, padding_config: Sequence[tuple[int, int, int]], **_: object
+) -> Array:
     """Filled up before, behind and between the entries; cut off where the filling is negative."""
     for axis, (before, behind, between) in enumerate(padding_config):
         size = (a.shape[axis] - 1) * (between + 1) + 1 if a.shape[axis] else 0
@@ -38,7 +53,7 @@ def _pad(a: Array, filler: Array, *, padding_config: Any, **_: Any) -> Array:
     return a
 
 
-def _concatenate(*arrays: Array, dimension: int, **_: Any) -> Array:
+def _concatenate(*arrays: Array, dimension: int, **_: object) -> Array:
     return np.concatenate(arrays, axis=dimension)
 
 
@@ -77,11 +92,13 @@ def reduce(block: Block, name: str, a: Array, axes: Sequence[int]) -> Array:
     return total
 
 
-def product(block: Block, a: Array, b: Array, *, dimension_numbers: Any, **_: Any) -> Array:
+def product(
+    block: Block, a: Array, b: Array, *, dimension_numbers: DotDimensions, **_: object
+) -> Array:
     """`dot_general`, every sum written out."""
     (a_summed, b_summed), (a_batch, b_batch) = dimension_numbers
 
-    def ordered(array: Array, first: Any, last: Any) -> tuple[Array, list[int]]:
+    def ordered(array: Array, first: Sequence[int], last: Sequence[int]) -> tuple[Array, list[int]]:
         free = [axis for axis in range(array.ndim) if axis not in (*first, *last)]
         sizes = [array.shape[axis] for axis in free]
         moved = np.transpose(array, (*first, *free, *last))

@@ -1,10 +1,12 @@
 """Elementwise primitives of JAX, as operations of a graph."""
 
+import enum
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from jaxbiped.compiler.ir import _elementary_functions as elementary
 from jaxbiped.compiler.ir import _powers as powers
@@ -12,7 +14,7 @@ from jaxbiped.compiler.ir._graph import Block, Kind, Value
 
 Array: TypeAlias = np.ndarray
 """An array of values, dtype object."""
-Rule: TypeAlias = Callable[..., Any]
+Rule: TypeAlias = Callable[..., Value]
 
 KINDS = {
     np.dtype("float64"): Kind.F64,
@@ -44,7 +46,7 @@ def _arithmetic(float_op: str, int_op: str) -> Rule:
 
 
 def _comparison(float_name: str, int_name: str) -> Rule:
-    def rule(block: Block, a: Value, b: Value, **_: Any) -> Value:
+    def rule(block: Block, a: Value, b: Value, **_: object) -> Value:
         if a.kind is Kind.BOOL:
             different = block.add("xor", a, b)
             return different if int_name == "ne" else block.add("not", different)
@@ -57,7 +59,7 @@ def _comparison(float_name: str, int_name: str) -> Rule:
 def _extreme(float_how: str, int_how: str) -> Rule:
     """Of two; NaN where either is."""
 
-    def rule(block: Block, a: Value, b: Value, **_: Any) -> Value:
+    def rule(block: Block, a: Value, b: Value, **_: object) -> Value:
         if a.kind is Kind.BOOL:
             return block.add("or" if int_how == "sgt" else "and", a, b)
         if not a.kind.is_float:
@@ -78,20 +80,20 @@ def _logical(op: str) -> Rule:
     return lambda block, a, b, **_: block.add(op, a, b)
 
 
-def _negative(block: Block, a: Value, **_: Any) -> Value:
+def _negative(block: Block, a: Value, **_: object) -> Value:
     if a.kind.is_float:
         return block.add("fneg", a)
     return block.add("sub", block.const(0, a.kind), a)
 
 
-def _size(block: Block, a: Value, **_: Any) -> Value:
+def _size(block: Block, a: Value, **_: object) -> Value:
     if a.kind.is_float:
         return block.add("fabs", a)
     below = block.add("icmp slt", a, block.const(0, a.kind), kind=Kind.BOOL)
     return block.add("select", below, _negative(block, a), a, kind=a.kind)
 
 
-def _sign(block: Block, a: Value, **_: Any) -> Value:
+def _sign(block: Block, a: Value, **_: object) -> Value:
     if not a.kind.is_float:
         raise NotImplementedError
     zero = block.const(0.0, a.kind)
@@ -101,7 +103,7 @@ def _sign(block: Block, a: Value, **_: Any) -> Value:
     return block.add("select", up, block.const(1.0, a.kind), negative, kind=a.kind)
 
 
-def _round(block: Block, a: Value, *, rounding_method: Any, **_: Any) -> Value:
+def _round(block: Block, a: Value, *, rounding_method: enum.IntEnum, **_: object) -> Value:
     if int(rounding_method) != 1:  # to the nearest, ties to even
         raise NotImplementedError
     return block.add("rint", a)
@@ -111,18 +113,18 @@ def _direct(op: str) -> Rule:
     return lambda block, a, **_: block.add(op, a)
 
 
-def _invert(block: Block, a: Value, **_: Any) -> Value:
+def _invert(block: Block, a: Value, **_: object) -> Value:
     if a.kind is Kind.BOOL:
         return block.add("not", a)
     return block.add("xor", a, block.const(-1, a.kind))
 
 
-def _is_finite(block: Block, a: Value, **_: Any) -> Value:
+def _is_finite(block: Block, a: Value, **_: object) -> Value:
     size = block.add("fabs", a)
     return block.add("fcmp olt", size, block.const(math.inf, a.kind), kind=Kind.BOOL)
 
 
-def _whole_power(block: Block, a: Value, *, y: int, **_: Any) -> Value:
+def _whole_power(block: Block, a: Value, *, y: int, **_: object) -> Value:
     multiply = "fmul" if a.kind.is_float else "mul"
     result, base, left = None, a, abs(y)
     while left:
@@ -136,7 +138,7 @@ def _whole_power(block: Block, a: Value, *, y: int, **_: Any) -> Value:
     return result if y >= 0 else block.add("fdiv", one, result)
 
 
-def _square(block: Block, a: Value, **_: Any) -> Value:
+def _square(block: Block, a: Value, **_: object) -> Value:
     return block.add("fmul" if a.kind.is_float else "mul", a, a)
 
 
@@ -158,7 +160,7 @@ def convert(block: Block, a: Value, kind: Kind) -> Value:
     return block.add("to_float" if kind.is_float else "resize_int", a, kind=kind)
 
 
-def _divide(block: Block, a: Value, b: Value, **_: Any) -> Value:
+def _divide(block: Block, a: Value, b: Value, **_: object) -> Value:
     """By the reciprocal, which other divisions by the same number share."""
     if not a.kind.is_float:
         raise NotImplementedError
@@ -167,11 +169,11 @@ def _divide(block: Block, a: Value, b: Value, **_: Any) -> Value:
     return block.add("fmul", a, block.add("fdiv", block.const(1.0, a.kind), b))
 
 
-def _convert(block: Block, a: Value, *, new_dtype: Any, **_: Any) -> Value:
+def _convert(block: Block, a: Value, *, new_dtype: npt.DTypeLike, **_: object) -> Value:
     return convert(block, a, KINDS[np.dtype(new_dtype)])
 
 
-def _select(block: Block, which: Value, *cases: Value, **_: Any) -> Value:
+def _select(block: Block, which: Value, *cases: Value, **_: object) -> Value:
     if len(cases) != 2:
         raise NotImplementedError
     return block.add(
@@ -179,13 +181,13 @@ def _select(block: Block, which: Value, *cases: Value, **_: Any) -> Value:
     )
 
 
-def _clamp(block: Block, low: Value, a: Value, high: Value, **_: Any) -> Value:
+def _clamp(block: Block, low: Value, a: Value, high: Value, **_: object) -> Value:
     above = ELEMENTWISE["max"](block, a, low)
     return ELEMENTWISE["min"](block, above, high)
 
 
 def _elementary(function: Callable[..., Value]) -> Rule:
-    def rule(block: Block, *args: Value, **_: Any) -> Value:
+    def rule(block: Block, *args: Value, **_: object) -> Value:
         kind = args[0].kind
         wide = [convert(block, a, Kind.F64) for a in args]
 
@@ -199,14 +201,14 @@ def _elementary(function: Callable[..., Value]) -> Rule:
     return rule
 
 
-def _logarithm(block: Block, a: Value, **_: Any) -> Value:
+def _logarithm(block: Block, a: Value, **_: object) -> Value:
     found: Value = _elementary(elementary.logarithm)(block, a)
     if a.kind is Kind.F64 and found.constant is None:
         found.logarithm_of = a
     return found
 
 
-def _exponential(block: Block, a: Value, **_: Any) -> Value:
+def _exponential(block: Block, a: Value, **_: object) -> Value:
     """Of y log x it is a power, and of that three halves are the usual ones: Hertz's."""
     if a.op == "fmul":
         for y, logarithm in (a.args, a.args[::-1]):
@@ -215,7 +217,7 @@ def _exponential(block: Block, a: Value, **_: Any) -> Value:
     return _elementary(elementary.exponential)(block, a)
 
 
-def _same(block: Block, a: Value, **_: Any) -> Value:
+def _same(block: Block, a: Value, **_: object) -> Value:
     return a
 
 

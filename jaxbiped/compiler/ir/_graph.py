@@ -5,9 +5,12 @@ import itertools
 import math
 import operator
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+
+Argument: TypeAlias = Any
+"""Of an operation: a value; of a constant its number, of a region also blocks and tuples."""
 
 
 class Kind(enum.Enum):
@@ -42,13 +45,13 @@ class Value:
 
     __slots__ = ("args", "block", "kind", "logarithm_of", "number", "op")
 
-    def __init__(self, op: str, args: tuple[Any, ...], kind: Kind, block: "Block") -> None:
+    def __init__(self, op: str, args: tuple[Argument, ...], kind: Kind, block: "Block") -> None:
         self.op, self.args, self.kind, self.block = op, args, kind, block
         self.number = next(_NUMBER)
         self.logarithm_of: Value | None = None
 
     @property
-    def constant(self) -> Any:
+    def constant(self) -> float | None:
         """The number that it always is, or None."""
         return self.args[0] if self.op == "const" else None
 
@@ -69,17 +72,18 @@ class Block:
     ) -> None:
         self.parent, self.invariant, self.loop = parent, invariant, loop
         self.values: list[Value] = []
-        self._known: dict[tuple[Any, ...], Value] = {}
+        self._known: dict[tuple[Argument, ...], Value] = {}
 
     def lineage(self) -> "list[Block]":
         """This block, the one around it, and so on."""
-        blocks, block = [], self
+        blocks: list[Block] = []
+        block: Block | None = self
         while block is not None:
             blocks.append(block)
-            block = block.parent  # type: ignore[assignment]
+            block = block.parent
         return blocks
 
-    def const(self, number: Any, kind: Kind) -> Value:
+    def const(self, number: float, kind: Kind) -> Value:
         """A number."""
         number = bool(number) if kind is Kind.BOOL else number
         number = float(number) if kind.is_float else int(number)
@@ -89,7 +93,7 @@ class Block:
         key = np.float64(number).tobytes() if kind.is_float else number
         return self._root()._keep(("const", kind, key), "const", (number,), kind)
 
-    def add(self, op: str, *args: Any, kind: Kind | None = None) -> Value:
+    def add(self, op: str, *args: Argument, kind: Kind | None = None) -> Value:
         """The value of an operation: an equal one that is known already, or a new one."""
         result = kind if kind is not None else args[0].kind
         folded = _fold(self, op, args, result)
@@ -105,7 +109,7 @@ class Block:
                 return known
         return self.home(args)._keep(key, op, args, result)
 
-    def home(self, args: Sequence[Any]) -> "Block":
+    def home(self, args: Sequence[Argument]) -> "Block":
         """Where to compute what depends on these alone."""
         values = [a for a in args if isinstance(a, Value)]
         if values and all(v.block.invariant or v.op == "const" for v in values):
@@ -124,7 +128,7 @@ class Block:
         home._known[key] = make(home)
         return home._known[key]
 
-    def region(self, op: str, args: tuple[Any, ...], kinds: list[Kind]) -> list[Value]:
+    def region(self, op: str, args: tuple[Argument, ...], kinds: list[Kind]) -> list[Value]:
         """An operation of several results, never shared with another."""
         head = Value(op, args, Kind.BOOL, self)
         self.values.append(head)
@@ -132,7 +136,9 @@ class Block:
         self.values.extend(results)
         return results
 
-    def _keep(self, key: tuple[Any, ...], op: str, args: tuple[Any, ...], kind: Kind) -> Value:
+    def _keep(
+        self, key: tuple[Argument, ...], op: str, args: tuple[Argument, ...], kind: Kind
+    ) -> Value:
         found = self._known.get(key)
         if found is None:
             found = Value(op, args, kind, self)
@@ -155,7 +161,7 @@ def _ieee(function: Callable[..., float]) -> Callable[..., float]:
     return apply
 
 
-_NUMBERS: dict[str, Callable[..., Any]] = {
+_NUMBERS: dict[str, Callable[..., float]] = {
     "fadd": _ieee(operator.add),
     "fsub": _ieee(operator.sub),
     "fmul": _ieee(operator.mul),
@@ -169,7 +175,7 @@ _NUMBERS: dict[str, Callable[..., Any]] = {
 }
 
 
-def _fold(block: Block, op: str, args: tuple[Any, ...], kind: Kind) -> Value | None:
+def _fold(block: Block, op: str, args: tuple[Argument, ...], kind: Kind) -> Value | None:
     """What an operation comes to where its arguments are numbers, or do nothing."""
     constants = [a.constant if isinstance(a, Value) else None for a in args]
     known = bool(constants) and all(c is not None for c in constants)
@@ -191,7 +197,7 @@ def _fold(block: Block, op: str, args: tuple[Any, ...], kind: Kind) -> Value | N
 
 
 def _fold_float(
-    block: Block, op: str, args: tuple[Any, ...], constants: list[Any], kind: Kind
+    block: Block, op: str, args: tuple[Argument, ...], constants: list[float | None], kind: Kind
 ) -> Value | None:
     first, second = constants
     if op == "fadd" and 0.0 in (first, second):
@@ -217,7 +223,7 @@ def _fold_float(
     return None
 
 
-def _strip_signs(block: Block, op: str, args: tuple[Any, ...]) -> Value | None:
+def _strip_signs(block: Block, op: str, args: tuple[Argument, ...]) -> Value | None:
     """Changes of sign moved out of an operation, where a sum or difference absorbs them."""
     a, b = args
     negated = [value.op == "fneg" for value in args]
@@ -238,7 +244,9 @@ def _strip_signs(block: Block, op: str, args: tuple[Any, ...]) -> Value | None:
     return block.add("fneg", block.add("fadd", x, b))
 
 
-def _fold_boolean(op: str, args: tuple[Any, ...], constants: list[Any]) -> Value | None:
+def _fold_boolean(
+    op: str, args: tuple[Argument, ...], constants: list[float | None]
+) -> Value | None:
     if args[0] is args[1]:
         return args[0]
     for constant, other in zip(constants, reversed(args), strict=True):

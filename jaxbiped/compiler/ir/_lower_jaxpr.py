@@ -4,11 +4,13 @@ Arrays disappear here: each entry becomes a value of its own, which a lane can k
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias, TypeGuard
 
 import numpy as np
-from jax.extend.core import Literal
+import numpy.typing as npt
+from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal, Var
 
+from jaxbiped._types import Numbers
 from jaxbiped.compiler.ir._array_primitives import MOVES, REDUCTIONS, product, reduce
 from jaxbiped.compiler.ir._elementwise_primitives import (
     ELEMENTWISE,
@@ -34,25 +36,27 @@ _INLINED = {
 _LONGEST_UNROLLED, _LARGEST_UNROLLED = 4, 2000
 """Loops over arrays of up to this length are written out, and up to so many equations in all."""
 
+Atom: TypeAlias = Var | Literal
+
 
 class UnknownPrimitiveError(NotImplementedError):
     """A JAX operation that the lane engine cannot express."""
 
 
 def lower_jaxpr(
-    block: Block, jaxpr: Any, consts: Sequence[Any], args: Sequence[Array]
+    block: Block, jaxpr: Jaxpr, consts: Sequence[Numbers], args: Sequence[Array]
 ) -> list[Array]:
     """Adds a jaxpr's operations to a block; the arrays of its results.
 
     Raises:
         UnknownPrimitiveError: it holds an operation that lanes do not have.
     """
-    known: dict[Any, Array] = {}
+    known: dict[Var, Array] = {}
     for variable, const in zip(jaxpr.constvars, consts, strict=True):
         known[variable] = const if _is_array(const) else _constant(block, const)
     known.update(zip(jaxpr.invars, args, strict=True))
 
-    def read(atom: Any) -> Array:
+    def read(atom: Atom) -> Array:
         if isinstance(atom, Literal):
             return _constant(block, np.asarray(atom.val, dtype=_dtype(atom)))
         return known[atom]
@@ -73,7 +77,7 @@ def lower_jaxpr(
     return [read(atom) for atom in jaxpr.outvars]
 
 
-def _dtype(atom: Any) -> Any:
+def _dtype(atom: Any) -> np.dtype:
     return atom.aval.dtype
 
 
@@ -81,17 +85,17 @@ def _shape(atom: Any) -> tuple[int, ...]:
     return tuple(atom.aval.shape)
 
 
-def _is_array(value: Any) -> bool:
+def _is_array(value: object) -> TypeGuard[Array]:
     return isinstance(value, np.ndarray) and value.dtype == object
 
 
-def _constant(block: Block, value: Any) -> Array:
+def _constant(block: Block, value: npt.ArrayLike) -> Array:
     numbers = np.asarray(value)
     kind = KINDS[numbers.dtype]
     return array_of([block.const(x, kind) for x in numbers.ravel()], numbers.shape)
 
 
-def inner_jaxpr(equation: Any) -> tuple[Any, Sequence[Any]] | None:
+def inner_jaxpr(equation: JaxprEqn) -> tuple[Jaxpr, Sequence[Numbers]] | None:
     """The jaxpr and the constants of what an equation only calls; None for any other."""
     name = _INLINED.get(equation.primitive.name)
     if name is None:
@@ -100,7 +104,7 @@ def inner_jaxpr(equation: Any) -> tuple[Any, Sequence[Any]] | None:
     return (inner.jaxpr, inner.consts) if hasattr(inner, "jaxpr") else (inner, [])
 
 
-def _apply(block: Block, equation: Any, inputs: list[Array]) -> list[Array]:
+def _apply(block: Block, equation: JaxprEqn, inputs: list[Array]) -> list[Array]:
     name, params = equation.primitive.name, equation.params
     inner = inner_jaxpr(equation)
     if inner is not None:
@@ -135,7 +139,7 @@ def _apply(block: Block, equation: Any, inputs: list[Array]) -> list[Array]:
     raise NotImplementedError
 
 
-def _branches(block: Block, branches: Any, inputs: list[Array]) -> list[Array]:
+def _branches(block: Block, branches: Sequence[ClosedJaxpr], inputs: list[Array]) -> list[Array]:
     """A conditional: each branch runs where any lane takes it."""
     which, operands = inputs[0].item(), inputs[1:]
     if which.constant is not None:
@@ -164,7 +168,7 @@ def _is(block: Block, which: Value, number: int, count: int) -> Value:
 
 
 def _conditional(
-    block: Block, here: Value, branch: Any, operands: list[Array], otherwise: list[Array]
+    block: Block, here: Value, branch: ClosedJaxpr, operands: list[Array], otherwise: list[Array]
 ) -> list[Array]:
     inside = Block(block)
     found = lower_jaxpr(inside, branch.jaxpr, branch.consts, operands)
@@ -183,7 +187,7 @@ def _reshape(values: Sequence[Value], like: list[Array]) -> list[Array]:
     return arrays
 
 
-def _scan(block: Block, params: Any, inputs: list[Array]) -> list[Array]:
+def _scan(block: Block, params: dict[str, Any], inputs: list[Array]) -> list[Array]:
     jaxpr, length = params["jaxpr"], params["length"]
     constants, carried = params["num_consts"], params["num_carry"]
     fixed, carry = inputs[:constants], inputs[constants : constants + carried]
@@ -211,14 +215,14 @@ def _scan(block: Block, params: Any, inputs: list[Array]) -> list[Array]:
     return [*carry, *(np.stack(column) for column in collected)]
 
 
-def _size(jaxpr: Any) -> int:
+def _size(jaxpr: Jaxpr) -> int:
     """How many equations a jaxpr has, with those inside of calls."""
     inner = [inner_jaxpr(equation) for equation in jaxpr.eqns]
     return sum(1 if each is None else _size(each[0]) for each in inner)
 
 
 def _repeat(
-    block: Block, jaxpr: Any, fixed: list[Array], carry: list[Array], length: int
+    block: Block, jaxpr: ClosedJaxpr, fixed: list[Array], carry: list[Array], length: int
 ) -> list[Array]:
     inside = Block(block, loop=True)
     starts = [v for array in carry for v in array.ravel()]
@@ -233,7 +237,7 @@ def _repeat(
 
 
 def _map(
-    block: Block, jaxpr: Any, fixed: list[Array], items: list[Array], length: int
+    block: Block, jaxpr: ClosedJaxpr, fixed: list[Array], items: list[Array], length: int
 ) -> list[Array]:
     """One run of the body for each entry along the leading axes, kept apart in memory."""
     inside = Block(block, loop=True)

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterable
-from typing import Any
 
 from jaxbiped.compiler.ir._graph import Value
 
@@ -64,7 +63,7 @@ def sources_of(value: Value) -> Iterable[Value]:
     if value.op != "part":
         return [a for a in value.args if isinstance(a, Value)]
     head, place = value.args
-    sources: list[Any] = [head]
+    sources: list[Value] = [head]
     if head.op == "if":
         sources += [head.args[2][place], head.args[3][place]]
     elif head.op == "map":

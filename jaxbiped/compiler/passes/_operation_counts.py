@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -17,7 +16,7 @@ _NO_WORK = ("input", "const", "part", "held", "taken")
 
 
 def count_operations(
-    function: Callable[[PyTree, PyTree], Any], varying: PyTree, invariant: PyTree
+    function: Callable[[PyTree, PyTree], PyTree], varying: PyTree, invariant: PyTree
 ) -> dict[str, int]:
     """Operations of `function(varying, invariant)` by name, most frequent first.
 

@@ -8,16 +8,17 @@ there were, wherever it is (Griewank and Walther, Evaluating Derivatives, chapte
 
 import heapq
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
-from jax.extend.core import Literal
+from jax.extend.core import Jaxpr, Literal, Var
+from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Numbers, Scalar
 from jaxbiped.compiler.ir._lower_jaxpr import inner_jaxpr
 
-Weight = Any
+Weight: TypeAlias = float | Scalar
 """Of an edge: a traced scalar, or a plain number."""
 _PASSED_ON = ("copy", "copy_p", "convert_element_type", "optimization_barrier", "neg")
 
@@ -35,7 +36,7 @@ def jacobian(function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[
     return jnp.stack([jnp.stack([jnp.asarray(w, dtype=float) for w in row]) for row in rows])
 
 
-def _eliminate_all(pushed: Callable[..., Any], inputs: list[Scalar]) -> list[list[Weight]]:
+def _eliminate_all(pushed: Callable[..., PyTree], inputs: list[Scalar]) -> list[list[Weight]]:
     closed = jax.make_jaxpr(pushed)(inputs)
     graph = _Graph(len(inputs))
     ends = _linear(graph, closed.jaxpr, closed.consts, list(range(len(inputs))))
@@ -58,8 +59,12 @@ _ZERO = _Zero()
 class _Known:
     """A value that does not depend on the inputs' tangents."""
 
-    def __init__(self, value: Any) -> None:
+    def __init__(self, value: Numbers) -> None:
         self.value = value
+
+
+_Operand: TypeAlias = int | _Known | _Zero
+"""A vertex by its number, or what depends on none."""
 
 
 class _Graph:
@@ -71,7 +76,7 @@ class _Graph:
         self.out_of: list[dict[int, Weight]] = [{} for _ in range(inputs)]
         self.outputs: set[int] = set()
 
-    def vertex(self, edges: Sequence[tuple[int, Weight]]) -> Any:
+    def vertex(self, edges: Sequence[tuple[int, Weight]]) -> "int | _Zero":
         """A sum of earlier ones; itself an earlier one, where it is nothing else."""
         edges = [(source, weight) for source, weight in edges if not _is(weight, 0.0)]
         if not edges:
@@ -80,7 +85,7 @@ class _Graph:
             return edges[0][0]
         return self._new(edges)
 
-    def output(self, end: Any) -> int:
+    def output(self, end: "_Operand") -> int:
         """A vertex that is kept."""
         found = self._new([(end, 1.0)] if isinstance(end, int) else [])
         self.outputs.add(found)
@@ -139,23 +144,25 @@ class _Graph:
         return {*before, *after}
 
 
-def _linear(graph: _Graph, jaxpr: Any, consts: Sequence[Any], args: Sequence[Any]) -> list[Any]:
+def _linear(
+    graph: _Graph, jaxpr: Jaxpr, consts: Sequence[Numbers], args: Sequence[_Operand]
+) -> list[_Operand]:
     """Adds a linear program's vertices; what its results are."""
-    known: dict[Any, Any] = {
+    known: dict[Var, _Operand] = {
         variable: _Known(const) for variable, const in zip(jaxpr.constvars, consts, strict=True)
     }
     known.update(zip(jaxpr.invars, args, strict=True))
 
-    def read(atom: Any) -> Any:
+    def read(atom: Var | Literal) -> _Operand:
         return _Known(atom.val) if isinstance(atom, Literal) else known[atom]
 
     for equation in jaxpr.eqns:
-        given = [read(atom) for atom in equation.invars]
+        given: list[Any] = [read(atom) for atom in equation.invars]
         inner = inner_jaxpr(equation)
         if all(isinstance(g, _Known) for g in given):
             found = equation.primitive.bind(*[g.value for g in given], **equation.params)
             found = found if equation.primitive.multiple_results else [found]
-            results = [_Known(each) for each in found]
+            results: list[_Operand] = [_Known(each) for each in found]
         elif inner is not None:
             results = _linear(graph, *inner, given)
         else:
@@ -164,10 +171,10 @@ def _linear(graph: _Graph, jaxpr: Any, consts: Sequence[Any], args: Sequence[Any
     return [read(atom) for atom in jaxpr.outvars]
 
 
-def _vertex(graph: _Graph, name: str, given: list[Any]) -> Any:
+def _vertex(graph: _Graph, name: str, given: list[Any]) -> int | _Zero:
     """What a linear operation on scalars gives."""
 
-    def scaled(each: Any, weight: Weight) -> list[tuple[int, Weight]]:
+    def scaled(each: _Operand, weight: Weight) -> list[tuple[int, Weight]]:
         # What a linear program knows beforehand of a sum or a choice can only be a zero.
         return [] if isinstance(each, _Known | _Zero) else [(each, weight)]
 
@@ -192,7 +199,7 @@ def _vertex(graph: _Graph, name: str, given: list[Any]) -> Any:
     raise _NoRuleError(name)
 
 
-def _as_number(value: Any) -> Weight:
+def _as_number(value: Numbers) -> Weight:
     """A constant as a plain number."""
     return value if isinstance(value, jax.core.Tracer) else float(value)
 

@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import threading
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.tree_util as jtu
@@ -250,7 +250,7 @@ class CompiledProgram:
             # second interrupt leaves it behind.
             used = code, fields, arrays, streams
 
-            def work(_: Any = used) -> None:
+            def work(_: object = used) -> None:
                 entry(fields.ctypes.data)
 
             workers = min(threads or default_threads(), -(-count // chosen))

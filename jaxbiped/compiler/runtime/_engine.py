@@ -1,7 +1,7 @@
 """Engines: what runs programs. Each tells what it cannot do, and runs what it can."""
 
 import abc
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import jax.tree_util as jtu
 import numpy as np
@@ -10,6 +10,8 @@ from jaxtyping import PyTree
 from jaxbiped.compiler.runtime._compiled_program import Recorded
 from jaxbiped.compiler.runtime._primitive import Recording
 from jaxbiped.compiler.runtime._program import Program
+
+Shapes: TypeAlias = tuple[tuple[int, ...], ...]
 
 
 class Request(NamedTuple):
@@ -33,13 +35,13 @@ class Request(NamedTuple):
     inputs: PyTree
     room: int = 0
     times: np.ndarray | None = None
-    stream: Any = None
+    stream: PyTree = None
     quick: bool = False
     batch: bool = False
     keeps_records: bool = False
     reads_once: bool = False
 
-    def shapes(self) -> tuple[Any, tuple[tuple[int, ...], ...]]:
+    def shapes(self) -> tuple[jtu.PyTreeDef, Shapes]:
         """Structure of one simulation's inputs, and the shapes of its leaves. Hashable."""
         leaves, structure = jtu.tree_flatten(self.inputs)
         skipped = 1 if self.batch else 0

@@ -1,7 +1,5 @@
 """Lane engine: programs as vector machine code for the host's CPU, one simulation a lane."""
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -9,7 +7,7 @@ import jax.tree_util as jtu
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result
+from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result, Shapes
 from jaxbiped.compiler.runtime._primitive import Schedule, call, call_recording
 from jaxbiped.compiler.runtime._program import Program
 
@@ -57,13 +55,13 @@ class LaneEngine(AbstractEngine):
 
 
 @bounded_cache(PROGRAMS)
-def _compiled(program: Program, structure: Any, shapes: Any) -> CompiledProgram:
+def _compiled(program: Program, structure: jtu.PyTreeDef, shapes: Shapes) -> CompiledProgram:
     leaves = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in shapes]
     return CompiledProgram(program, jtu.tree_unflatten(structure, leaves))
 
 
 @bounded_cache(PROGRAMS)
-def _hindrance(program: Program, structure: Any, shapes: Any) -> str | None:
+def _hindrance(program: Program, structure: jtu.PyTreeDef, shapes: Shapes) -> str | None:
     try:
         _compiled(program, structure, shapes).check()
     except UnknownPrimitiveError as error:

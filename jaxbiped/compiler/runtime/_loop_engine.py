@@ -1,6 +1,6 @@
 """Loop engine: the same programs as loops that XLA compiles, on every device."""
 
-from typing import Any
+from typing import TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +16,8 @@ from jaxbiped.compiler.runtime._program import Program
 
 _ROUND = 128
 """Attempted steps after which slots that are over take the next simulations."""
+_Loop: TypeAlias = tuple[PyTree, Scalar, Scalar, list[Array]]
+"""What is carried, whether it is over, records so far and the arrays that hold them."""
 
 
 class LoopEngine(AbstractEngine):
@@ -55,7 +57,7 @@ def _run_one(program: Program, inputs: PyTree, room: int) -> tuple[PyTree, Recor
         _, values = jax.eval_shape(program.record, inputs, first, never)
         records = [jnp.zeros(room, value.dtype) for value in values]
 
-    def advance(loop: tuple[PyTree, Scalar, Scalar, list[Array]]) -> Any:
+    def advance(loop: _Loop) -> _Loop:
         now, _, count, kept = loop
         after, over = program.attempt(inputs, now)
         if program.record is not None:
@@ -148,7 +150,7 @@ def _refill(
     """The simulations at these places replaced; a place beyond the slots takes none."""
     begun = jax.vmap(program.start)(fresh)
 
-    def put(old: Any, new: Any) -> Any:
+    def put(old: Array, new: Array) -> Array:
         return old.at[places].set(new, mode="drop")
 
     given, now = jtu.tree_map(put, given, fresh), jtu.tree_map(put, now, begun)

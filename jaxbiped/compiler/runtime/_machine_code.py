@@ -6,7 +6,6 @@ import tempfile
 import threading
 import weakref
 from pathlib import Path
-from typing import Any
 
 import llvmlite
 import llvmlite.binding as llvm
@@ -27,7 +26,7 @@ class MachineCode:
         address: of its entry.
     """
 
-    def __init__(self, engine: Any, entry: str) -> None:
+    def __init__(self, engine: llvm.ExecutionEngine, entry: str) -> None:
         self._engine = engine
         self.address: int = engine.get_function_address(entry)
 
@@ -62,13 +61,13 @@ def _versions() -> tuple[str, str]:
     return str(llvmlite.__version__), str(llvm.llvm_version_info)
 
 
-def _target_machine(host: Host, as_written: bool) -> Any:
+def _target_machine(host: Host, as_written: bool) -> llvm.TargetMachine:
     target = llvm.Target.from_triple(host.triple)
     effort = 1 if as_written else 2
     return target.create_target_machine(cpu=host.cpu, features=host.features, opt=effort, jit=True)
 
 
-def _module(text: str, machine: Any, as_written: bool) -> Any:
+def _module(text: str, machine: llvm.TargetMachine, as_written: bool) -> llvm.ModuleRef:
     module = llvm.parse_assembly(text)
     module.verify()
     if as_written:

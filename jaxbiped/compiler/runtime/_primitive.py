@@ -4,7 +4,7 @@ import contextlib
 import contextvars
 import enum
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 import equinox as eqx
 import jax
@@ -15,6 +15,7 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, PyTree
 
+from jaxbiped._types import Numbers
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram, Recorded
 from jaxbiped.compiler.runtime._program import leaves_of
 from jaxbiped.compiler.runtime._record_cache import BLOCK
@@ -63,10 +64,10 @@ class Recording(eqx.Module):
         recorder: how it was run.
     """
 
-    numbers: Any
+    numbers: Numbers
     recorder: Recorder = eqx.field(static=True)
 
-    def columns(self, first: Any) -> list[Any]:
+    def columns(self, first: Numbers) -> list[Array]:
         """For each of the first k numbers `first`'s and then those recorded, NaN beyond the last.
 
         `first` has shape (k,), the arrays (1 + room,).
@@ -80,7 +81,7 @@ def call(
     inputs: PyTree,
     schedule: Schedule | None = None,
     *,
-    stream: Any = None,
+    stream: PyTree = None,
     room: int = 0,
     quick: bool = False,
 ) -> tuple[PyTree, Recorded | None]:
@@ -138,7 +139,7 @@ def _params(
     )
 
 
-def _numbers(inputs: PyTree) -> Any:
+def _numbers(inputs: PyTree) -> Numbers:
     """The leaves one behind the other: every array that crosses costs time."""
     leaves = jtu.tree_leaves(inputs)
     if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
@@ -146,7 +147,7 @@ def _numbers(inputs: PyTree) -> Any:
     return np.concatenate([np.ravel(np.asarray(leaf, dtype=np.float64)) for leaf in leaves])
 
 
-def _bind(given: list[Any], params: dict[str, Any]) -> list[Any]:
+def _bind(given: list[Numbers], params: dict[str, Any]) -> list[Any]:
     """The operation's results for one simulation."""
     if any(isinstance(leaf, jax.core.Tracer) for leaf in given):
         return [leaf[0] for leaf in _RUN.bind(*[x[None] for x in given], **params)]
@@ -154,7 +155,7 @@ def _bind(given: list[Any], params: dict[str, Any]) -> list[Any]:
     return [jnp.asarray(leaf[0]) for leaf in found]
 
 
-def _outputs(compiled: CompiledProgram, table: Any) -> PyTree:
+def _outputs(compiled: CompiledProgram, table: Array) -> PyTree:
     shapes, structure = jtu.tree_flatten(compiled.outline.outputs)
     parts = leaves_of(compiled.outline.outputs, table)
     leaves = [jnp.asarray(part.astype(s.dtype)) for part, s in zip(parts, shapes, strict=True)]
@@ -162,8 +163,8 @@ def _outputs(compiled: CompiledProgram, table: Any) -> PyTree:
 
 
 def _run(
-    numbers: Any,
-    stream: Any = None,
+    numbers: Numbers,
+    stream: Numbers | None = None,
     *,
     compiled: CompiledProgram,
     schedule: Schedule | None,
@@ -201,15 +202,15 @@ def _run(
 
 
 def _shapes(
-    leaves: tuple[Any, ...],
+    leaves: Sequence[jax.core.ShapedArray],
     *,
     compiled: CompiledProgram,
     schedule: Schedule | None,
     room: int,
     wants: _Part,
     recorder: Recorder | None,
-    **_: Any,
-) -> list[Any]:
+    **_: object,
+) -> list[jax.ShapeDtypeStruct]:
     count = leaves[0].shape[0]
     if wants is _Part.COLUMNS:
         assert recorder is not None
@@ -226,11 +227,13 @@ def _shapes(
     return found
 
 
-def _implementation(*leaves: Any, **params: Any) -> list[Array]:
+def _implementation(*leaves: Array, **params: Any) -> list[Array]:
     return [jnp.asarray(leaf) for leaf in _run(*leaves, **params)]
 
 
-def _abstract_evaluation(*leaves: Any, **params: Any) -> list[Any]:
+def _abstract_evaluation(
+    *leaves: jax.core.ShapedArray, **params: Any
+) -> list[jax.core.ShapedArray]:
     shapes = _shapes(leaves, **params)
     return [jax.core.ShapedArray(shape.shape, shape.dtype) for shape in shapes]
 
@@ -266,7 +269,7 @@ def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
     return results
 
 
-def _refuse_derivative(primals: Any, tangents: Any, **params: Any) -> Any:
+def _refuse_derivative(primals: object, tangents: object, **params: object) -> NoReturn:
     raise TypeError(
         'JAX cannot differentiate what the lane engine computes here: use engine="xla", or a '
         "function that brings its own derivatives, such as gait_measures."

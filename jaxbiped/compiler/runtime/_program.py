@@ -10,7 +10,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Numbers, Scalar
 from jaxbiped.compiler.ir._elementwise_primitives import KINDS, Array, array_of, convert
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.ir._lower_jaxpr import lower_jaxpr
@@ -118,7 +118,7 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
     carried_shape = jax.eval_shape(program.start, inputs)
     carried = [inputs_of(body, leaf) for leaf in jtu.tree_leaves(carried_shape)]
     first = lower_function(begin, program.start, (inputs,), given)
-    shapes: tuple[Any, ...] = (inputs, carried_shape)
+    shapes: tuple[PyTree, ...] = (inputs, carried_shape)
     arguments = [*given, *carried]
     row: list[Value] = []
     if program.stream:
@@ -162,7 +162,7 @@ def graph_of(program: Program, inputs: PyTree) -> Graph:
     return graph
 
 
-def leaves_of(structure: PyTree, table: Any) -> list[Any]:
+def leaves_of(structure: PyTree, table: Numbers) -> list[Any]:
     """A table of outputs (numbers, …) cut into arrays of the leaves' shapes, (*shape, …)."""
     leaves, place = [], 0
     for leaf in jax.tree.leaves(structure):
@@ -172,7 +172,7 @@ def leaves_of(structure: PyTree, table: Any) -> list[Any]:
     return leaves
 
 
-def inputs_of(block: Block, leaf: Any) -> Array:
+def inputs_of(block: Block, leaf: jax.ShapeDtypeStruct | jax.Array) -> Array:
     """What is read of one leaf, as values of a block."""
     kind = KINDS[np.dtype(leaf.dtype)]
     shape = np.shape(leaf)
@@ -180,7 +180,7 @@ def inputs_of(block: Block, leaf: Any) -> Array:
 
 
 def lower_function(
-    block: Block, function: Callable[..., Any], shapes: tuple[Any, ...], arrays: list[Array]
+    block: Block, function: Callable[..., PyTree], shapes: tuple[PyTree, ...], arrays: list[Array]
 ) -> list[Array]:
     """A function's operations added to a block: its results."""
     closed = jax.make_jaxpr(function)(*shapes)

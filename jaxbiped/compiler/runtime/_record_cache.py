@@ -2,12 +2,14 @@
 
 import collections
 import threading
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Hashable
+from typing import TypeAlias
 
 import numpy as np
 
 Tables = tuple[np.ndarray, np.ndarray, np.ndarray]
+_Key: TypeAlias = tuple[Hashable, bytes]
+"""A program and the bytes of one simulation's inputs."""
 """Of n simulations: outputs (numbers, n), records (n, room, numbers), and how many these are."""
 
 BLOCK = 512
@@ -24,7 +26,7 @@ class RecordCache:
     def __init__(self, most: Callable[[], int]) -> None:
         """Holds `most` bytes, inputs included; beyond them what came first goes first."""
         self._most, self._size = most, 0
-        self._records: collections.OrderedDict[Any, np.ndarray] = collections.OrderedDict()
+        self._records: collections.OrderedDict[_Key, np.ndarray] = collections.OrderedDict()
         self._lock = threading.Lock()
 
     @property
@@ -39,14 +41,14 @@ class RecordCache:
             self._size = 0
 
     def ran(
-        self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
+        self, program: Hashable, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
     ) -> np.ndarray:
         """Outputs of what `run` finds for inputs (numbers, n); its records are then known."""
         return self._ran(program, inputs, run)[0]
 
     def rows(
         self,
-        program: Any,
+        program: Hashable,
         inputs: np.ndarray,
         run: Callable[[np.ndarray], Tables],
         *,
@@ -65,7 +67,7 @@ class RecordCache:
 
     def columns(
         self,
-        program: Any,
+        program: Hashable,
         inputs: np.ndarray,
         first: np.ndarray,
         room: int,
@@ -84,7 +86,7 @@ class RecordCache:
         return found
 
     def _known(
-        self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
+        self, program: Hashable, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
     ) -> list[np.ndarray]:
         """Records of each simulation; what is not known `run` finds."""
         keys = [(program, column.tobytes()) for column in inputs.T]
@@ -97,7 +99,7 @@ class RecordCache:
         return [known[key] for key in keys]
 
     def _ran(
-        self, program: Any, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
+        self, program: Hashable, inputs: np.ndarray, run: Callable[[np.ndarray], Tables]
     ) -> tuple[np.ndarray, list[np.ndarray]]:
         """Outputs and records of each simulation, which are held from now on."""
         every, found = [], []
@@ -120,10 +122,10 @@ class RecordCache:
                 self._drop(next(iter(self._records)))
         return outputs, found
 
-    def _drop(self, key: Any) -> None:
+    def _drop(self, key: _Key) -> None:
         records = self._records.pop(key, None)
         self._size -= 0 if records is None else _bytes_of(key, records)
 
 
-def _bytes_of(key: tuple[Any, bytes], records: np.ndarray) -> int:
+def _bytes_of(key: _Key, records: np.ndarray) -> int:
     return len(key[1]) + records.nbytes

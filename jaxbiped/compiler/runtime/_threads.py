@@ -3,7 +3,6 @@
 import os
 import threading
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,9 @@ def default_threads() -> int:
     return os.cpu_count() or 1
 
 
-def run_in_threads(work: Callable[[], Any], workers: int, stop: np.ndarray, *, quick: bool) -> None:
+def run_in_threads(
+    work: Callable[[], object], workers: int, stop: np.ndarray, *, quick: bool
+) -> None:
     """Runs the same work in several threads, which share its queue; `stop` ends it early.
 
     What is `quick` needs no thread: it is over before a user could interrupt.

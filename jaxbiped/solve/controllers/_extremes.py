@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped._types import Scalar, Time
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
 
 
@@ -28,8 +28,8 @@ class Extremes(AbstractWrappedControl):
     def init(
         self,
         terms: Any,
-        t0: RealScalarLike,
-        t1: RealScalarLike,
+        t0: Time,
+        t1: Time,
         y0: PyTree,
         dt0: Scalar | None,
         args: PyTree,
@@ -41,13 +41,7 @@ class Extremes(AbstractWrappedControl):
         return first, (inner, value, value)
 
     def adapt_step_size(
-        self,
-        t0: RealScalarLike,
-        t1: RealScalarLike,
-        y0: PyTree,
-        y1_candidate: PyTree,
-        args: PyTree,
-        *rest: Any,
+        self, t0: Time, t1: Time, y0: PyTree, y1_candidate: PyTree, args: PyTree, *rest: Any
     ) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, and looks."""
         *others, (inner, lowest, highest) = rest

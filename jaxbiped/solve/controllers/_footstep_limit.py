@@ -7,7 +7,7 @@ import diffrax
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped._types import RealScalarLike, Scalar, Time
 from jaxbiped.dynamics._feet import feet, landings, standing_foot
 from jaxbiped.dynamics._state import State
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
@@ -33,8 +33,8 @@ class FootstepLimit(AbstractWrappedControl):
     def init(
         self,
         terms: Any,
-        t0: RealScalarLike,
-        t1: RealScalarLike,
+        t0: Time,
+        t1: Time,
         y0: State,
         dt0: Scalar | None,
         args: PyTree,
@@ -48,8 +48,8 @@ class FootstepLimit(AbstractWrappedControl):
 
     def adapt_step_size(
         self,
-        t0: RealScalarLike,
-        t1: RealScalarLike,
+        t0: Time,
+        t1: Time,
         y0: State,
         y1_candidate: State,
         args: PyTree,

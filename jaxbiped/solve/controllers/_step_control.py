@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Numbers, RealScalarLike, Scalar
+from jaxbiped._types import Numbers, RealScalarLike, Scalar, Time
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
 
@@ -70,8 +70,8 @@ class InUnits(AbstractWrappedControl):
 
     def adapt_step_size(
         self,
-        t0: RealScalarLike,
-        t1: RealScalarLike,
+        t0: Time,
+        t1: Time,
         y0: PyTree,
         y1_candidate: PyTree,
         args: PyTree,

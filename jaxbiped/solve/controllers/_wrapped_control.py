@@ -33,7 +33,7 @@ class StepControl(Protocol):
         """Accepts or rejects a step."""
 
 
-class AbstractWrappedControl(AbstractControl):
+class AbstractWrappedControl(AbstractControl):  # type: ignore[type-arg]
     """Leaves every step's size to another controller, and adds something of its own.
 
     Attributes:

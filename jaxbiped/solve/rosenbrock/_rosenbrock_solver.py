@@ -3,7 +3,7 @@
 import functools
 import operator
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
 
 import diffrax
 import jax.numpy as jnp
@@ -13,7 +13,7 @@ from equinox.internal import ω
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
-from jaxbiped._types import BoolScalarLike, RealScalarLike, Scalar
+from jaxbiped._types import BoolScalarLike, Scalar, SomeTree, Time
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.rosenbrock._linearisation import (
     AbstractLinearisation,
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 else:
     from equinox import AbstractClassVar
 
-_Component = TypeVar("_Component")
 Row: TypeAlias = tuple[float, ...]
 
 
@@ -70,15 +69,13 @@ class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
         coefficients: k_1, k_2, … of the polynomial, each shaped as the solution.
     """
 
-    t0: RealScalarLike  # type: ignore[misc]
-    t1: RealScalarLike  # type: ignore[misc]
+    t0: Time  # type: ignore[misc]
+    t1: Time  # type: ignore[misc]
     y0: PyTree
     y1: PyTree
     coefficients: tuple[PyTree, ...]
 
-    def evaluate(
-        self, t0: RealScalarLike, t1: RealScalarLike | None = None, left: bool = True
-    ) -> PyTree:
+    def evaluate(self, t0: Time, t1: Time | None = None, left: bool = True) -> PyTree:
         del left
         if t1 is not None:
             return (self.evaluate(t1) ** ω - self.evaluate(t0) ** ω).ω
@@ -95,7 +92,7 @@ class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
         return jtu.tree_map(value, self.y0, self.y1, *self.coefficients)
 
 
-class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):
+class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):  # type: ignore[type-arg]
     """A Rosenbrock method: every step solves a few linear systems with one exact Jacobian.
 
     Works on any pytree of real arrays. Where the leaves are scalars, entries of the Jacobian
@@ -111,21 +108,19 @@ class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):
     term_structure: ClassVar = diffrax.AbstractTerm
     interpolation_cls: ClassVar[Callable[..., RosenbrockInterpolation]] = RosenbrockInterpolation
 
-    def init(
-        self, terms: Any, t0: RealScalarLike, t1: RealScalarLike, y0: PyTree, args: PyTree
-    ) -> None:
+    def init(self, terms: Any, t0: Time, t1: Time, y0: PyTree, args: PyTree) -> None:
         """Rosenbrock methods carry nothing from step to step."""
         return None
 
-    def func(self, terms: Any, t0: RealScalarLike, y0: PyTree, args: PyTree) -> PyTree:
+    def func(self, terms: Any, t0: Time, y0: PyTree, args: PyTree) -> PyTree:
         """The vector field at a point."""
         return terms.vf(t0, y0, args)
 
     def step(
         self,
         terms: Any,
-        t0: RealScalarLike,
-        t1: RealScalarLike,
+        t0: Time,
+        t1: Time,
         y0: PyTree,
         args: PyTree,
         solver_state: None,
@@ -139,12 +134,7 @@ class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):
 
 
 def step_of(
-    tableau: RosenbrockTableau,
-    terms: Any,
-    t0: RealScalarLike,
-    t1: RealScalarLike,
-    y0: PyTree,
-    args: PyTree,
+    tableau: RosenbrockTableau, terms: Any, t0: Time, t1: Time, y0: PyTree, args: PyTree
 ) -> tuple[PyTree, PyTree, tuple[PyTree, ...]]:
     """The new value, its error estimate and the coefficients of the dense output."""
     start, join = split(y0)
@@ -249,7 +239,7 @@ def stages_of(
     step = tableau.gamma * control
     moves = control != 0.0
 
-    def picked(components: list[_Component]) -> list[_Component]:
+    def picked(components: list[SomeTree]) -> list[SomeTree]:
         return [components[i] for i in kept]
 
     slope, f_t, jacobian = fusion_barrier(

@@ -1,15 +1,18 @@
 """Coordinates in which starts differ: of the state, and the scene's parameters."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice
 from jaxbiped._quantity import Quantity
+from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import State
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameters import parameter_names, parameter_quantities
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -66,7 +69,7 @@ def coordinate_quantities(scene: Scene | RigidScene) -> dict[str, Quantity]:
     return {name: known[name] for name in coordinate_names(scene)}
 
 
-def check_coordinates(scene: Scene | RigidScene, names: Any) -> None:
+def check_coordinates(scene: Scene | RigidScene, names: Iterable[str]) -> None:
     """Raises `ArgumentError` for a name that is no coordinate of the scene's starts."""
     for name in names:
         check_choice("coordinate", name, coordinate_names(scene))
@@ -77,13 +80,15 @@ def parameters_among(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]
     return {name: column for name, column in columns.items() if name not in COORDINATES}
 
 
-def state_at(base: Any, columns: Mapping[str, np.ndarray]) -> Any:
+def state_at(base: PyTree, columns: Mapping[str, np.ndarray]) -> PyTree:
     """The states (n,) with these coordinates, all else from the base's leaves (n,)."""
     changed = {COORDINATES[name]: column for name, column in columns.items() if name in COORDINATES}
     return base._replace(**changed)
 
 
-def place_states(scene: Any, base: Any, states: Any, named: Any) -> Any:
+def place_states(
+    scene: AbstractScene, base: PyTree, states: PyTree, named: Collection[str]
+) -> PyTree:
     """States whose stance foot is as deep, and rolls and slips, as the base's does.
 
     The hip's height and velocity follow from the stance leg where they are not `named`. A rigid
@@ -93,7 +98,7 @@ def place_states(scene: Any, base: Any, states: Any, named: Any) -> Any:
         return states
     length, radius = scene.walker.hip_to_foot, scene.walker.r
 
-    def rolling(state: Any) -> dict[str, np.ndarray]:
+    def rolling(state: State | BristleState) -> dict[str, np.ndarray]:
         sine, cosine = np.sin(state.theta_2), np.cos(state.theta_2)
         return {
             "hip_z": length * cosine,

@@ -1,12 +1,13 @@
 """Given starts."""
 
 import hashlib
-from typing import Any
 
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
@@ -24,7 +25,7 @@ class GivenStarts(AbstractStarts):
         ArgumentError: a state of another kind, or leaves of different shapes.
     """
 
-    states: Any
+    states: PyTree
 
     def __check_init__(self) -> None:
         check_type("states", self.states, State, BristleState, RigidState)
@@ -49,7 +50,7 @@ class GivenStarts(AbstractStarts):
         states = jtu.tree_map(lambda leaf: np.asarray(leaf, np.float64)[numbers], self.states)
         return Batch(states, {}, states._asdict())
 
-    def described(self) -> dict[str, Any]:
+    def described(self) -> JsonObject:
         digest = hashlib.sha256()
         for leaf in self.states:
             digest.update(np.ascontiguousarray(leaf, dtype=np.float64).tobytes())

@@ -3,12 +3,14 @@
 import abc
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
+from jaxbiped._types import JsonObject
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -23,11 +25,14 @@ from jaxbiped.sweep.starts._coordinates import (
 )
 from jaxbiped.sweep.starts._sequences import SAMPLINGS, sequence_points
 
+Completion: TypeAlias = Callable[[Any, PyTree], PyTree]
+"""Completes starts: of a scene and its states, leaves (n,)."""
+
 
 class Batch(NamedTuple):
     """Some of the starts: states and parameters as `Labelling` takes them, and coordinates."""
 
-    states: Any
+    states: PyTree
     parameters: dict[str, np.ndarray]
     columns: dict[str, np.ndarray]
 
@@ -55,7 +60,7 @@ class AbstractStarts(eqx.Module):
         """Coordinates that each start has for itself, of which no axis tells."""
 
     @abc.abstractmethod
-    def described(self) -> dict[str, Any]:
+    def described(self) -> JsonObject:
         """What they are, ready for JSON."""
 
     @property
@@ -85,7 +90,7 @@ class Grid(AbstractStarts):
 
     values: dict[str, np.ndarray]
     place: bool
-    follow: Callable[[Any, Any], Any] | None
+    follow: Completion | None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -109,7 +114,7 @@ class Grid(AbstractStarts):
         columns = {name: values[place] for (name, values), place in pairs}
         return batch_at(labelling, columns, place=self.place, follow=self.follow)
 
-    def described(self) -> dict[str, Any]:
+    def described(self) -> JsonObject:
         values = {name: [float(x) for x in values] for name, values in self.values.items()}
         return {"grid": values, "place": self.place, "follow": identity(self.follow)}
 
@@ -131,7 +136,7 @@ class Sample(AbstractStarts):
     method: str
     seed: int
     place: bool
-    follow: Callable[[Any, Any], Any] | None
+    follow: Completion | None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -153,7 +158,7 @@ class Sample(AbstractStarts):
         }
         return batch_at(labelling, columns, place=self.place, follow=self.follow)
 
-    def described(self) -> dict[str, Any]:
+    def described(self) -> JsonObject:
         bounds = {name: [self.lower[name], self.upper[name]] for name in self.lower}
         rest = {"place": self.place, "follow": identity(self.follow)}
         drawn = {"sample": self.method, "count": self.count, "seed": self.seed}
@@ -165,7 +170,7 @@ def grid(
     values: Mapping[str, Sequence[float] | np.ndarray],
     *,
     place: bool = False,
-    follow: Callable[[Any, Any], Any] | None = None,
+    follow: Completion | None = None,
 ) -> Grid:
     """A regular grid of starts over coordinates of the state and parameters of the scene.
 
@@ -214,7 +219,7 @@ def sample(
     method: str = "sobol",
     seed: int = 0,
     place: bool = False,
-    follow: Callable[[Any, Any], Any] | None = None,
+    follow: Completion | None = None,
 ) -> Sample:
     """Random or quasi-random starts within bounds of coordinates (see `grid`).
 
@@ -261,7 +266,7 @@ def batch_at(
     columns: dict[str, np.ndarray],
     *,
     place: bool = False,
-    follow: Callable[[Any, Any], Any] | None = None,
+    follow: Completion | None = None,
 ) -> Batch:
     """The starts at these coordinates, each (n,); `place` and `follow` as in `grid`."""
     count = len(next(iter(columns.values())))

@@ -1,7 +1,7 @@
 """Weight on a normal law: its parameters from how a mass stands on it."""
 
 import abc
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self
 
 import jax.numpy as jnp
 
@@ -53,7 +53,7 @@ class AbstractDampedLaw(AbstractNormalLaw):
         K, damper = matched_to_weight(
             mass=mass, penetration=penetration, damping_ratio=damping_ratio, g=g, **told
         )
-        weight: Any = as_float(mass) * as_float(g)
+        weight = as_float(mass) * as_float(g)
         return cls(K, cls.damping_coefficient(damper, as_float(penetration), weight), **n)
 
 
@@ -107,6 +107,6 @@ def matched_to_weight(
     check_positive("g", g, "m/s^2")
     check_not_negative("damping_ratio", damping_ratio)
     check_at_least("n", n, "1", 1.0)
-    weight: Any = mass * g
+    weight = mass * g
     slope = n * weight / penetration
     return weight / penetration**n, 2.0 * damping_ratio * jnp.sqrt(slope * mass)
