@@ -46,11 +46,6 @@ def solver_named(solver: str | diffrax.AbstractSolver[PyTree]) -> diffrax.Abstra
 
     Raises:
         ArgumentError: an unknown name.
-
-    Examples:
-        >>> import jaxbiped as jb
-        >>> jb.solvers.solver_named("rodas4")
-        Rodas4()
     """
     if isinstance(solver, diffrax.AbstractSolver):
         return solver
