@@ -39,7 +39,7 @@ class Effort(NamedTuple):
         rtol: relative tolerance; the absolute one is a hundredth of it in the scene's units.
         footsteps: after which a start that is not certain is given up.
         max_attempts: cap on the solver's attempted steps.
-        gap: see `arrived`.
+        gap: see `after_arrival`.
         solver: of the compliant walker.
         engine: "lanes" or "xla".
     """

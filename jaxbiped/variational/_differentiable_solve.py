@@ -45,7 +45,7 @@ class Setting(NamedTuple):
 
     Attributes:
         solver, watch, counting, saved: see there.
-        quick: see `call`.
+        quick: see `Request`.
     """
 
     solver: AbstractRosenbrock

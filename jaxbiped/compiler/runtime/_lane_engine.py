@@ -27,7 +27,14 @@ class LaneEngine(AbstractEngine):
         """
         compiled, quick = self.compile(request), request.quick
         if request.batch:
-            return Result(*compiled.run(request.inputs, room=request.room, quick=quick))
+            found = compiled.run(
+                request.inputs,
+                schedule=request.times,
+                stream=request.stream,
+                room=request.room,
+                quick=quick,
+            )
+            return Result(found.outputs, found.recorded)
         if request.keeps_records:
             recorded = call_recording(
                 compiled,
@@ -39,7 +46,7 @@ class LaneEngine(AbstractEngine):
             )
             return Result(recorded[0], recording=recorded[1])
         schedule = None if request.times is None else Schedule(request.times)
-        found = call(
+        outputs, records = call(
             compiled,
             request.inputs,
             schedule,
@@ -47,7 +54,7 @@ class LaneEngine(AbstractEngine):
             room=request.room,
             quick=quick,
         )
-        return Result(*found)
+        return Result(outputs, records)
 
     def compile(self, request: Request) -> CompiledProgram:
         """The compiled program of requests with inputs of these shapes, traced when needed."""
