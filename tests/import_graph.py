@@ -19,6 +19,7 @@ LAYERS = [
     "gait",
     "basins",
     "sweep",
+    "optimise",
     "plot",
     "cli",
 ]

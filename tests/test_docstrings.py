@@ -24,6 +24,7 @@ NAMESPACES = {
             "solvers",
             "basins",
             "starts",
+            "optimise",
             "plot",
         )
     },

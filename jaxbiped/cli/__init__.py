@@ -14,6 +14,7 @@ from jaxbiped.cli._basin import Basin
 from jaxbiped.cli._constraints import Constraints
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
+from jaxbiped.cli._optimise import Optimise
 from jaxbiped.cli._refusal import one_sentence
 from jaxbiped.cli._report import Report as Report
 from jaxbiped.cli._walk import Walk
@@ -22,6 +23,7 @@ _Command = (
     Annotated[Walk, subcommand("walk")]
     | Annotated[FindGait, subcommand("gait")]
     | Annotated[Basin, subcommand("basin")]
+    | Annotated[Optimise, subcommand("optimise")]
     | Annotated[Models, subcommand("models")]
     | Annotated[Constraints, subcommand("constraints")]
     | Annotated[None, subcommand("version")]

@@ -39,7 +39,8 @@ def second_variation(
         last: the return, with its nodes.
         leading: v directions of the m recurring components, those of the leading eigenpair, which
             move no parameter; (v, m).
-        weights: of the recurring components of each one's second derivatives, (v, m).
+        weights: of the recurring components of each one's second derivatives, (v, m), or of all
+            components, (v, c).
         tangents: p other directions, each of which moves one active parameter, shape (m, p).
         sizes: by how much, shape (p,).
 
@@ -48,11 +49,14 @@ def second_variation(
     """
     flow = _flow(spec, args, like)
     places = jnp.asarray(recurring_indices(spec.system, like))
+    c = flow.structure.num_leaves
+    if weights.shape[1] != c:
+        weights = jnp.zeros((len(weights), c)).at[:, places].set(weights)
     if spec.engine == "lanes":
         adjoints = _pull_back(spec, flow, places, last, leading, weights)
         return adjoints.family[places] @ tangents + adjoints.parameters * sizes
     second = _all_second_derivatives(spec, flow, places, last, leading, tangents, sizes)
-    return jnp.einsum("vm,mpv->p", weights, second[places])
+    return jnp.einsum("vc,cpv->p", weights, second)
 
 
 def _pull_back(
@@ -74,8 +78,7 @@ def _pull_back(
         if k + 1 < spec.steps:
             before = flow.earlier(nodes.arrival, parameters)[1:]
             along = _after_arrival(flow, before, parameters, arrived.leading)
-    second = jnp.zeros((len(weights), c)).at[:, places].set(weights)
-    adjoints = Adjoints(second, jnp.zeros(c), jnp.zeros(p))
+    adjoints = Adjoints(weights, jnp.zeros(c), jnp.zeros(p))
     for k, (nodes, arrived, steps) in reversed(list(enumerate(carried))):
         final = k + 1 == spec.steps
         adjoints = pull_back(flow, nodes, arrived, steps, adjoints, final=final)
