@@ -126,7 +126,12 @@ def evaluate(
         found = jacobian_functionals(
             scene, state, of_jacobian, footsteps=steps, accuracy=accuracy, engine=engine
         )
-        rows |= dict(zip(of_jacobian, _rows_of(found), strict=True))
+        # The orbit's own error moves the Jacobian, too, as its multipliers tell.
+        shares = np.asarray(gait.multiplier_errors) / float(gait.measures.spectral_radius)
+        rows |= {
+            name: row._replace(error=max(row.error, abs(row.value) * float(shares[0])))
+            for name, row in zip(of_jacobian, _rows_of(found), strict=True)
+        }
     if set(wanted) - set(rows):
         found = cycle_functionals(scene, state, footsteps=steps, accuracy=accuracy, engine=engine)
         rows |= dict(zip(integral_names(scene), _rows_of(found), strict=True))

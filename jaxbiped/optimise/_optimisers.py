@@ -8,6 +8,7 @@ back towards it.
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
@@ -188,7 +189,8 @@ def run_optax(
         if value > best + 0.5 * _RAISED:
             logits = 0.5 * (logits + at_best)  # no gait there: half way back
             continue
-        step, state = method.update(jnp.asarray(gradient * now * (1.0 - now)), state, logits)
+        with jax.numpy_dtype_promotion("standard"):  # optax's own
+            step, state = method.update(jnp.asarray(gradient * now * (1.0 - now)), state, logits)
         if float(jnp.max(jnp.abs(jnp.asarray(step)))) < 1e-6:
             return Ended(True, "Steps became small.")
         logits = jnp.asarray(optax.apply_updates(logits, step))

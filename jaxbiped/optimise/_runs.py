@@ -18,7 +18,7 @@ from jaxbiped.optimise._optimisers import (
 )
 from jaxbiped.optimise._trust_region import run_trust_region
 
-_KEPT = 1e-6
+_KEPT = 1e-5
 """Part of its bound by which a requirement may be missed and still counts as kept."""
 _OPTIMAL = 1e-3
 """Residual of the conditions of optimality from which a design counts as an optimum."""
