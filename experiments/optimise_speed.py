@@ -15,7 +15,7 @@ from _options import Options, parse
 
 import jaxbiped as jb
 
-LEG = {"d": (0.05, 0.2), "r": (0.04, 0.12), "J": (0.003, 0.02)}
+LEG = {"d": (0.05, 0.2), "r": (0.04, 0.16), "J": (0.003, 0.02)}
 BODY = {**LEG, "hip_mass": (0.0, 1.0)}
 BOUND = 0.4
 OPTIMISERS = ("trust-region", "slsqp", "trust-constr")
@@ -64,8 +64,8 @@ def fastest(options: Options, scene: jb.Scene) -> dict[str, Any]:
         seconds = time.perf_counter() - began
         found[name] = summary(best) | {"wall_s": seconds}
         options.say(
-            f"{name:>13}: {best.objective:.6f} m/s, {best.outcome}, {len(best.history)} iterations, "
-            f"{best.evaluations} gaits, {seconds:.2f} s"
+            f"{name:>13}: {best.objective:.6f} m/s, {best.outcome}, {len(best.history)} "
+            f"iterations, {best.evaluations} gaits, {seconds:.2f} s"
         )
     return found
 

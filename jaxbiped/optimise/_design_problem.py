@@ -16,6 +16,7 @@ from jaxbiped.gait._explain_search import explain_search
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, evaluate_ensemble
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._objectives import Evaluation, evaluate
 from jaxbiped.optimise._requirements import Requirement
@@ -29,14 +30,6 @@ _HALVINGS = 5
 _FLOOR, _ASIDE, _NEAR = 0.1, 0.5, 0.02
 """Size below which components of the state count as of one size; how far aside, in units of the
 step, and how far at least, relative to it, a gait may lie from where it was expected."""
-
-
-class GaitSettings(NamedTuple):
-    """How gaits are found; see `find_gait`."""
-
-    footsteps: int = 1
-    accuracy: str = "balanced"
-    engine: str = "auto"
 
 
 class Design(NamedTuple):
@@ -55,6 +48,7 @@ class DesignProblem:
         weights: of the measures in the sum that is minimised, by name.
         requirements: what must hold.
         evaluations: of all designs so far.
+        ensemble: over whose members measures are taken; None for the design alone.
         latest: the last design whose gait was found; `asked` all of them, in order.
         lost: how often a design had none.
     """
@@ -68,11 +62,12 @@ class DesignProblem:
         requirements: tuple[Requirement, ...],
         settings: GaitSettings,
         evaluations: Evaluations,
+        ensemble: Ensemble | None = None,
     ) -> None:
         self.scene, self.variables = scene, variables
         self.sense, self.requirements = sense, requirements
         self.weights = {name: sense * weight for name, weight in told.items()}
-        self.settings, self.evaluations = settings, evaluations
+        self.settings, self.evaluations, self.ensemble = settings, evaluations, ensemble
         self.wanted = tuple(dict.fromkeys((*told, *(each.name for each in requirements))))
         self.latest: Design | None = None
         self.asked: list[Design] = []
@@ -175,7 +170,14 @@ class DesignProblem:
         )
 
     def _keep(self, u: np.ndarray, scene: Scene | RigidScene, gait: Gait) -> Evaluation | None:
-        known = evaluate(scene, gait, self.wanted, self.settings.accuracy)
+        if self.ensemble is None:
+            known = evaluate(scene, gait, self.wanted, self.settings.accuracy)
+        else:
+            nominal = evaluate(scene, gait, (), self.settings.accuracy)
+            members = evaluate_ensemble(self.ensemble, scene, nominal, self.wanted, self.settings)
+            if members is None:
+                return None
+            known = members
         if not all(np.isfinite(known.values[name]) for name in self.wanted):
             return None
         self.evaluations.add(u, known)

@@ -10,7 +10,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
+from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
 from jaxbiped.optimise._jacobian_functionals import (
     JACOBIAN_FUNCTIONALS,
     LEADING,
@@ -111,30 +111,45 @@ def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective
         raise ArgumentError(f"{what} = {name!r} is not allowed for this scene: {lacks}.")
 
 
-def evaluate(
-    scene: Scene | RigidScene, gait: Gait, names: Iterable[str], accuracy: str
-) -> Evaluation:
-    """Objectives of a gait that was found with the sensitivities to all parameters."""
-    wanted = tuple(names)
-    rows = {name: _row(gait, name) for name in _OF_THE_GAIT}
-    steps = gait.orbit[0].shape[0]
-    state, engine = gait.measures.state, gait.engine
+def functionals_for(wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
+    """Which functionals of the Jacobian these measures need, and whether those of the cycle."""
     of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in wanted)
     if "spectral_radius" in wanted:
         of_jacobian = (*CLUSTER, *(name for name in of_jacobian if name not in CLUSTER))
+    return of_jacobian, bool(set(wanted) - set(of_jacobian) - set(_OF_THE_GAIT))
+
+
+def evaluate(
+    scene: Scene | RigidScene,
+    gait: Gait,
+    names: Iterable[str],
+    accuracy: str,
+    functionals: tuple[Functionals | None, ...] | None = None,
+) -> Evaluation:
+    """Objectives of a gait that was found with the sensitivities to all parameters.
+
+    `functionals` are those of `functionals_for`, where they are known.
+    """
+    wanted = tuple(names)
+    of_jacobian, of_cycle = functionals_for(wanted)
+    state, steps, engine = gait.measures.state, gait.orbit[0].shape[0], gait.engine
+    first, second = (None, None) if functionals is None else functionals
+    rows = {name: _row(gait, name) for name in _OF_THE_GAIT}
     if of_jacobian:
-        found = jacobian_functionals(
+        first = first or jacobian_functionals(
             scene, state, of_jacobian, footsteps=steps, accuracy=accuracy, engine=engine
         )
         # The orbit's own error moves the Jacobian, too, as its multipliers tell.
         shares = np.asarray(gait.multiplier_errors) / float(gait.measures.spectral_radius)
         rows |= {
             name: row._replace(error=max(row.error, abs(row.value) * float(shares[0])))
-            for name, row in zip(of_jacobian, _rows_of(found), strict=True)
+            for name, row in zip(of_jacobian, _rows_of(first), strict=True)
         }
-    if set(wanted) - set(rows):
-        found = cycle_functionals(scene, state, footsteps=steps, accuracy=accuracy, engine=engine)
-        rows |= dict(zip(integral_names(scene), _rows_of(found), strict=True))
+    if of_cycle:
+        second = second or cycle_functionals(
+            scene, state, footsteps=steps, accuracy=accuracy, engine=engine
+        )
+        rows |= dict(zip(integral_names(scene), _rows_of(second), strict=True))
         rows["cost_of_transport"] = _cost_of_transport(scene, rows)
     kept = {name: rows[name] for name in dict.fromkeys((*wanted, *of_jacobian, *_OF_THE_GAIT))}
     slopes = gait.sensitivities.state

@@ -16,12 +16,13 @@ from jaxbiped._checks import (
 )
 from jaxbiped._types import JsonObject
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._design_problem import DesignProblem, GaitSettings
+from jaxbiped.optimise._design_problem import DesignProblem
+from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, ensemble_of
 from jaxbiped.optimise._evaluations import Evaluations
-from jaxbiped.optimise._objectives import Evaluation, check_objective
+from jaxbiped.optimise._objectives import CLUSTER, Evaluation, check_objective
 from jaxbiped.optimise._optimality import Optimality, optimality_of
 from jaxbiped.optimise._optimisers import OPTIMISERS, Ended
-from jaxbiped.optimise._requirements import SubjectTo, requirements_of
+from jaxbiped.optimise._requirements import Requirement, SubjectTo, requirements_of
 from jaxbiped.optimise._restarts import scattered_designs
 from jaxbiped.optimise._runs import Iteration, Outcome, Runs
 from jaxbiped.optimise._variables import start_of, variables_of
@@ -72,6 +73,9 @@ def optimise_gait(
     optimiser: str | optax.GradientTransformation = "trust-region",
     iterations: int = 200,
     restarts: int = 0,
+    scatter: Mapping[str, float] | None = None,
+    members: int = 8,
+    criterion: str = "mean",
     seed: int = 0,
     footsteps: int = 1,
     accuracy: str = "balanced",
@@ -98,7 +102,11 @@ def optimise_gait(
         iterations: most of the optimiser, of each run.
         restarts: further runs, from the best of 8 times as many designs scattered over the bounds,
             whose gaits are sought as one batch.
-        seed: of these designs.
+        scatter: relative half-widths by parameter; every design is then an ensemble whose members
+            differ by factors within these, and measures are taken over all members.
+        members: how many.
+        criterion: "mean" for the expectation, "worst" for the worst member of each measure.
+        seed: of scattered designs and of members.
         footsteps: how many a cycle has.
         accuracy: "balanced" or "tight".
         engine: as for `find_gait`.
@@ -136,10 +144,16 @@ def optimise_gait(
         raise ArgumentError(
             'subject_to is not allowed with optax: choose optimiser = "trust-region".'
         )
+    ensemble = None
+    if scatter:
+        worse = _larger_is_worse(told, sense, requirements) if criterion == "worst" else {}
+        ensemble = ensemble_of(scene, scatter, members, criterion, worse, seed)
     settings = GaitSettings(footsteps, accuracy, engine)
     path = None if store is None else Path(store)
-    evaluations = Evaluations(path, _problem_settings(scene, vary, told, sense, settings))
-    problem = DesignProblem(scene, variables, told, sense, requirements, settings, evaluations)
+    evaluations = Evaluations(path, _problem_settings(scene, vary, told, sense, settings, ensemble))
+    problem = DesignProblem(
+        scene, variables, told, sense, requirements, settings, evaluations, ensemble
+    )
     begin = problem.begin(start_of(scene, variables))
     runs = Runs(problem, iterations, optimiser, progress)
     with runs.bar:
@@ -170,12 +184,42 @@ def _goal(
     return {name: float(w) for name, w in weights.items()}, -1.0 if what == "maximise" else 1.0
 
 
+def _larger_is_worse(
+    told: Mapping[str, float], sense: float, requirements: tuple[Requirement, ...]
+) -> dict[str, bool]:
+    """Of each measure, for the worst of several.
+
+    Raises:
+        ArgumentError: a measure of which both more and less would be worse.
+    """
+    sides: dict[str, set[bool]] = {}
+    for name, weight in told.items():
+        sides.setdefault(name, set()).add(sense * weight > 0.0)
+    for each in requirements:
+        sides.setdefault(each.name, set()).update(
+            [
+                larger
+                for larger, bound in ((True, each.high), (False, each.low))
+                if bound is not None
+            ]
+        )
+    for name, both in sides.items():
+        if len(both) > 1:
+            raise ArgumentError(
+                f"{name} is bounded and sought from both sides: its worst member is not defined; "
+                'choose criterion = "mean".'
+            )
+    worse = {name: both.pop() for name, both in sides.items()}
+    return worse | dict.fromkeys(CLUSTER, worse.get("spectral_radius", True))
+
+
 def _problem_settings(
     scene: Scene | RigidScene,
     vary: Mapping[str, tuple[float, float]],
     told: Mapping[str, float],
     sense: float,
     settings: GaitSettings,
+    ensemble: Ensemble | None,
 ) -> JsonObject:
     """What evaluations depend on, and in which order they come."""
     return {
@@ -184,6 +228,9 @@ def _problem_settings(
         "vary": {name: [float(x) for x in bounds] for name, bounds in vary.items()},
         "goal": [dict(told), sense],
         "settings": settings._asdict(),
+        "ensemble": None
+        if ensemble is None
+        else {"of": ensemble.names, "factors": ensemble.factors.tolist(), "by": ensemble.criterion},
     }
 
 

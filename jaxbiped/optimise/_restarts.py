@@ -13,7 +13,8 @@ from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._design_problem import Design, DesignProblem, GaitSettings
+from jaxbiped.optimise._design_problem import Design, DesignProblem
+from jaxbiped.optimise._ensemble import GaitSettings
 from jaxbiped.scene._parameters import parameter_names, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene

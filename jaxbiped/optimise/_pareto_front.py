@@ -1,17 +1,15 @@
-"""Robust design: objectives under scatter of parameters, and the trade between two of them."""
+"""Pareto front: the trade between two measures of a gait."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_choice, check_count
+from jaxbiped._checks import ArgumentError
 from jaxbiped.optimise._objectives import check_objective
 from jaxbiped.optimise._optimise_gait import Optimum, optimise_gait
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-
-SENSES = ("maximise", "minimise")
 
 
 class ParetoFront(NamedTuple):
