@@ -147,16 +147,22 @@ def run_trust_constr(functions: Functions, u: np.ndarray, iterations: int, told:
                 jac=lambda x: functions.spare_gradients(x, rows),
             )
         )
-    found = minimize(
-        functions.objective,
-        np.clip(u, _EDGE, 1.0 - _EDGE),
-        jac=True,
-        method="trust-constr",
-        bounds=Bounds(0.0, 1.0, keep_feasible=True),
-        constraints=constraints,
-        callback=lambda x, _: told(x),
-        options={"maxiter": iterations, "gtol": 1e-6, "xtol": 1e-7},
-    )
+    try:
+        found = minimize(
+            functions.objective,
+            np.clip(u, _EDGE, 1.0 - _EDGE),
+            jac=True,
+            method="trust-constr",
+            bounds=Bounds(0.0, 1.0, keep_feasible=True),
+            constraints=constraints,
+            callback=lambda x, _: told(x),
+            options={"maxiter": iterations, "gtol": 1e-6, "xtol": 1e-7},
+        )
+    except ArgumentError:
+        raise
+    except (ValueError, np.linalg.LinAlgError) as error:
+        # Where derivatives grow without bound, as at corners of the spectral radius.
+        return Ended(False, f"SciPy's trust-constr broke down: {error}.")
     return Ended(found.status in (1, 2), str(found.message))
 
 

@@ -22,6 +22,8 @@ _PENALTY, _MOST = 10.0, 1e5
 """Weight of missed requirements, at first and at most."""
 _GAIN = 1e-9
 """Expected gain, relative to the objective's size, below which there is nothing more to gain."""
+_STEEPEST = 1e6
+"""Norm of the curvature beyond which it is forgotten."""
 _CUTS = 6
 """Linearisations at rejected trials that are kept."""
 
@@ -242,7 +244,10 @@ def _updated(curvature: np.ndarray, here: _Local, there: _Local) -> np.ndarray:
     if step @ change < 0.2 * own:
         mixed = 0.8 * own / (own - float(step @ change))
         change = mixed * change + (1.0 - mixed) * bent
-    return curvature - np.outer(bent, bent) / own + np.outer(change, change) / float(step @ change)
+    updated = curvature - np.outer(bent, bent) / own
+    updated += np.outer(change, change) / float(step @ change)
+    # Across a corner derivatives jump, which tells of no curvature.
+    return updated if np.linalg.norm(updated) < _STEEPEST else np.eye(len(step))
 
 
 def _multipliers(of: _Local) -> np.ndarray:
