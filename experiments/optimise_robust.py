@@ -1,8 +1,8 @@
 """Designs that hold under scatter of the contact and of the slope, and the trade that they make.
 
 Writes optimise_robust.png. The leg is made as fast as a bound of the spectral radius allows: for
-the nominal walker, in the mean over an ensemble and for its worst member: stiffness, damping, Stribeck
-rate and slope differ from member to member. Then the front of speed against spectral radius. Each
+the nominal walker, in the mean over an ensemble, and for its worst member. Stiffness, damping,
+Stribeck rate and slope differ from member to member. Then the front of speed against radius. Each
 design is tried on an ensemble that it was not made for.
 """
 

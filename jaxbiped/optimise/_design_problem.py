@@ -25,6 +25,8 @@ from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
+_KEPT = 1e-6
+"""Part of its bound by which a requirement may be missed and still counts as kept, at least."""
 _HALVINGS = 5
 """How often a step to a design is halved before its gait is given up."""
 _FLOOR, _ASIDE, _NEAR = 0.1, 0.5, 0.02
@@ -138,6 +140,16 @@ class DesignProblem:
                 if bound is not None:
                     worst = max(worst, sign * (bound - value) / scale_of(bound))
         return worst
+
+    def allowance(self, known: Evaluation) -> float:
+        """What of `excess` is within the error bars of the measures."""
+        sizes = [
+            known.errors[each.name] / scale_of(bound)
+            for each in self.requirements
+            for bound in (each.low, each.high)
+            if bound is not None
+        ]
+        return max([_KEPT, *sizes])
 
     def from_guess(self, u: np.ndarray, guess: np.ndarray) -> Evaluation | None:
         """What is known of a design whose gait is near a guess, shape (m,)."""

@@ -18,8 +18,6 @@ from jaxbiped.optimise._optimisers import (
 )
 from jaxbiped.optimise._trust_region import run_trust_region
 
-_KEPT = 1e-5
-"""Part of its bound by which a requirement may be missed and still counts as kept."""
 _OPTIMAL = 1e-3
 """Residual of the conditions of optimality from which a design counts as an optimum."""
 
@@ -27,7 +25,8 @@ _OPTIMAL = 1e-3
 class Outcome(enum.IntEnum):
     """How an optimisation ended. `str(outcome)` is its name in words.
 
-    - converged: the optimiser's own test is met, and every requirement kept.
+    - converged: the optimiser's own test is met, and every requirement kept, to
+      its measure's error bar.
     - corner: no better design was found nearby, but the derivatives do not balance: as at corners
       of the spectral radius, where multipliers meet.
     - unfinished: the iterations were used up, or the optimiser could not go on.
@@ -105,7 +104,7 @@ class Runs:
         if self.interrupted:
             return Outcome.INTERRUPTED
         told = optimality_of(self.problem, self.best)
-        if told.excess > _KEPT:
+        if told.excess > self.problem.allowance(self.best.known):
             return Outcome.INFEASIBLE
         optimal = told.residual <= _OPTIMAL
         if not self.ended.converged:
@@ -128,4 +127,5 @@ class Runs:
     def _rank(self, design: Design) -> tuple[float, float]:
         """Designs nearer to the requirements come first, and of those that keep them the better."""
         excess = self.problem.excess(design.known)
-        return max(excess, _KEPT), self.problem.objective(design.known)[0]
+        kept = excess <= self.problem.allowance(design.known)
+        return 0.0 if kept else excess, self.problem.objective(design.known)[0]

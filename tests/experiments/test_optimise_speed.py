@@ -8,19 +8,21 @@ from tests.experiments.quick import quick_run
 pytestmark = pytest.mark.slow
 
 
-def test_the_radius_falls_at_no_loss_of_speed(tmp_path):
+def test_the_radius_is_halved_at_no_loss_of_speed(tmp_path):
     numbers, figures = quick_run("optimise_speed", tmp_path)
     (figure,) = figures.values()
-    assert_is_drawn(figure, unitless={"iteration", "spectral radius", *_PARTS})
-    seed, calm = numbers["seed"], numbers["calmest"]
-    assert calm["measures"]["spectral_radius"] < 0.5 * seed["spectral_radius"]
-    assert calm["measures"]["speed"] >= seed["speed_m_s"] * (1.0 - 1e-5)
-    for certificate in (seed["certificate"], calm["certificate"]):
-        assert certificate["stable"] is True
-        assert certificate["returned"] is True
-    fast = numbers["fastest"]["trust-region"]
-    assert fast["measures"]["speed"] > seed["speed_m_s"]
-    assert fast["measures"]["spectral_radius"] <= 0.4 * (1.0 + 1e-5)
-
-
-_PARTS = ("real part of a multiplier", "imaginary part")
+    axes = {"gait sensitivity norm", "spectral radius"}
+    axes |= {"real part of a multiplier", "imaginary part"}
+    assert_is_drawn(figure, unitless=axes)
+    told = numbers["designs"]
+    seed = told["seed"]["measures"]
+    for name in ("calmest", "least radius"):
+        measures = told[name]["measures"]
+        assert measures["spectral_radius"] <= 0.5 * seed["spectral_radius"] * (1.0 + 1e-4)
+        assert measures["speed"] >= seed["speed"] * (1.0 - 1e-4)
+    for each in told.values():
+        assert each["certificate"]["stable"] is True
+        assert each["certificate"]["returned"] is True
+    fast = numbers["fastest"]["trust-region"]["measures"]
+    assert fast["speed"] > seed["speed"]
+    assert fast["spectral_radius"] <= 0.4 * (1.0 + 1e-4)
