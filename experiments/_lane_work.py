@@ -110,7 +110,7 @@ def scenes(count: int, duration: float, *, quick: bool) -> list[dict[str, Any]]:
         def one(*state: Any, scene: jb.Scene = scene) -> Any:
             options: dict[str, Any] = dict(save="end", engine="lanes", watch=_WATCH)
             end = jb.simulate(scene, jb.State(*state), duration=0.2 * duration, **options)
-            return end.accepted + end.rejected
+            return end.attempted
 
         jax.vmap(one)(*starts)
         began = time.perf_counter()

@@ -5,14 +5,15 @@ import enum
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped.solve._ending import Ending
+from jaxbiped._ending import Ending
 
 WALKING_NAME = "walking period-{period}"
 """What a start that walks is called, by the footsteps in a cycle of its gait."""
 
 
 class Label(enum.IntEnum):
-    """What became of a start. `str(label)` is its name in words; every `Ending` is a label.
+    """What became of a start. `str(label)` is its name in words; every `Ending` of a walk is
+    a label.
 
     - walking: it converges to a periodic gait; see the gait for its period.
     - fell forward, fell back, stopped, stumbled, out of steps, solver failed, timed out: as in

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
+from jaxbiped._ending import Ending
 from jaxbiped._quantity import Quantity
 from jaxbiped._summary import summary
 from jaxbiped._types import Scalar
@@ -23,7 +24,6 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameters import parameter_quantities
-from jaxbiped.solve._ending import Ending
 
 _NOTHING = 1e-9
 """A measure (SI units) that is zero but for the solve's error has no elasticity."""

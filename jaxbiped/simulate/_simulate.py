@@ -87,8 +87,9 @@ def simulate(
             because friction saturates, and derivatives do not.
         save: "steps" for every step and the continuous solution, "end" for the final state, an
             array of increasing times [s], shape (n,), at which to save, or a section (by lanes
-            only), at whose arrivals to save: `HeelStrike()` saves the footsteps. The legs take
-            turns there as in `return_map`, but the states saved keep their own names.
+            only), whose `arrivals` to save beside the final state: `HeelStrike()` saves the
+            footsteps. The legs take turns there as in `return_map`, but the states saved keep
+            their own names.
         max_arrivals: how many arrivals at a section there is room for.
         extremes: a function of (scene, state) whose least and largest values, number by number,
             over the ends of all steps are wanted.

@@ -244,7 +244,7 @@ class RigidLabelling(AbstractLabellingLoop):
             footsteps=walked.footsteps,
             time=walked.t,
             distance=state_with_hip(start.solve, walked).hip_x - start.solve.state.hip_x,
-            attempts=walked.attempts,
+            attempts=walked.accepted + walked.rejected,
         )
 
 

@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.solve._accuracy import Precision, rms_norm
-from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.variational._switch_locator import (

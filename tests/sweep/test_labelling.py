@@ -109,8 +109,8 @@ def test_a_walker_at_rest_is_given_up_after_the_longest_wait_for_a_footstep():
     assert found.time[0] >= 50.0 * np.sqrt(0.4 / 9.8)
 
 
-def test_every_ending_is_a_label_and_stored_codes_keep_their_meaning():
-    for ending in jb.Ending:
+def test_every_ending_of_a_walk_is_a_label_and_stored_codes_keep_their_meaning():
+    for ending in set(jb.Ending) - {jb.Ending.FINISHED}:
         assert jb.basins.Label[ending.name].value == ending.value
         assert str(jb.basins.Label(ending.value)) == str(ending)
     own = {
