@@ -99,7 +99,14 @@ def _second_derivatives(spec: ReturnMapSpec, active: tuple[int, ...], radius: bo
 
 
 def slopes_of(last: LinearisedReturn) -> Slopes:
-    """x(p) = P(x(p), p) differentiated: dx = (I − P_x)⁻¹ P_p, and all else by the chain rule."""
+    """x(p) = P(x(p), p) differentiated: dx = (I − P_x)⁻¹ P_p, and all else by the chain rule.
+
+    Args:
+        last: a return to where it began, with p directions of parameters.
+
+    Returns:
+        Derivatives of the orbit, in units of the parameters' sizes.
+    """
     m = last.recurring.shape[0]
     by_state, by_parameter = last.jacobian[:, :m], last.jacobian[:, m:]
     recurring = solve(jnp.eye(m) - by_state, by_parameter)

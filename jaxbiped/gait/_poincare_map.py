@@ -36,19 +36,23 @@ PARAMETER_FLOOR = 1e-4
 
 
 class LinearisedReturn(NamedTuple):
-    """One return. With m recurring components, p parameters and n = m + p directions:
+    """One return, with derivatives along n = m + p directions.
+
+    Those of the m recurring components come first, then each of the p parameters' in units of its
+    size (1 where it is zero).
 
     Attributes:
-        recurring: the m components that must return.
+        recurring: the components that must return, SI units, shape (m,).
         jacobian: their derivatives on the section, shape (m, n).
         monodromy: their derivatives at a fixed time, shape (m, n).
         velocity: their rates where the cycle ends, shape (m,).
-        period: duration [s]; `period_row` its derivatives, shape (n,).
-        advance: what the cyclic coordinates gained, shape (d,); `advance_rows` (d, n).
-        peak: largest load; `peak_row` (n,). Zeros where the system has none.
+        period, period_row: duration [s], and its derivatives, shape (n,).
+        advance, advance_rows: what the d cyclic coordinates gained, shape (d,), and (d, n).
+        peak, peak_row: largest load, and (n,). Zeros where the system has none.
         code: 0 or that of an `Ending`.
         attempted: solver steps attempted.
-        jumps: crossings where the vector field itself jumped; `missed` of them had no correction.
+        jumps, missed: crossings where the vector field itself jumped, and how many of them had no
+            correction.
         nodes: the ends of the steps of each solve to the section, leaves (steps, …), where saved.
     """
 

@@ -20,6 +20,7 @@ from jaxbiped._checks import (
     check_unbatched,
 )
 from jaxbiped._types import Numbers, Scalar
+from jaxbiped.compiler import Request
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
@@ -272,12 +273,16 @@ class Simulation(eqx.Module):
 
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
-        request = able_request(self)
+        request = self.lane_request()
         return trim(by_xla(self)) if request is None else by_lanes(self, request)
+
+    def lane_request(self) -> Request | None:
+        """What it asks of `jaxbiped.compiler.LANES`; None where XLA runs it."""
+        return able_request(self)
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
-        request = able_request(self)
+        request = self.lane_request()
         if request is not None:
             return CompiledSimulation(prepare_lanes(self, request), self)
         program = by_xla.lower(self).compile()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 FIELDS: dict[str, tuple[str, float, str, str]] = {
     "label": ("i1", int(Label.PENDING), "", "what became of the start"),
     "gait": ("i2", -1, "", "position of the gait that it converges to"),
-    "period": ("i2", 0, "footsteps", "cycle of the gait that it converges to"),
+    "cycle_footsteps": ("i2", 0, "footsteps", "cycle of the gait that it converges to"),
     "footsteps": ("i4", 0, "", "heel strikes until the label was certain"),
     "time": ("f8", np.nan, "s", "simulated time until the label was certain"),
     "distance": ("f8", np.nan, "m", "distance walked until the label was certain"),

@@ -276,9 +276,7 @@ def test_extremes_of_the_contact_parameters():
 
     angles = jnp.full(len(cases), jb.seed_state().theta_1)
     ends = _batch(angles, jnp.array([*cases.values()]), 2.0, ACCURACIES["balanced"].walk)
-    for name, ending, attempts in zip(
-        cases, ends.ending, ends.attempted, strict=True
-    ):
+    for name, ending, attempts in zip(cases, ends.ending, ends.attempted, strict=True):
         assert jb.Ending(int(ending)) == jb.Ending.WALKING, name
         assert int(attempts) < 40000, name
 
