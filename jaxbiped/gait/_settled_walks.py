@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import exchange_legs
@@ -86,8 +86,7 @@ def _arrivals(scene: Scene, starts: PyTree) -> tuple[Scalar, PyTree]:
         )
         total, last = _last_arrivals(walk)
         stands = jnp.abs(last.theta_1) < jnp.abs(last.theta_2)
-        last = jtu.tree_map(lambda a, b: jnp.where(stands, a, b), exchange_legs(last), last)
-        return total, last
+        return total, select(stands, exchange_legs(last), last)
 
     return jax.vmap(one)(starts)
 

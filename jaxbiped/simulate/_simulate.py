@@ -282,11 +282,9 @@ class Simulation(eqx.Module):
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
-        request = self.lane_request()
-        if request is not None:
+        if (request := self.lane_request()) is not None:
             return CompiledSimulation(prepare_lanes(self, request), self)
-        program = by_xla.lower(self).compile()
-        return CompiledSimulation(program, self)
+        return CompiledSimulation(by_xla.lower(self).compile(), self)
 
 
 class CompiledSimulation:

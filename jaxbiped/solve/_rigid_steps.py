@@ -3,11 +3,10 @@
 from typing import NamedTuple
 
 import jax.numpy as jnp
-import jax.tree_util as jtu
 
 from jaxbiped._circular import sine_cosine
 from jaxbiped._ending import Ending
-from jaxbiped._types import Scalar, SomeTree
+from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -132,12 +131,12 @@ def attempt_step(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Sc
     strike = _strike(walk, trial, roughly)
     free, kept = _after_free_step(walk, now, trial, error, roughly, strike)
     landing = now.landing > 0
-    after = _where(landing, _landing(walk, now, trial, strike), free)
-    after = _where(after.struck, _after_strike(walk, after, strike), after)
+    after = select(landing, _landing(walk, now, trial, strike), free)
+    after = select(after.struck, _after_strike(walk, after, strike), after)
     # The last stage is the first one of the next step, after an impact from the new state.
-    rates = accelerations(walk.scene, _where(after.struck, strike.state, trial))
+    rates = accelerations(walk.scene, select(after.struck, strike.state, trial))
     accepted = landing | kept
-    rates = _where(accepted, rates, now.rates)
+    rates = select(accepted, rates, now.rates)
     one = jnp.where(accepted, 1, 0)
     after = after._replace(
         rates=rates, accepted=now.accepted + one, rejected=now.rejected + (1 - one)
@@ -245,7 +244,7 @@ def _after_free_step(
     lost = ~jnp.isfinite(pace) | (pace <= _ROUNDING * t)
     after = now._replace(
         t=t,
-        state=_where(keep, trial, now.state),
+        state=select(keep, trial, now.state),
         step=jnp.where(closes, back, _step(walk, t, pace, now.due, now.period)),
         pace=pace,
         landing=jnp.where(closes, 1, 0),
@@ -273,7 +272,3 @@ def _landing(
 def _opening(state: RigidState) -> tuple[Scalar, Scalar]:
     """Sum of the leg angles and its rate: above zero while the swing foot ahead is off ground."""
     return state.theta_1 + state.theta_2, state.omega_1 + state.omega_2
-
-
-def _where(condition: Scalar, a: SomeTree, b: SomeTree) -> SomeTree:
-    return jtu.tree_map(lambda x, y: jnp.where(condition, x, y), a, b)

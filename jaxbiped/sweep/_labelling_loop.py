@@ -10,10 +10,9 @@ from typing import Generic, NamedTuple, TypeVar
 import equinox.internal as eqxi
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Parameter, Scalar, select
 from jaxbiped.basins._label import Label
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
@@ -284,7 +283,7 @@ def _trace_or(
     """A new trace where the condition holds; made only if it does in any start of the batch."""
 
     def made() -> ArrivalHistory:
-        return jtu.tree_map(lambda a, b: jnp.where(condition, a, b), make(), old)
+        return select(condition, make(), old)
 
     trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(condition), made, lambda: old)
     return trace
