@@ -158,7 +158,7 @@ def basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
         "labelled_in_this_run": fresh,
         "starts_per_s": fresh / seconds,
         "mean_footsteps": float(found.footsteps.mean()),
-        "solver_steps": int(found.attempts.sum()),
+        "solver_steps": int(found.attempted.sum()),
         "gaits": gaits,
     }
 

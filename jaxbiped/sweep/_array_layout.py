@@ -23,7 +23,7 @@ FIELDS: dict[str, tuple[str, float, str, str]] = {
     "distance": ("f8", np.nan, "m", "distance walked until the label was certain"),
     "rate": ("f8", np.nan, "", "share of the distance from the gait left after a footstep"),
     "closest": ("f8", np.nan, "", "smallest distance from a gait, in its metric"),
-    "attempts": ("i4", 0, "", "attempted steps of the solver"),
+    "attempted": ("i4", 0, "", "attempted steps of the solver"),
 }
 """Of each field: dtype, value before it is known, unit, and what it is."""
 

@@ -113,6 +113,6 @@ def _empty_outcome(size: int) -> Outcome[np.ndarray]:
         distance=real,
         rate=real,
         closest=real,
-        attempts=whole,
+        attempted=whole,
         final=tuple([real] * size),
     )

@@ -53,7 +53,7 @@ class Labelled(NamedTuple):
         rate: share of the distance from the gait that is left after a footstep, over the last
             cycle; NaN without a cycle, and where nothing but rounding is left of the distance.
         closest: smallest distance from any of the gaits, in its metric; infinite without arrival.
-        attempts: of the solver's steps.
+        attempted: how many steps the solver attempted.
         final: last states on the section without hip_x, shape (n, m); infinite without arrival.
     """
 
@@ -65,7 +65,7 @@ class Labelled(NamedTuple):
     distance: np.ndarray
     rate: np.ndarray
     closest: np.ndarray
-    attempts: np.ndarray
+    attempted: np.ndarray
     final: np.ndarray
 
     @property
@@ -129,7 +129,7 @@ class Labelling(eqx.Module):
             distance=outcome.distance,
             rate=outcome.rate,
             closest=outcome.closest,
-            attempts=outcome.attempts.astype(np.int32),
+            attempted=outcome.attempted.astype(np.int32),
             final=np.stack(outcome.final, axis=1),
         )
 

@@ -63,7 +63,7 @@ class Outcome(NamedTuple, Generic[_Number]):
     distance: _Number
     rate: _Number
     closest: _Number
-    attempts: _Number
+    attempted: _Number
     final: tuple[_Number, ...]
 
 
@@ -146,7 +146,7 @@ class CompliantLabelling(AbstractLabellingLoop):
             footsteps=count,
             time=solved.t,
             distance=solved.state.hip_x - start.solve.state.hip_x,
-            attempts=solved.accepted + solved.rejected,
+            attempted=solved.accepted + solved.rejected,
         )
 
     def _traced(self, start: Start, now: Progress, after: PyTree) -> ArrivalHistory:
@@ -243,7 +243,7 @@ class RigidLabelling(AbstractLabellingLoop):
             footsteps=walked.footsteps,
             time=walked.t,
             distance=state_with_hip(start.solve, walked).hip_x - start.solve.state.hip_x,
-            attempts=walked.accepted + walked.rejected,
+            attempted=walked.accepted + walked.rejected,
         )
 
 
@@ -254,7 +254,7 @@ def _outcome(
     footsteps: Scalar,
     time: Scalar,
     distance: Scalar,
-    attempts: Scalar,
+    attempted: Scalar,
 ) -> Outcome[Scalar]:
     """A failure is certain; all footsteps walked without a verdict are not."""
     kind = trace.verdict.dtype
@@ -272,7 +272,7 @@ def _outcome(
         distance=distance,
         rate=trace.rate,
         closest=trace.closest,
-        attempts=attempts,
+        attempted=attempted,
         final=trace.recent[0],
     )
 

@@ -96,7 +96,7 @@ def test_a_start_without_any_verdict_is_unresolved_and_a_cap_is_told(simplest):
     assert (again.names[0], again.cycle_footsteps[0], again.gait[0]) == ("unresolved", 1, -1)
     assert again.footsteps[0] < 12
     capped = gaitless(simplest.scene, simplest_state(*STABLE), max_solver_steps=5)(state)
-    assert (capped.names[0], capped.attempts[0]) == ("out of steps", 5)
+    assert (capped.names[0], capped.attempted[0]) == ("out of steps", 5)
 
 
 def test_a_walker_at_rest_is_given_up_after_the_longest_wait_for_a_footstep():
