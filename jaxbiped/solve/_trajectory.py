@@ -122,7 +122,8 @@ class Trajectory(eqx.Module, Generic[SomeState]):
         """
         if self.dense is None:
             raise ValueError(
-                'Nothing is known between the saved times: simulate with save="steps".'
+                "Nothing is known between the saved times: only `simulate` keeps that, with "
+                'save="steps".'
             )
         if jnp.ndim(self.t) != 1:
             raise ValueError("This is a batch of trajectories: look at one of them at a time.")
