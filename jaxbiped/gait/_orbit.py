@@ -83,7 +83,7 @@ def orbit_of(
     _, sizes = seed_directions(args, active, m)
     radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
     if _second_derivatives(spec, active, radius):
-        # Lanes take both at once; XLA would compute in lockstep and compile for longer.
+        # Lanes take both at once; XLA would compute in lockstep.
         each_of = jax.vmap if spec.engine == "lanes" else _map_over_rows
         radius_slopes, looser_slopes = each_of(
             lambda each: _radius_slopes(spec, args, active, guess, each)

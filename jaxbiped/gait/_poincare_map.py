@@ -13,6 +13,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
+from jaxbiped.compiler import Recorded
 from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import Precision
@@ -178,6 +179,7 @@ def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) 
     state, columns = along_columns(lambda s, a: minimal_state(a, s), found.y, args)
     nodes = found.nodes
     if nodes is not None:
+        assert isinstance(nodes.ends, Recorded)
         structure = jtu.tree_structure(found.y.state)
 
         def left(rows: Scalar) -> Scalar:
@@ -185,7 +187,8 @@ def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) 
             outside = jtu.tree_leaves(minimal_state(args.args, inside))
             return jnp.stack([rows[..., 0], *outside], axis=-1)
 
-        nodes = Nodes(left(nodes.start), left(nodes.ends), left(nodes.arrival), nodes.steps)
+        ends = Recorded(left(jnp.asarray(nodes.ends.values)), nodes.ends.counts)  # type: ignore[arg-type]
+        nodes = Nodes(left(nodes.start), ends, left(nodes.arrival), nodes.steps)
     return found._replace(y=Tangents(state, as_columns(columns)), nodes=nodes)
 
 
