@@ -134,14 +134,8 @@ def _params(
     recorder: Recorder | None = None,
 ) -> dict[str, Any]:
     """Of the operation: what is run and how, and which part of what that gives is wanted."""
-    return dict(
-        compiled=compiled,
-        schedule=schedule,
-        room=room,
-        quick=quick,
-        wants=wants,
-        recorder=recorder,
-    )
+    how = dict(compiled=compiled, schedule=schedule, room=room, quick=quick)
+    return how | dict(wants=wants, recorder=recorder)
 
 
 def _numbers(inputs: PyTree) -> Numbers:
