@@ -67,6 +67,11 @@ class Recording(eqx.Module):
     numbers: Numbers
     recorder: Recorder = eqx.field(static=True)
 
+    @property
+    def room(self) -> int:
+        """For how many records there was room."""
+        return self.recorder.room
+
     def columns(self, first: Numbers) -> list[Array]:
         """For each of the first k numbers `first`'s and then those recorded, NaN beyond the last.
 
