@@ -2,12 +2,13 @@
 
 import pytest
 
+from tests.drawn import assert_is_drawn, labels_of
 from tests.experiments.quick import quick_run
 
 pytestmark = pytest.mark.slow
 
 
-def test_identify(tmp_path):
+def test_estimates_scatter_as_their_errors_say(tmp_path):
     run = quick_run("identify", tmp_path)
     numbers = run.numbers
     assert numbers["converged"] == numbers["sets"] == 3
@@ -18,4 +19,4 @@ def test_identify(tmp_path):
         assert off < 4.0 * held["mean_standard_error"]
         assert 0.0 < held["mean_standard_error"] < 0.1 * held["truth"]
     (figure,) = run.figures.values()
-    assert [len(axes.patches) > 0 for axes in figure.axes] == [True] * 3
+    assert_is_drawn(figure, unitless=set(labels_of(figure)))
