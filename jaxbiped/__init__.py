@@ -19,6 +19,7 @@ from jaxbiped import basins as basins
 from jaxbiped import constraints as constraints
 from jaxbiped import dynamics as dynamics
 from jaxbiped import gait as gait
+from jaxbiped import identify as identify
 from jaxbiped import measure as measure
 from jaxbiped.scene import laws as laws
 from jaxbiped.solve import solvers as solvers
@@ -81,6 +82,9 @@ from jaxbiped.gait._gradient_modes import Implicit as Implicit
 from jaxbiped.gait._gradient_modes import Reverse as Reverse
 from jaxbiped.gait._return_map import return_map as return_map
 from jaxbiped.gait._rolling_starts import rolling_starts as rolling_starts
+
+# Identification.
+from jaxbiped.identify._fit_gait import fit_gait as fit_gait
 
 # Basins and sweeps.
 from jaxbiped.sweep._attractor import Attractor as Attractor
