@@ -21,6 +21,7 @@ from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.simulate._simulate import simulate
 from jaxbiped.solve._engine import ENGINES
+from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.sweep._prepare import labelling
 from jaxbiped.sweep.starts._starts import sample
 
@@ -166,20 +167,20 @@ def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> Wal
     state: WalkerState = gait.measures.state
     fast = [name for name in state._fields if name.startswith(("hip_v", "omega"))]
     pushed = state._replace(**{name: getattr(state, name) * (1.0 + push) for name in fast})
+    walk: Trajectory[Any]
     if isinstance(scene, RigidScene):
-        rigid = rigid_walk(scene, cast(RigidState, pushed), footsteps=count, max_arrivals=count)
-        times = np.asarray(rigid.strikes[0])
+        walk = rigid_walk(scene, cast(RigidState, pushed), footsteps=count, max_arrivals=count)
     else:
-        steps = max(65536, 1024 * count)
         walk = simulate(
             scene,
             pushed,
             footsteps=count,
             save=HeelStrike(),
             max_arrivals=count,
-            max_solver_steps=steps,
+            max_solver_steps=max(65536, 1024 * count),
         )
-        times = np.asarray(walk.t)
+    assert walk.arrivals is not None
+    times = np.asarray(walk.arrivals.t)
     times = times[np.isfinite(times)]
     last = float(times[-1] - times[-2]) if len(times) > 1 else np.nan
     difference = abs(last / float(gait.measures.period) - 1.0)

@@ -21,7 +21,7 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.linalg._small_matrices import solve
-from jaxbiped.optimise._cycle_integrals import MotionSection, integrals_of, with_integrals
+from jaxbiped.optimise._cycle_integrals import UNITS, MotionSection, integrals_of, with_integrals
 from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -121,7 +121,8 @@ def _functionals(
     def at(precision: Precision) -> tuple[Scalar, Scalar, Scalar]:
         once = linearised_return(spec, seeds, y, precision, jnp.asarray(False))
         values, slopes = _totals(once, point)
-        return values, slopes / sizes, once.code
+        units = jnp.asarray([UNITS.get(name, 1.0) for name in integral_names(scene)])
+        return units * values, units[:, None] * slopes / sizes, once.code
 
     values, slopes, code = jax.vmap(at)(both)
     return Functionals(
