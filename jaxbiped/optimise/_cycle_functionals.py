@@ -4,6 +4,7 @@ from typing import NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
@@ -17,16 +18,18 @@ from jaxbiped.gait._poincare_map import (
     linearised_return,
     recurring_components,
     seed_directions,
+    state_with,
 )
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.linalg._small_matrices import solve
-from jaxbiped.optimise._cycle_integrals import UNITS, MotionSection, integrals_of, with_integrals
+from jaxbiped.optimise._cycle_integrals import MotionSection, integrals_of, with_integrals
 from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, precision_of
 from jaxbiped.variational._hybrid_system import AbstractSystem, section_of
+from jaxbiped.variational._tangents import Seeded
 
 _PATIENCE = 50.0
 """Time allowed to the next arrival, in units of √(l/g)."""
@@ -112,26 +115,45 @@ def _functionals(
     spec: ReturnMapSpec, scene: Scene | RigidScene, state: WalkerState, accuracy: str
 ) -> Functionals:
     y = with_integrals(state)
-    point = recurring_components(spec.system, y)
     _, active = select_parameters(scene, None)
-    seeds, sizes = seed_directions(scene, active, len(point))
+    seeds, sizes = seed_directions(scene, active, len(recurring_components(spec.system, y)))
     fine = precision_of(accuracy, scene)
+    y = corrected(spec, seeds, y, fine)
+    point = recurring_components(spec.system, y)
     both = Precision(*(jnp.asarray([tol, LOOSER * tol]) for tol in fine))
 
     def at(precision: Precision) -> tuple[Scalar, Scalar, Scalar]:
         once = linearised_return(spec, seeds, y, precision, jnp.asarray(False))
         values, slopes = _totals(once, point)
-        units = jnp.asarray([UNITS.get(name, 1.0) for name in integral_names(scene)])
-        return units * values, units[:, None] * slopes / sizes, once.code
+        return values, slopes / sizes, once.code
 
-    values, slopes, code = jax.vmap(at)(both)
+    return with_errors(*jax.vmap(at)(both))
+
+
+def with_errors(values: Scalar, slopes: Scalar, code: Scalar) -> Functionals:
+    """Functionals from a fine solve and a looser one, leaves (2, …); NaN unless both returned."""
+    known = jnp.where(jnp.all(code == 0), 1.0, jnp.nan)
     return Functionals(
-        values=values[0],
-        errors=jnp.abs(values[0] - values[1]),
-        slopes=slopes[0],
-        slope_errors=jnp.abs(slopes[0] - slopes[1]),
+        values=values[0] * known,
+        errors=jnp.abs(values[0] - values[1]) * known,
+        slopes=slopes[0] * known,
+        slope_errors=jnp.abs(slopes[0] - slopes[1]) * known,
         code=jnp.max(code),
     )
+
+
+def corrected(spec: ReturnMapSpec, seeds: Seeded, y: PyTree, precision: Precision) -> PyTree:
+    """A state near a fixed point after one more correction by Newton.
+
+    What a search leaves is below its tolerance, but derivatives along contact feel it.
+    """
+    point = recurring_components(spec.system, y)
+    once = linearised_return(
+        spec, seeds, y, precision, jnp.asarray(False), carries_parameters=jnp.asarray(False)
+    )
+    m = len(point)
+    step = solve(jnp.eye(m) - once.jacobian[:, :m], once.recurring - point)
+    return state_with(spec.system, y, point + jnp.where(once.code == 0, step, 0.0))
 
 
 def _totals(once: LinearisedReturn, point: Scalar) -> tuple[Scalar, Scalar]:

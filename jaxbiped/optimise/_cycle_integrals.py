@@ -28,8 +28,6 @@ COMPLIANT = ("slip_distance", "friction_loss", "impact_loss")
 """Integrals of a walker with laws of contact."""
 RIGID = ("impact_loss",)
 """Those of the rigid walker."""
-UNITS = {"slip_distance": 1e-3, "friction_loss": 1e-2, "impact_loss": 1.0}
-"""Of their coordinates (SI): steps are chosen by them, too, and what is small counts as much."""
 
 
 def _with_integrals(kind: Any, integrals: tuple[str, ...]) -> Any:
@@ -80,9 +78,9 @@ class WalkingIntegrals(AbstractSystem):
         for foot in feet(args, state):
             slip = slip + jnp.where(touches(foot), jnp.abs(foot.slip_speed), 0.0)
         rates = {
-            "slip_distance": slip / UNITS["slip_distance"],
-            "friction_loss": power.friction / UNITS["friction_loss"],
-            "impact_loss": power.indentation / UNITS["impact_loss"],
+            "slip_distance": slip,
+            "friction_loss": power.friction,
+            "impact_loss": power.indentation,
         }
         return _joined(y, Walking().vector_field(t, state, args), rates)
 
@@ -133,7 +131,7 @@ class RollingIntegrals(AbstractSystem):
         state = _motion(y)
         after = impact(args, state).state
         lost = _kinetic(args, state) - _kinetic(args, after)
-        return _joined(y, after, {"impact_loss": y.impact_loss + lost / UNITS["impact_loss"]})
+        return _joined(y, after, {"impact_loss": y.impact_loss + lost})
 
     def load(self, args: RigidScene, y: PyTree) -> Scalar:
         """How deep the swing foot is underground [m]."""

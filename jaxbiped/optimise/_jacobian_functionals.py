@@ -24,7 +24,12 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.linalg._small_matrices import eigenpairs, invert, singular_pairs
-from jaxbiped.optimise._cycle_functionals import Functionals, cycle_spec
+from jaxbiped.optimise._cycle_functionals import (
+    Functionals,
+    corrected,
+    cycle_spec,
+    with_errors,
+)
 from jaxbiped.optimise._disturbed_cycle import UndisturbedSection, disturbed, undisturbed
 from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -100,6 +105,7 @@ def _functionals(
     _, active = select_parameters(scene, None)
     seeds, sizes = seed_directions(scene, active, m)
     fine = precision_of(accuracy, scene)
+    y = corrected(spec, seeds, y, fine)
     both = Precision(*(jnp.asarray([tol, LOOSER * tol]) for tol in fine))
 
     def once(precision: Precision) -> LinearisedReturn:
@@ -129,14 +135,7 @@ def _functionals(
         found = jnp.where(once.jumps > 0, jnp.nan, jnp.stack(slopes))
         return jnp.stack([each.value for each in told]), found / sizes
 
-    values, slopes = jax.vmap(at)(returns)
-    return Functionals(
-        values=values[0],
-        errors=jnp.abs(values[0] - values[1]),
-        slopes=slopes[0],
-        slope_errors=jnp.abs(slopes[0] - slopes[1]),
-        code=jnp.max(returns.code),
-    )
+    return with_errors(*jax.vmap(at)(returns), returns.code)
 
 
 class _Weighed(NamedTuple):

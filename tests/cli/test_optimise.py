@@ -6,6 +6,7 @@ import pytest
 
 from jaxbiped.cli import main
 
+pytestmark = pytest.mark.slow
 RIGID = [
     "optimise",
     "--model",

@@ -5,6 +5,7 @@ import pytest
 
 import jaxbiped as jb
 
+pytestmark = pytest.mark.slow
 RIGID = jb.ladder()["rigid"]
 
 
@@ -52,7 +53,6 @@ def test_the_place_of_the_nearest_bifurcation(best):
     assert found.walk is None
 
 
-@pytest.mark.slow
 def test_the_other_engine_finds_the_same_gait(best):
     found = jb.optimise.certify(best, starts=0, footsteps=0, other_engine=True)
     assert found.other_engine.engine == "xla"

@@ -10,6 +10,7 @@ from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_nam
 from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
 from jaxbiped.optimise._objectives import check_objective, evaluate
 
+pytestmark = pytest.mark.slow
 SCENES = jb.ladder() | {"heavy hip": jb.seed_scene(hip_mass=0.5, slope=0.025, r=0.1)}
 VARIED = ("d", "J", "slope")
 USUAL = (1e-3, 1e-5)
@@ -18,6 +19,7 @@ NOISY = {
     "spectral_radius": (3e-3, 3e-5),
     "radius_bound": (1e-3, 1e-4),
     "slip_distance": (1e-2, 1e-5),
+    "friction_loss": (1e-3, 1e-5),
 }
 """The same for what the balanced accuracy tells to its error bars alone, by the tight one."""
 

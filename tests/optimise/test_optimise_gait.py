@@ -11,6 +11,7 @@ from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._variables import variables_of
 
+pytestmark = pytest.mark.slow
 RIGID = jb.ladder()["rigid"]
 LEG = {"d": (0.08, 0.12), "r": (0.06, 0.1)}
 

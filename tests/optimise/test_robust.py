@@ -7,6 +7,7 @@ import jaxbiped as jb
 from jaxbiped.optimise._ensemble import GaitSettings, ensemble_of, evaluate_ensemble
 from jaxbiped.optimise._objectives import evaluate
 
+pytestmark = pytest.mark.slow
 RIGID = jb.ladder()["rigid"]
 SCATTER = {"slope": 0.1, "d": 0.05}
 WANTED = ("speed", "spectral_radius", "impact_loss")
