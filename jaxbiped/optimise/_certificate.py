@@ -61,7 +61,8 @@ class Certificate(NamedTuple):
 
     Attributes:
         optimality: conditions of Karush, Kuhn and Tucker: residual, multipliers, their errors.
-        multipliers: Floquet multipliers, largest first, complex; `multiplier_errors` estimated.
+        multipliers: Floquet multipliers, largest first, complex.
+        multiplier_errors: their estimated errors.
         unit_multiplier_error: distance from 1 of the multiplier that must be 1.
         stable: whether all lie inside the unit circle; None where an error bar crosses it.
         sensitivity_norm: see `OBJECTIVES`, with its error; infinite where the gait is not stable.

@@ -8,7 +8,6 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
-from scipy.stats import qmc
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_within
@@ -64,6 +63,8 @@ def ensemble_of(
         ArgumentError: an unknown parameter or criterion, one that is zero, or a scatter not
             between 0 and 1.
     """
+    from scipy.stats import qmc
+
     check_choice("criterion", criterion, CRITERIA)
     check_count("members", members)
     own = parameter_values(scene)

@@ -89,8 +89,10 @@ class Evaluation(NamedTuple):
     """Objectives of one gait with respect to the p parameters of its scene.
 
     Attributes:
-        values: by name; `errors` their estimated errors.
-        slopes: derivatives by name, shape (p,); `slope_errors` their estimated errors.
+        values: by name.
+        errors: their estimated errors.
+        slopes: derivatives by name, shape (p,).
+        slope_errors: their estimated errors.
         state: of the gait, its recurring components, shape (m,).
         state_slopes: derivatives, shape (m, p).
     """

@@ -20,7 +20,8 @@ class Held(NamedTuple):
     Attributes:
         name: of the measure, or of the variable at its bound.
         bound: that it is held to.
-        value: its value; `error` estimated.
+        value: its value.
+        error: estimated error of that.
         active: whether the bound holds the optimum back.
         multiplier: derivative of the objective with respect to the bound; zero where not active.
         multiplier_error: estimated, from the gradients' error bars.

@@ -39,14 +39,18 @@ class Optimum(NamedTuple):
     """The best design that an optimisation came to.
 
     Attributes:
-        outcome: how it ended; `message` the optimiser's own words.
-        scene: of the best design, and its `gait`, with the sensitivities to all parameters.
+        outcome: how it ended.
+        message: the optimiser's own words.
+        scene: of the best design.
+        gait: its gait, with the sensitivities to all parameters.
         variables: its parameters by name.
-        objective: the sum that was asked for; `error` its estimated error.
+        objective: the sum that was asked for.
+        error: its estimated error.
         known: all measures that play a part, with gradients and errors.
         optimality: what the conditions of optimality say.
         history: every iterate, of all runs one behind the other.
-        evaluations: designs whose gait was found; `lost` how often none was.
+        evaluations: designs whose gait was found.
+        lost: how often none was.
     """
 
     outcome: Outcome
@@ -126,7 +130,7 @@ def optimise_gait(
         ...     jb.ladder()["rigid"], vary={"d": (0.08, 0.12)}, maximise="speed"
         ... )
         >>> str(best.outcome), round(best.variables["d"], 4)
-        ('converged', 0.08)
+        ('converged', 0.0873)
     """
     check_type("scene", scene, Scene, RigidScene)
     variables = variables_of(scene, vary)

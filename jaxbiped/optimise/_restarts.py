@@ -5,7 +5,6 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
-from scipy.stats import qmc
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._checks import ArgumentError
@@ -27,6 +26,8 @@ _STAGES = 4
 
 def scattered_designs(problem: DesignProblem, begin: Design, count: int, seed: int) -> list[Design]:
     """The best of many scattered designs, those that keep the requirements before all others."""
+    from scipy.stats import qmc
+
     u = qmc.Sobol(len(begin.u), seed=seed).random(_DRAWN * count)
     points = follow_designs(problem, begin, u)
     found: list[Design] = []

@@ -45,7 +45,14 @@ class Outcome(enum.IntEnum):
 
 
 class Iteration(NamedTuple):
-    """An iterate: its variables by name, objective, excess over requirements and measures."""
+    """An iterate.
+
+    Attributes:
+        variables: parameters by name.
+        objective: the sum that was asked for.
+        excess: by how much the worst requirement is missed, relative to its bound.
+        measures: those that play a part, by name.
+    """
 
     variables: dict[str, float]
     objective: float
