@@ -20,6 +20,7 @@ from jaxbiped import constraints as constraints
 from jaxbiped import dynamics as dynamics
 from jaxbiped import gait as gait
 from jaxbiped import measure as measure
+from jaxbiped.scene import actuation as actuation
 from jaxbiped.scene import laws as laws
 from jaxbiped.solve import solvers as solvers
 from jaxbiped.sweep import starts as starts
