@@ -11,6 +11,7 @@ from jaxbiped.dynamics._forces import foot_force
 from jaxbiped.dynamics._hip_motion import hip_motion, normal_forces
 from jaxbiped.dynamics._redundant_state import legs_of, minimal_state
 from jaxbiped.dynamics._state import State
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._scene import Scene
 
 
@@ -64,6 +65,13 @@ def energies(scene: Scene, state: State) -> Energies:
     Returns:
         The three energies [J], leaves shaped as the state's.
     """
+    kinetic, gravitational = mechanical_energies(scene, state)
+    elastic = sum(_elastic_energy(scene, foot) for foot in feet(scene, state))
+    return Energies(kinetic, gravitational, jnp.asarray(elastic))
+
+
+def mechanical_energies(scene: AbstractScene, state: State) -> tuple[Scalar, Scalar]:
+    """Kinetic and gravitational energy of a walker of any kind, as `Energies` has them [J]."""
     walker, ground = scene.walker, scene.ground
     hip = minimal_state(scene, state)
     kinetic = 0.5 * walker.hip_mass * (hip.hip_vx**2 + hip.hip_vz**2)
@@ -77,8 +85,7 @@ def energies(scene: Scene, state: State) -> Energies:
         moment_x = moment_x + walker.m * (leg.hip_x + walker.d * sine)
         moment_z = moment_z + walker.m * (leg.hip_z - walker.d * cosine)
     height = moment_z * jnp.cos(ground.slope) - moment_x * jnp.sin(ground.slope)
-    elastic = sum(_elastic_energy(scene, foot) for foot in feet(scene, state))
-    return Energies(kinetic, ground.g * height, jnp.asarray(elastic))
+    return kinetic, ground.g * height
 
 
 def powers(scene: Scene, state: State) -> Powers:
