@@ -157,9 +157,7 @@ def _names_by_leaf(scene: AbstractScene) -> list[str]:
     paths = [path for path, _ in jtu.tree_flatten_with_path(scene.minimal)[0]]
     whole = [_texts(path) for path in paths]
     own = [texts[-1] for texts in whole]
-    return [
-        texts[-1] if own.count(texts[-1]) == 1 else ".".join(texts) for texts in whole
-    ]
+    return [texts[-1] if own.count(texts[-1]) == 1 else ".".join(texts) for texts in whole]
 
 
 def _texts(path: _Path) -> list[str]:

@@ -30,7 +30,9 @@ class FootPreload(AbstractActuator):
     feet: ClassVar[str] = "compliant"
     extension: Parameter = parameter("foot's extension", "$e$", "m", minimum=0.0)
     onset: Parameter = parameter("phase of the extension", r"$\varphi_e$", "rad", default=0.1)
-    span: Parameter = parameter("span of the extension", "$w_e$", "rad", positive=True, default=0.05)
+    span: Parameter = parameter(
+        "span of the extension", "$w_e$", "rad", positive=True, default=0.05
+    )
 
     def set_point(self, angle: Scalar, rate: Scalar) -> tuple[Scalar, Scalar]:
         """How far the foot is extended [m], and how fast it is [m/s]."""

@@ -58,8 +58,7 @@ class HipSpline(AbstractPhaseTorque):
             beyond = jnp.maximum(place + (2.0 - j), 0.0)
             cubes.append(beyond * beyond * beyond)
         splines = (
-            sum(weight * cubes[i + j] for j, weight in enumerate(_DIFFERENCE))
-            for i in range(count)
+            sum(weight * cubes[i + j] for j, weight in enumerate(_DIFFERENCE)) for i in range(count)
         )
         return sum(a * b for a, b in zip(self.torque, splines, strict=True))  # type: ignore
 
