@@ -115,4 +115,4 @@ def _optional_float(value: Parameter | None) -> Scalar | None:
 
 def _tuple(values: Parameter | Iterable[Parameter]) -> tuple[Scalar, ...]:
     one = not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0
-    return tuple(map(as_float, [values] if one else values))  # type: ignore
+    return tuple(map(as_float, [values] if one else values))

@@ -1,4 +1,4 @@
-"""Actuation in the equations of motion: torques at the hip, set points of feet, and their powers."""
+"""Actuation in the equations of motion: torques at the hip, set points of feet, their powers."""
 
 from typing import NamedTuple, TypeAlias, TypeVar
 
@@ -29,6 +29,10 @@ def actuators_of(scene: WalkerScene, kind: type[_Part]) -> tuple[_Part, ...]:
     return tuple(part for part in scene.actuation or () if isinstance(part, kind))
 
 
+def _at_hip(scene: WalkerScene) -> list[AbstractHipActuator]:
+    return [part for part in scene.actuation or () if isinstance(part, AbstractHipActuator)]
+
+
 def load_shares(
     scene: WalkerScene, normal: tuple[Scalar | None, Scalar | None]
 ) -> tuple[Scalar | None, Scalar | None]:
@@ -45,7 +49,7 @@ def load_shares(
 
 def hip_torques(scene: WalkerScene, hip: HipMotion) -> LegTorques | None:
     """Torque of all actuators on each leg [N·m]; None where the scene has none at the hip."""
-    parts = actuators_of(scene, AbstractHipActuator)
+    parts = _at_hip(scene)
     if not parts:
         return None
     on_legs = [part.torques(hip) for part in parts]
@@ -87,7 +91,7 @@ def actuator_powers(
     torques = hip_torques(scene, hip)
     if torques is not None:
         total = total + _power(torques, hip)
-    for part in actuators_of(scene, AbstractHipActuator):
+    for part in _at_hip(scene):
         driven = part.motor_torques(hip)
         if driven is not None:
             motors.append(_power(driven, hip))

@@ -58,9 +58,9 @@ def _interpolate(a: Scalar, b: Scalar, s: Scalar | float) -> tuple[Scalar, Scala
 
 
 def homotopy_to(scene: AbstractScene) -> Homotopy:
-    """The line to `scene` from the seed's scene, its laws made to resemble the seed's, its actuators idle.
+    """The line to `scene` from the seed's scene, its laws made to resemble the seed's.
 
-    Numbers of laws that are not in the catalogue stay those of `scene`.
+    Numbers of laws that are not in the catalogue stay those of `scene`. Its actuators are idle.
     """
     return Homotopy(scene.with_minimal(_seed_like(scene.minimal)), scene)
 
@@ -69,10 +69,10 @@ def _seed_like(scene: Scene | RigidScene) -> Scene | RigidScene:
     with jax.ensure_compile_time_eval():
         own = jtu.tree_map(float, seed_scene())
         if isinstance(scene, RigidScene):
-            begin = dataclasses.replace(
+            rigid = dataclasses.replace(
                 scene, walker=own.walker, ground=own.ground, actuation=_idle(scene)
             )
-            return jtu.tree_map(as_float, begin)
+            return jtu.tree_map(as_float, rigid)
         normal, friction = own.normal, own.friction
         normals = {
             law: normal_law_like(

@@ -10,8 +10,8 @@ from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._rigid_ledger import kept_strikes, rigid_ledger
 from jaxbiped.measure._samples import evaluate_at, sample
-from jaxbiped.scene._redundant_scene import CompliantScene
 from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._rigid_walk import RigidWalked
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -37,7 +37,7 @@ class CostOfTransport(NamedTuple):
 
 
 def cost_of_transport(
-    scene: CompliantScene | RigidScene,
+    scene: Scene | RigidScene,
     walk: Trajectory | RigidWalked,
     times: np.ndarray | None = None,
 ) -> CostOfTransport:
@@ -91,7 +91,7 @@ def cost_of_transport(
 
 
 def _compliant(
-    scene: CompliantScene, walk: Trajectory, ends: np.ndarray
+    scene: Scene, walk: Trajectory, ends: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Distance [m], gravity's work and the motors' [J] between times."""
     count = max(len(ends) - 1, 0)

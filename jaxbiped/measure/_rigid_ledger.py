@@ -1,5 +1,6 @@
 """The energy ledger of the rigid walker: where the work of gravity and actuators went."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
@@ -95,14 +96,14 @@ def kept_strikes(scene: RigidScene, walk: RigidWalked) -> tuple[np.ndarray, Rigi
     known = np.isfinite(np.asarray(times))
     if np.ndim(times) != 1 or known.sum() < 2:
         raise ArgumentError(
-            "walk.strikes has fewer than two heel strikes, which is not allowed: walk two footsteps "
-            "or more with max_arrivals of as many."
+            "walk.strikes has fewer than two heel strikes, which is not allowed: walk two "
+            "footsteps or more with max_arrivals of as many."
         )
     return np.asarray(times)[known], _rows(states, known)
 
 
 def _rows(states: RigidState, rows: slice | np.ndarray) -> RigidState:
-    return RigidState(*[np.asarray(leaf)[rows] for leaf in states])
+    return RigidState(*[jnp.asarray(leaf)[rows] for leaf in states])
 
 
 def _energies(scene: RigidScene, states: RigidState) -> tuple[np.ndarray, np.ndarray]:
@@ -112,8 +113,12 @@ def _energies(scene: RigidScene, states: RigidState) -> tuple[np.ndarray, np.nda
 
 def _walked(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> RigidState:
     """States so long after their starts, within their footsteps."""
-    each = jax.vmap(lambda start, t: rigid_walk(scene, start, duration=t, accuracy="tight").state)
-    return each(RigidState(*map(jnp.asarray, starts)), jnp.asarray(durations))
+
+    def walked(start: RigidState, duration: Scalar) -> RigidState:
+        return rigid_walk(scene, start, duration=duration, accuracy="tight").state  # type: ignore
+
+    each: Callable[[RigidState, Scalar], RigidState] = jax.vmap(walked)
+    return each(starts, jnp.asarray(durations))
 
 
 def _before_impact(scene: RigidScene, starts: RigidState, periods: np.ndarray) -> RigidState:
@@ -137,7 +142,7 @@ def _hip_works(
     if scene.actuation is None:
         return np.zeros(len(periods)), np.zeros(len(periods))
     shares = (edges[:-1, None] + np.diff(edges)[:, None] * 0.5 * (1.0 + NODES)).ravel()
-    many = RigidState(*[np.repeat(leaf, len(shares)) for leaf in starts])
+    many = RigidState(*[jnp.repeat(leaf, len(shares)) for leaf in starts])
     states = _walked(scene, many, np.outer(periods, shares).ravel())
     powers = _powers(scene, states)
 

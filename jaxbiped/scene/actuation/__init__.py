@@ -1,7 +1,7 @@
 """Actuation: what drives a walker beside gravity.
 
-A line below is a part's registration: `ACTUATORS` and the command line have it by its `name`, in the
-order of the lines.
+A line below is a part's registration: `ACTUATORS` and the command line have it by its `name`, in
+the order of the lines.
 """
 
 from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator as AbstractActuator

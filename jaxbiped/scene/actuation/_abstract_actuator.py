@@ -6,7 +6,7 @@ is still an autonomous system whose legs may be exchanged.
 
 import abc
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple, Self, TypeAlias
+from typing import Any, ClassVar, NamedTuple, Self, TypeAlias, cast
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -66,19 +66,19 @@ class AbstractHipActuator(AbstractActuator):
 
     @abc.abstractmethod
     def motor_torques(self, hip: HipMotion) -> LegTorques | None:
-        """What of it a motor gives, not a spring or a damper [N·m]; None where there is no motor."""
+        """What of it a motor gives, not a spring or a damper [N·m]; None without a motor."""
 
 
 class AbstractPhaseTorque(AbstractHipActuator):
     """A torque at the hip that is a function of the phase: how far the stance leg has turned.
 
     The phase is minus the stance leg's angle [rad], which grows as the walker rolls over that leg;
-    so the system stays autonomous. A positive torque drives the walker downhill: it turns the stance
-    leg back. In double support each leg's torque is weighted by the load that it carries.
+    so the system stays autonomous. A positive torque drives the walker downhill: it turns the
+    stance leg back. In double support each leg's torque is weighted by the load that it carries.
 
     Attributes:
-        reaction: what takes the opposite torque: "swing", the other leg, which it swings forward; or
-            "trunk", an upright trunk that is not modelled.
+        reaction: what takes the opposite torque: "swing", the other leg, which it swings forward;
+            or "trunk", an upright trunk that is not modelled.
     """
 
     reaction: AbstractVar[str]
@@ -114,7 +114,10 @@ def actuation_of(parts: AbstractActuator | Sequence[AbstractActuator] | None) ->
     """One part, several or none as a scene keeps them."""
     if parts is None:
         return None
-    return (tuple(parts) or None) if isinstance(parts, list | tuple) else (parts,)
+    if isinstance(parts, AbstractActuator):
+        return (parts,)
+    # What is neither is refused by `check_actuation`, with what it is.
+    return tuple(parts) or None if isinstance(parts, list | tuple) else (cast(Any, parts),)
 
 
 def check_actuation(actuation: Actuation, feet: str) -> None:

@@ -13,9 +13,9 @@ from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator
 class FootPreload(AbstractActuator):
     """The foot's set point, (extension/2) (1 + tanh((φ − onset)/span)) below the leg's own.
 
-    φ is minus the leg's angle. The massless foot is pressed into the ground by so much while its leg
-    trails, and let up again in the swing: normal laws see the penetration δ with this added. For
-    compliant feet alone.
+    φ is minus the leg's angle. The massless foot is pressed into the ground by so much while its
+    leg trails, and let up again in the swing: normal laws see the penetration δ with this added.
+    For compliant feet alone.
 
     Attributes (leaves of any batch shape):
         extension: of a leg that trails far [m].
@@ -29,10 +29,8 @@ class FootPreload(AbstractActuator):
     name: ClassVar[str] = "foot-preload"
     feet: ClassVar[str] = "compliant"
     extension: Parameter = parameter("foot's extension", "$e$", "m", minimum=0.0)
-    onset: Parameter = parameter("phase of the extension", r"$\varphi_e$", "rad", default=0.1)
-    span: Parameter = parameter(
-        "span of the extension", "$w_e$", "rad", positive=True, default=0.05
-    )
+    onset: Parameter = parameter("extension's phase", r"$\varphi_e$", "rad", default=0.1)
+    span: Parameter = parameter("extension's span", "$w_e$", "rad", positive=True, default=0.05)
 
     def set_point(self, angle: Scalar, rate: Scalar) -> tuple[Scalar, Scalar]:
         """How far the foot is extended [m], and how fast it is [m/s]."""

@@ -60,7 +60,7 @@ class HipSpline(AbstractPhaseTorque):
         splines = (
             sum(weight * cubes[i + j] for j, weight in enumerate(_DIFFERENCE)) for i in range(count)
         )
-        return sum(a * b for a, b in zip(self.torque, splines, strict=True))  # type: ignore
+        return jnp.asarray(sum(a * b for a, b in zip(self.torque, splines, strict=True)))
 
     def idle(self) -> Self:
         return dataclasses.replace(self, torque=tuple(0.0 * each for each in self.torque))
