@@ -281,6 +281,8 @@ def draw_simplest(ax: Axes, pairs: list[Pair]) -> None:
     ax.plot(angles, kuo, color=COLOURS[0], linewidth=1.0, label="½ (v tan α)² a step")
     ax.set_xscale("log")
     ax.set_yscale("log")
+    ax.minorticks_off()
+    ax.set_xticks([0.05, 0.1, 0.2, 0.3], ["0.05", "0.1", "0.2", "0.3"])
     dress(
         ax, "Simplest walker", "half of the angle between the legs (rad)", "cost of transport (–)"
     )

@@ -16,6 +16,7 @@ NAMESPACES = {
     **{
         f"jb.{name}": getattr(jb, name)
         for name in (
+            "actuation",
             "laws",
             "constraints",
             "dynamics",

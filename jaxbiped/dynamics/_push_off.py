@@ -40,6 +40,13 @@ def push_off_work(scene: RigidScene, state: RigidState) -> Scalar:
 
     The impulse times the mean of the hip's velocities along it, before and after. In between
     neither foot is held: the walker is free, and the legs follow the hip.
+
+    Args:
+        scene: the rigid walker.
+        state: leg 2 standing, leaves of any common shape, SI units.
+
+    Returns:
+        The work [J], shaped as the state's leaves.
     """
     impulse = push_off_impulse(scene, state)
     if impulse is None:

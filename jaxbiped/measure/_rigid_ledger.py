@@ -70,7 +70,7 @@ def rigid_ledger(scene: RigidScene, walk: RigidWalked) -> RigidLedger:
         >>> walk = jb.rigid_walk(scene, start, footsteps=2, max_arrivals=2, engine="lanes")
         >>> books = jb.measure.rigid_ledger(scene, walk)
         >>> books.gravity_work.round(3), books.impact_loss.round(3)
-        (array([0.07]), array([0.069]))
+        (array([0.076]), array([0.066]))
     """
     times, states = kept_strikes(scene, walk)
     starts = _rows(states, slice(-1))
