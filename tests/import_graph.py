@@ -17,6 +17,7 @@ LAYERS = [
     "simulate",
     "measure",
     "gait",
+    "identify",
     "basins",
     "sweep",
     "plot",

@@ -6,7 +6,7 @@ from jaxbiped._types import JsonObject
 from jaxbiped.gait._gait import Gait
 from jaxbiped.measure._cost_of_transport import cost_of_transport
 from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.simulate._rigid_walk import RigidWalked, rigid_walk
+from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.simulate._simulate import simulate
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -19,7 +19,7 @@ def gait_cost(scene: Any, gait: Gait, footsteps: int) -> JsonObject:
     if scene.actuation is None:
         return {}
     modelled, state = scene.minimal, gait.measures.state
-    walk: RigidWalked | Trajectory
+    walk: Trajectory[Any]
     if isinstance(modelled, RigidScene):
         most = footsteps + 1
         walk = rigid_walk(modelled, state, footsteps=most, max_arrivals=most, accuracy="tight")
@@ -28,7 +28,7 @@ def gait_cost(scene: Any, gait: Gait, footsteps: int) -> JsonObject:
     return walk_cost(modelled, walk)
 
 
-def walk_cost(scene: Any, walk: Trajectory | RigidWalked) -> JsonObject:
+def walk_cost(scene: Any, walk: Trajectory[Any]) -> JsonObject:
     """Cost of transport over the whole footsteps of a walk, ready for JSON; {} without any."""
     found = cost_of_transport(scene, walk)
     if not len(found.cost):

@@ -1,18 +1,19 @@
 """Mechanical cost of transport: what energy a walker takes over its weight and its way."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._energy import energies, powers
-from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.dynamics._redundant_state import EulerState, RedundantState, minimal_state
+from jaxbiped.dynamics._state import State
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._rigid_ledger import kept_strikes, rigid_ledger
 from jaxbiped.measure._samples import evaluate_at, sample
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.simulate._rigid_walk import RigidWalked
 from jaxbiped.solve._trajectory import Trajectory
 
 
@@ -38,7 +39,7 @@ class CostOfTransport(NamedTuple):
 
 def cost_of_transport(
     scene: Scene | RigidScene,
-    walk: Trajectory | RigidWalked,
+    walk: Trajectory[Any],
     times: np.ndarray | None = None,
 ) -> CostOfTransport:
     """The mechanical cost of transport of a walk, footstep by footstep.
@@ -75,8 +76,6 @@ def cost_of_transport(
             raise ArgumentError(
                 "times is not allowed for a RigidScene: it is counted between heel strikes."
             )
-        check_type("walk", walk, RigidWalked)
-        assert isinstance(walk, RigidWalked)
         _, states = kept_strikes(scene, walk)
         reach = float(scene.walker.hip_to_foot)
         distance = np.diff(states.hip_x + reach * np.sin(states.theta_2))
@@ -84,7 +83,7 @@ def cost_of_transport(
         gravity, motors = books.gravity_work, books.motor_work
     else:
         check_type("walk", walk, Trajectory)
-        assert isinstance(walk, Trajectory)
+        check_type("walk.state", walk.state, State, BristleState, RedundantState, EulerState)
         ends = heel_strikes(scene, walk).time_s if times is None else np.asarray(times)
         distance, gravity, motors = _compliant(scene, walk, ends)
     return CostOfTransport((motors + gravity) / (weight * distance), motors, gravity, distance)

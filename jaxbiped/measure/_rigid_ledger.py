@@ -1,7 +1,7 @@
 """The energy ledger of the rigid walker: where the work of gravity and actuators went."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +16,8 @@ from jaxbiped.dynamics._rigid_state import RigidState, whole_state
 from jaxbiped.dynamics._rolling import rolling_hip_motion, rolling_rates
 from jaxbiped.measure._samples import NODES, Samples
 from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.simulate._rigid_walk import RigidWalked, rigid_walk
+from jaxbiped.simulate._rigid_walk import rigid_walk
+from jaxbiped.solve._trajectory import Trajectory
 
 _PANELS = 24
 """Parts of a footstep, each with its Gauss points."""
@@ -48,7 +49,7 @@ class RigidLedger(NamedTuple):
     motor_work: np.ndarray
 
 
-def rigid_ledger(scene: RigidScene, walk: RigidWalked) -> RigidLedger:
+def rigid_ledger(scene: RigidScene, walk: Trajectory[RigidState]) -> RigidLedger:
     """The energy ledger of the footsteps between the heel strikes that a rigid walk kept.
 
     Works are integrals of the actuators' powers over single support, walked again tightly.
@@ -88,18 +89,20 @@ def rigid_ledger(scene: RigidScene, walk: RigidWalked) -> RigidLedger:
     return RigidLedger(gravity, work, loss, stored, residual, motors + np.maximum(push, 0.0))
 
 
-def kept_strikes(scene: RigidScene, walk: RigidWalked) -> tuple[np.ndarray, RigidState]:
+def kept_strikes(scene: RigidScene, walk: Trajectory[RigidState]) -> tuple[np.ndarray, RigidState]:
     """Times [s] and states of the heel strikes that a walk kept, leaves of shape (n + 1,)."""
     check_type("scene", scene, RigidScene)
-    check_type("walk", walk, RigidWalked)
-    times, states = walk.strikes
-    known = np.isfinite(np.asarray(times))
-    if np.ndim(times) != 1 or known.sum() < 2:
+    check_type("walk", walk, Trajectory)
+    check_type("walk.state", walk.state, RigidState)
+    assert walk.arrivals is not None
+    times = np.asarray(walk.arrivals.t)
+    known = np.isfinite(times)
+    if times.ndim != 1 or known.sum() < 2:
         raise ArgumentError(
-            "walk.strikes has fewer than two heel strikes, which is not allowed: walk two "
+            "walk.arrivals has fewer than two heel strikes, which is not allowed: walk two "
             "footsteps or more with max_arrivals of as many."
         )
-    return np.asarray(times)[known], _rows(states, known)
+    return times[known], _rows(walk.arrivals.state, known)
 
 
 def _rows(states: RigidState, rows: slice | np.ndarray) -> RigidState:
@@ -115,7 +118,7 @@ def _walked(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> Rig
     """States so long after their starts, within their footsteps."""
 
     def walked(start: RigidState, duration: Scalar) -> RigidState:
-        return rigid_walk(scene, start, duration=duration, accuracy="tight").state  # type: ignore
+        return rigid_walk(scene, start, duration=cast(float, duration), accuracy="tight").final
 
     each: Callable[[RigidState, Scalar], RigidState] = jax.vmap(walked)
     return each(starts, jnp.asarray(durations))

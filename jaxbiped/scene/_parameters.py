@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any, TypeAlias, TypeVar
 
 import jax.tree_util as jtu
+from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice
 from jaxbiped._parameter import parameter_infos
@@ -100,9 +101,11 @@ def _entry(quantity: Quantity, rest: _Path) -> Quantity:
 
 
 def select_parameters(
-    scene: AbstractScene, parameters: tuple[str, ...] | None
+    scene: PyTree, parameters: tuple[str, ...] | None
 ) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """Names of the parameters asked for, all for None, and the positions of their leaves.
+
+    Leaves of anything but a scene have names in the same way.
 
     Raises:
         ArgumentError: a name that the scene does not have.
@@ -153,9 +156,9 @@ def _replace(part: Any, path: _Path, value: Parameter) -> Any:
     return dataclasses.replace(part, **{key.name: _replace(getattr(part, key.name), rest, value)})
 
 
-def _names_by_leaf(scene: AbstractScene) -> list[str]:
-    paths = [path for path, _ in jtu.tree_flatten_with_path(scene.minimal)[0]]
-    whole = [_texts(path) for path in paths]
+def _names_by_leaf(scene: PyTree) -> list[str]:
+    modelled = scene.minimal if isinstance(scene, AbstractScene) else scene
+    whole = [_texts(path) for path, _ in jtu.tree_flatten_with_path(modelled)[0]]
     own = [texts[-1] for texts in whole]
     return [texts[-1] if own.count(texts[-1]) == 1 else ".".join(texts) for texts in whole]
 

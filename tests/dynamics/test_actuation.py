@@ -124,8 +124,8 @@ def test_a_driven_rigid_footstep_is_scipys():
         rtol=1e-12, atol=1e-13,
     )  # fmt: skip
     walk = jb.rigid_walk(RIGID, start, duration=0.3, accuracy="tight", engine="lanes")
-    assert int(walk.footsteps) == 0
-    np.testing.assert_allclose(np.array(walk.state[1:]), solved.y[:, -1], rtol=1e-9)
+    assert int(walk.arrivals.total) == 0
+    np.testing.assert_allclose(np.array(walk.final[1:]), solved.y[:, -1], rtol=1e-9)
 
 
 def _before_impact():
@@ -182,7 +182,7 @@ def test_at_strength_zero_rigid_walks_are_the_passive_ones():
         jb.rigid_walk(scene, start, footsteps=3, accuracy="tight", engine="lanes")
         for scene in (_idle(RIGID), jb.RigidScene(SEED.walker, SEED.ground))
     ]
-    np.testing.assert_allclose(np.array(walks[0].state), np.array(walks[1].state), rtol=1e-12)
+    np.testing.assert_allclose(np.array(walks[0].final), np.array(walks[1].final), rtol=1e-12)
 
 
 @pytest.mark.slow
@@ -207,7 +207,7 @@ def test_both_engines_roll_alike():
         jb.rigid_walk(RIGID, start, footsteps=3, accuracy="tight", engine=engine)
         for engine in ("xla", "lanes")
     )
-    np.testing.assert_allclose(np.array(one.state), np.array(other.state), rtol=1e-11)
+    np.testing.assert_allclose(np.array(one.final), np.array(other.final), rtol=1e-11)
 
 
 @pytest.mark.slow
