@@ -65,13 +65,13 @@ def energies(scene: Scene, state: State) -> Energies:
     Returns:
         The three energies [J], leaves shaped as the state's.
     """
-    kinetic, gravitational = mechanical_energies(scene, state)
+    kinetic, moment = kinetic_and_moment(scene, state)
     elastic = sum(_elastic_energy(scene, foot) for foot in feet(scene, state))
-    return Energies(kinetic, gravitational, jnp.asarray(elastic))
+    return Energies(kinetic, scene.ground.g * moment, jnp.asarray(elastic))
 
 
-def mechanical_energies(scene: AbstractScene, state: State) -> tuple[Scalar, Scalar]:
-    """Kinetic and gravitational energy of a walker of any kind, as `Energies` has them [J]."""
+def kinetic_and_moment(scene: AbstractScene, state: State) -> tuple[Scalar, Scalar]:
+    """Kinetic energy [J] and mass times height [kg·m] of a walker of any kind."""
     walker, ground = scene.walker, scene.ground
     hip = minimal_state(scene, state)
     kinetic = 0.5 * walker.hip_mass * (hip.hip_vx**2 + hip.hip_vz**2)
@@ -85,7 +85,7 @@ def mechanical_energies(scene: AbstractScene, state: State) -> tuple[Scalar, Sca
         moment_x = moment_x + walker.m * (leg.hip_x + walker.d * sine)
         moment_z = moment_z + walker.m * (leg.hip_z - walker.d * cosine)
     height = moment_z * jnp.cos(ground.slope) - moment_x * jnp.sin(ground.slope)
-    return kinetic, ground.g * height
+    return kinetic, height
 
 
 def powers(scene: Scene, state: State) -> Powers:

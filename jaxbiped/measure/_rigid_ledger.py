@@ -10,7 +10,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
-from jaxbiped.dynamics._energy import mechanical_energies
+from jaxbiped.dynamics._energy import kinetic_and_moment
 from jaxbiped.dynamics._push_off import push_off_work
 from jaxbiped.dynamics._rigid_state import RigidState, whole_state
 from jaxbiped.dynamics._rolling import rolling_hip_motion, rolling_rates
@@ -110,8 +110,8 @@ def _rows(states: RigidState, rows: slice | np.ndarray) -> RigidState:
 
 
 def _energies(scene: RigidScene, states: RigidState) -> tuple[np.ndarray, np.ndarray]:
-    kinetic, gravitational = mechanical_energies(scene, whole_state(scene, states))
-    return np.asarray(kinetic), np.asarray(gravitational)
+    kinetic, moment = kinetic_and_moment(scene, whole_state(scene, states))
+    return np.asarray(kinetic), np.asarray(scene.ground.g * moment)
 
 
 def _walked(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> RigidState:
