@@ -1,0 +1,210 @@
+"""Pseudo-arclength: points along a curve of zeros, around its folds.
+
+A search without a guess follows the seed's gait by it, and so does every continuation of gaits.
+Keller, in Applications of Bifurcation Theory (1977); Seydel, Practical Bifurcation and Stability
+Analysis (2010), chapter 4.
+"""
+
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+_MOST_CORRECTIONS = 6
+_CONTRACTION = 0.6
+"""Share of a correction that the next may have."""
+_MOST_SECANTS = 24
+_ZERO = 1e-10
+"""A test function as small as this has been located."""
+
+
+class Change(NamedTuple):
+    """By how much a map moves a point, and the derivatives of that.
+
+    Attributes:
+        value: shape (m,).
+        by_point: derivatives with respect to the point, shape (m, m).
+        by_s: with respect to the curve's parameter, shape (m,).
+        code: 0, or what the map could not do instead.
+        seen: what else the evaluation told.
+    """
+
+    value: np.ndarray
+    by_point: np.ndarray
+    by_s: np.ndarray
+    code: int
+    seen: Any = None
+
+
+class Curve(NamedTuple):
+    """The zeros of a map that changes with a parameter s.
+
+    Attributes:
+        change: of a point, shape (m,), and s.
+        sizes: of the m components and, last, of s, in which arclength is measured, shape (m + 1,).
+        converged: size of a correction that ends the corrector.
+    """
+
+    change: Callable[[np.ndarray, float], Change]
+    sizes: np.ndarray
+    converged: float
+
+
+class CurvePoint(NamedTuple):
+    """A zero.
+
+    Attributes:
+        place: point and s in their sizes, shape (m + 1,).
+        tangent: unit tangent there, shape (m + 1,).
+        change: what was evaluated there.
+    """
+
+    place: np.ndarray
+    tangent: np.ndarray
+    change: Change
+
+
+class Attempt(NamedTuple):
+    """What came of correcting a guess.
+
+    Attributes:
+        found: the zero, None where there was none.
+        quick: whether few corrections led to it.
+        code: what the map could not do, where that was the reason.
+    """
+
+    found: CurvePoint | None
+    quick: bool = False
+    code: int = 0
+
+
+class StepControl(NamedTuple):
+    """Arclengths of steps.
+
+    Attributes:
+        first: of the first.
+        largest: at most.
+        smallest: below which a curve is given up.
+        least_cosine: of the angle between the tangents at the two ends of a step.
+    """
+
+    first: float
+    largest: float
+    smallest: float
+    least_cosine: float = 0.85
+
+
+def correct(
+    curve: Curve, guess: np.ndarray, border: np.ndarray, along: np.ndarray | None = None
+) -> Attempt:
+    """The zero near `guess` in the plane normal to `border`, by Newton's method.
+
+    Its tangent points on from the direction `along`, towards larger s unless given.
+    """
+    point, last = guess, np.inf
+    for k in range(_MOST_CORRECTIONS):
+        here = curve.change(point[:-1] * curve.sizes[:-1], float(point[-1] * curve.sizes[-1]))
+        if here.code != 0:
+            return Attempt(None, code=here.code)
+        slopes = _slopes(here, curve.sizes)
+        right = np.append(-here.value / curve.sizes[:-1], 0.0)
+        try:
+            move = np.linalg.solve(np.vstack([slopes, border]), right)
+        except np.linalg.LinAlgError:
+            return Attempt(None)
+        size = float(np.linalg.norm(move))
+        if not size <= max(_CONTRACTION * last, curve.converged):
+            return Attempt(None)
+        if size <= curve.converged:
+            found = CurvePoint(point + move, _tangent(slopes, along), here)
+            return Attempt(found, quick=k <= 2)
+        point, last = point + move, size
+    return Attempt(None)
+
+
+def follow(
+    curve: Curve,
+    begin: CurvePoint,
+    control: StepControl,
+    *,
+    low: float = -np.inf,
+    high: float = np.inf,
+) -> Iterator[Attempt]:
+    """The points of a curve onwards from one, the last of them exactly at a bound of s.
+
+    Where steps get too small, a failed attempt tells why at the end.
+    """
+    here, step = begin, control.first
+    bounds = {True: high, False: low}
+    while True:
+        rise = here.tangent[-1]
+        room = bounds[rise > 0.0] - here.place[-1] * curve.sizes[-1]
+        length = step
+        if abs(rise * curve.sizes[-1] * step) > abs(room):
+            length = room / (rise * curve.sizes[-1])
+        # The last step ends on the bound, the others where the tangent says.
+        border = np.eye(len(here.place))[-1] if length < step else here.tangent
+        attempt = correct(curve, here.place + length * here.tangent, border, here.tangent)
+        bent = attempt.found is not None and (
+            attempt.found.tangent @ here.tangent < control.least_cosine
+        )
+        if attempt.found is None or (bent and step > 50.0 * control.smallest):
+            step *= 0.4
+            if step < control.smallest:
+                yield Attempt(None, code=attempt.code)
+                return
+            continue
+        yield attempt
+        if length < step:
+            return
+        here = attempt.found
+        step = min(control.largest, step * (1.7 if attempt.quick else 1.1))
+
+
+def locate(
+    curve: Curve, here: CurvePoint, there: CurvePoint, test: Callable[[CurvePoint], float]
+) -> CurvePoint | None:
+    """The point between two where a test function that has other signs there vanishes.
+
+    By the secant rule with Illinois's halving; None where the curve is lost in between.
+    """
+    ends = [0.0, _advance(here, there)]
+    values = [test(here), test(there)]
+    best, least = None, np.inf
+    for _ in range(_MOST_SECANTS):
+        (a, b), (u, v) = ends, values
+        length = (a * v - b * u) / (v - u)
+        near = here if best is None else best
+        ahead = (length - _advance(here, near)) / (near.tangent @ here.tangent)
+        guess = near.place + ahead * near.tangent
+        found = correct(curve, guess, here.tangent, here.tangent).found
+        if found is None:
+            return best
+        value = test(found)
+        if abs(value) < least:
+            best, least = found, abs(value)
+        if abs(value) <= _ZERO or abs(b - a) < _ZERO**1.5:
+            break
+        if value * v < 0.0:
+            ends, values = [b, length], [v, value]
+        else:
+            ends, values = [a, length], [0.5 * u, value]
+    return best
+
+
+def _advance(here: CurvePoint, there: CurvePoint) -> float:
+    """How far a point lies along the tangent of another."""
+    return float((there.place - here.place) @ here.tangent)
+
+
+def _slopes(here: Change, sizes: np.ndarray) -> np.ndarray:
+    """Derivatives of the scaled change with respect to the scaled point and s, (m, m + 1)."""
+    both = np.column_stack([here.by_point, here.by_s])
+    return both * sizes / sizes[:-1, None]
+
+
+def _tangent(slopes: np.ndarray, along: np.ndarray | None) -> np.ndarray:
+    """Unit tangent of the curve, on in a direction, or towards larger s."""
+    *_, rows = np.linalg.svd(slopes)
+    forward = rows[-1][-1] if along is None else rows[-1] @ along
+    return rows[-1] if forward >= 0.0 else -rows[-1]
