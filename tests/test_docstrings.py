@@ -20,6 +20,7 @@ NAMESPACES = {
             "constraints",
             "dynamics",
             "gait",
+            "continuation",
             "measure",
             "solvers",
             "basins",

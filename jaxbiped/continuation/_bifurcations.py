@@ -5,6 +5,7 @@ section 10.2.2.
 """
 
 import enum
+from functools import partial
 from itertools import combinations
 from typing import NamedTuple
 
@@ -37,6 +38,17 @@ class BranchEvent(enum.StrEnum):
     LIMIT = "limit"
 
 
+EVENTS = tuple(BranchEvent)
+"""In the order of their codes in datasets."""
+_CRITICAL = {
+    BranchEvent.FOLD: 1.0,
+    BranchEvent.PERIOD_DOUBLING: -1.0,
+    BranchEvent.BRANCH_POINT: 1.0,
+    BranchEvent.NEIMARK_SACKER: float("nan"),
+}
+"""Where the critical multiplier lies."""
+
+
 class BifurcationPoint(NamedTuple):
     """A special point of a branch.
 
@@ -58,69 +70,55 @@ class BifurcationPoint(NamedTuple):
         return self.point.value
 
 
-def fold_test(found: CurvePoint) -> float:
-    """How the parameter advances along the curve."""
-    return float(found.tangent[-1])
+def multiplier_test(kind: BranchEvent, values: np.ndarray) -> float:
+    """A function of the multipliers that is smooth in the Jacobian and vanishes at this kind.
+
+    Product of λ − 1, of λ + 1, or of λᵢ λⱼ − 1 over all pairs.
+    """
+    if kind is BranchEvent.NEIMARK_SACKER:
+        return float(np.prod([a * b - 1.0 for a, b in combinations(values, 2)]).real)
+    return float(np.prod(values - _CRITICAL[kind]).real)
 
 
-def doubling_test(found: CurvePoint) -> float:
-    """Product of (λ + 1)."""
-    return float(np.prod(_multipliers(found) + 1.0).real)
-
-
-def branching_test(found: CurvePoint) -> float:
-    """Product of (λ − 1)."""
-    return float(np.prod(_multipliers(found) - 1.0).real)
-
-
-def pair_test(found: CurvePoint) -> float:
-    """Product of (λᵢ λⱼ − 1) over pairs."""
-    pairs = combinations(_multipliers(found), 2)
-    return float(np.prod([a * b - 1.0 for a, b in pairs]).real)
-
-
-def _multipliers(found: CurvePoint) -> np.ndarray:
-    return multipliers_of(found.change)
-
-
-_TESTS = {
-    BranchEvent.FOLD: fold_test,
-    BranchEvent.PERIOD_DOUBLING: doubling_test,
-    BranchEvent.NEIMARK_SACKER: pair_test,
-    BranchEvent.BRANCH_POINT: branching_test,
-}
+def critical_multiplier(kind: BranchEvent, point: BranchPoint) -> tuple[complex, float, float]:
+    """The multiplier by which a gait is at this kind, its error, and its distance from there."""
+    values = point.multipliers
+    if kind is BranchEvent.NEIMARK_SACKER:
+        pairs = np.abs(values.imag) > _REAL
+        distances = np.where(pairs, np.abs(np.abs(values) - 1.0), np.inf)
+    else:
+        distances = np.abs(values - _CRITICAL[kind])
+    nearest = int(np.argmin(distances))
+    error = float(point.multiplier_errors[nearest])
+    return complex(values[nearest]), error, float(distances[nearest])
 
 
 def bifurcations_between(
     curve: Curve, axis: Axis, here: CurvePoint, there: CurvePoint
 ) -> list[tuple[CurvePoint, BifurcationPoint]]:
     """The bifurcations between two neighbouring points, in their order along the branch."""
-    turns = fold_test(here) * fold_test(there) < 0.0
+    turns = here.tangent[-1] * there.tangent[-1] < 0.0
     found = []
-    for kind, test in _TESTS.items():
-        if test(here) * test(there) >= 0.0 or (kind is BranchEvent.BRANCH_POINT and turns):
+    for kind in _CRITICAL:
+        # Where the parameter turns back it is a fold, and told by that more exactly.
+        if turns and kind is BranchEvent.BRANCH_POINT:
             continue
-        place = locate(curve, here, there, test)
+        test = _advance if kind is BranchEvent.FOLD else partial(_test_at, kind)
+        place = locate(curve, here, there, test) if test(here) * test(there) < 0.0 else None
         if place is None:
             continue
-        event = _event(kind, branch_point(curve, axis, place))
-        if event is not None:
-            found.append((place, event))
+        point = branch_point(curve, axis, place)
+        value, error, distance = critical_multiplier(kind, point)
+        # Two real multipliers whose product is 1 cross nothing.
+        if distance < _AT:
+            found.append((place, BifurcationPoint(kind, point, value, error)))
     return sorted(found, key=lambda each: float((each[0].place - here.place) @ here.tangent))
 
 
-def _event(kind: BranchEvent, point: BranchPoint) -> BifurcationPoint | None:
-    """The event at a zero of a test function; None where it is none of this kind."""
-    values = point.multipliers
-    complex_ones = np.abs(values.imag) > _REAL
-    if kind is BranchEvent.NEIMARK_SACKER:
-        distances = np.where(complex_ones, np.abs(np.abs(values) - 1.0), np.inf)
-    else:
-        critical = -1.0 if kind is BranchEvent.PERIOD_DOUBLING else 1.0
-        distances = np.abs(values - critical)
-    nearest = int(np.argmin(distances))
-    # A pair of real multipliers whose product is 1 crosses nothing.
-    if not distances[nearest] < _AT:
-        return None
-    error = float(point.multiplier_errors[nearest])
-    return BifurcationPoint(kind, point, complex(values[nearest]), error)
+def _advance(found: CurvePoint) -> float:
+    """How the parameter advances along the curve."""
+    return float(found.tangent[-1])
+
+
+def _test_at(kind: BranchEvent, found: CurvePoint) -> float:
+    return multiplier_test(kind, multipliers_of(found.change))

@@ -1,6 +1,6 @@
 """Branch of gaits along a parameter: its points, bifurcations and ends."""
 
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import equinox as eqx
 import jax.tree_util as jtu
@@ -9,12 +9,16 @@ import numpy as np
 from jaxbiped._types import as_float
 from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._bifurcations import BifurcationPoint
+from jaxbiped.continuation._branch_dataset import branch_dataset
 from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.continuation._trace import BranchStop
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.scene._parameters import parameter_quantities, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+
+if TYPE_CHECKING:
+    import xarray
 
 
 class Branch(eqx.Module):
@@ -93,3 +97,14 @@ class Branch(eqx.Module):
         """The scene of a gait, of the point of that number or of the one given."""
         value = self.points[point].value if isinstance(point, int) else point.value
         return with_parameters(self.scene, {self.axis.name: value})
+
+    def dataset(self) -> "xarray.Dataset":
+        """The branch as a dataset for `to_netcdf` or `to_zarr`; `open_branch` takes it back.
+
+        Returns:
+            Along `point` the parameter, `state_…`, period, step_length, speed, peak_normal,
+            multipliers with their errors, `stable` (1, 0, and −1 where the errors leave it open)
+            and `bifurcation`, SI units; the same of the special points along `event`, with kind,
+            critical multiplier and its error; all else in the attributes.
+        """
+        return branch_dataset(self)

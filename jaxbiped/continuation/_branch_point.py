@@ -6,8 +6,8 @@ import numpy as np
 
 from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._cycle import Cycle, CycleProblem
-from jaxbiped.gait._pseudo_arclength import Change, Curve, CurvePoint
 from jaxbiped.gait._orbit import CLOSENESS
+from jaxbiped.gait._pseudo_arclength import Change, Curve, CurvePoint
 from jaxbiped.gait._settled_walks import component_sizes
 from jaxbiped.gait._stability import Bifurcation
 
@@ -15,6 +15,9 @@ NO_WALK = -1
 """Code of an orbit that returns but is none of a walk: a foot deep underground, a step uphill."""
 _CONVERGED = 3.0
 """Size of the last correction of a point, in units of the state's tolerance."""
+
+_LOCATED = 1e-9
+"""Error of a multiplier at least: so near to the unit circle bifurcations are located."""
 
 
 class BranchPoint(NamedTuple):
@@ -56,7 +59,7 @@ class BranchPoint(NamedTuple):
 
 def is_stable(multipliers: np.ndarray, errors: np.ndarray) -> bool | None:
     """Whether multipliers lie inside the unit circle; None where an error bar straddles it."""
-    sizes = np.abs(multipliers)
+    sizes, errors = np.abs(multipliers), np.maximum(errors, _LOCATED)
     if np.any(sizes - errors > 1.0):
         return False
     return True if np.all(sizes + errors < 1.0) else None

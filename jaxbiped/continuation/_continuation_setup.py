@@ -1,6 +1,6 @@
 """Setup of a continuation: whose gaits are followed along which axis, and how exactly."""
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import jax.tree_util as jtu
 import numpy as np
@@ -10,7 +10,7 @@ from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import BranchPoint, branch_point, gait_curve
 from jaxbiped.continuation._cycle import CycleProblem
-from jaxbiped.continuation._trace import BranchStop, Trace
+from jaxbiped.continuation._trace import Trace
 from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._state import check_state
@@ -60,6 +60,12 @@ class ContinuationSetup(NamedTuple):
     def recurring(self, state: WalkerState) -> np.ndarray:
         """The components of a state that must return."""
         return np.asarray(recurring_components(self.problem.spec.system, state))
+
+    def state(self, found: CurvePoint) -> WalkerState:
+        """The state of a point of the curve."""
+        recurring = found.place[:-1] * self.curve.sizes[:-1]
+        state = type(self.problem.like)(0.0, *recurring.tolist())
+        return cast(WalkerState, jtu.tree_map(as_float, state))
 
     def point(self, found: CurvePoint) -> BranchPoint:
         """What is told of a point of the curve."""

@@ -1,6 +1,7 @@
 """Continuation of a gait in a parameter of its scene."""
 
 import jax.tree_util as jtu
+import numpy as np
 
 from jaxbiped._checks import (
     check_choice,
@@ -124,7 +125,7 @@ def first_gait(
     with stage("compiling the continuation (first time for this kind of scene)"):
         seen = setup.problem.cycle(setup.recurring(start), (setup.axis.leaf,), [value], 1)
     if int(seen.code[0]) == 0:
-        near = setup.recurring(start) if guess is not None else seen.recurring[0]
+        near = setup.recurring(start) if guess is not None else np.asarray(seen.recurring[0])
         found = setup.at_value(near, value).found
         if found is not None and (guess is not None or setup.point(found).stable):
             return found

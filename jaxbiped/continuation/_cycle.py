@@ -71,11 +71,13 @@ class CycleProblem(NamedTuple):
     ) -> Cycle:
         """The cycle from a point of m components, parameters at positions `active` so changed."""
         pairs: PyTree = [np.array([rtol, LOOSER * rtol]) for rtol in self.precision]
-        given: PyTree = np.asarray(point), np.asarray(values, dtype=float)
+        numbers: PyTree = [np.asarray(point), np.asarray(values, dtype=float)]
+        start, given = numbers
         count: PyTree = np.asarray(footsteps)
-        found: Cycle = jax.device_get(
-            _evaluate(self.spec, self.scene, active, self.like, *given, Precision(*pairs), count)
+        result = _evaluate(
+            self.spec, self.scene, active, self.like, start, given, Precision(*pairs), count
         )
+        found: Cycle = jax.device_get(result)
         return found
 
 
@@ -116,7 +118,7 @@ def _chain(
     units = jnp.concatenate([jnp.ones(m), sizes])
 
     def add(_: int, before: Cycle) -> Cycle:
-        y = state_with(spec.system, like, before.recurring)
+        y = state_with(spec.system, like, jnp.asarray(before.recurring))
         once = linearised_return(spec, seeds, y, precision, before.code != 0)
         own = once.jacobian / units
         by_parameters = jnp.concatenate([jnp.zeros((m, m)), own[:, m:]], axis=1)

@@ -94,12 +94,12 @@ def trace(
             events.append(BifurcationPoint(BranchEvent.LIMIT, last, largest, error))
         return Trace(points, events, BranchStop(end, cause, last.value))
 
-    if _leaves(begin):
-        return stopped(BranchEnd.REACHED, _BOUND)
+    if leaves_range(begin):
+        return stopped(BranchEnd.REACHED, BOUND)
     control = StepControl(_FIRST * largest_step, largest_step, _SMALLEST, _LEAST_COSINE)
     for attempt in islice(follow(curve, here, control, low=0.0, high=1.0), max_points):
         if attempt.found is None:
-            return stopped(*_reason(attempt.code))
+            return stopped(*reason_of(attempt.code))
         there = attempt.found
         for place, event in bifurcations_between(curve, axis, here, there):
             points.append(branch_point(curve, axis, place))
@@ -108,19 +108,19 @@ def trace(
                 return stopped(BranchEnd.UNFINISHED, f"stopped at the {until}")
         points.append(branch_point(curve, axis, there))
         tell(points[-1])
-        if _is_bound(there):
-            return stopped(BranchEnd.REACHED, _BOUND)
+        if is_bound(there):
+            return stopped(BranchEnd.REACHED, BOUND)
         if len(points) > 3 and _closes(begin, here, there):
             return stopped(BranchEnd.CLOSED, "the branch is closed")
         here = there
     return stopped(BranchEnd.UNFINISHED, f"{max_points} points were followed")
 
 
-_BOUND = "the range ends"
+BOUND = "the range ends"
 
 
-def _reason(code: int) -> tuple[BranchEnd, str]:
-    """Why the curve could not be followed, from the code of the last attempt."""
+def reason_of(code: int) -> tuple[BranchEnd, str]:
+    """Why a curve could not be followed on, from the code of the last attempt."""
     if code == NO_WALK:
         return BranchEnd.NO_WALK, "no walk: a foot deep underground, or a step uphill"
     if code:
@@ -128,13 +128,13 @@ def _reason(code: int) -> tuple[BranchEnd, str]:
     return BranchEnd.BREAKS_OFF, "the return map is not smooth"
 
 
-def _is_bound(point: CurvePoint) -> bool:
+def is_bound(point: CurvePoint) -> bool:
     return bool(min(abs(point.place[-1]), abs(point.place[-1] - 1.0)) < _AT_BOUND)
 
 
-def _leaves(point: CurvePoint) -> bool:
+def leaves_range(point: CurvePoint) -> bool:
     """Whether a point lies on the end of the range and the branch leads out of it."""
-    return _is_bound(point) and bool((point.place[-1] > 0.5) == (point.tangent[-1] > 0.0))
+    return is_bound(point) and bool((point.place[-1] > 0.5) == (point.tangent[-1] > 0.0))
 
 
 def _closes(begin: CurvePoint, here: CurvePoint, there: CurvePoint) -> bool:

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-_MOST_CORRECTIONS = 6
+_MOST_CORRECTIONS, _PATIENT = 6, 20
+"""Corrections allowed, and where they need not get smaller from the first on."""
 _CONTRACTION = 0.6
 """Share of a correction that the next may have."""
 _MOST_SECANTS = 24
@@ -95,14 +96,20 @@ class StepControl(NamedTuple):
 
 
 def correct(
-    curve: Curve, guess: np.ndarray, border: np.ndarray, along: np.ndarray | None = None
+    curve: Curve,
+    guess: np.ndarray,
+    border: np.ndarray,
+    along: np.ndarray | None = None,
+    *,
+    patient: bool = False,
 ) -> Attempt:
     """The zero near `guess` in the plane normal to `border`, by Newton's method.
 
-    Its tangent points on from the direction `along`, towards larger s unless given.
+    Its tangent points on from the direction `along`, towards larger s unless given. Corrections
+    that do not get smaller end it, unless it is `patient`.
     """
     point, last = guess, np.inf
-    for k in range(_MOST_CORRECTIONS):
+    for k in range(_PATIENT if patient else _MOST_CORRECTIONS):
         here = curve.change(point[:-1] * curve.sizes[:-1], float(point[-1] * curve.sizes[-1]))
         if here.code != 0:
             return Attempt(None, code=here.code)
@@ -113,7 +120,7 @@ def correct(
         except np.linalg.LinAlgError:
             return Attempt(None)
         size = float(np.linalg.norm(move))
-        if not size <= max(_CONTRACTION * last, curve.converged):
+        if not (patient or size <= max(_CONTRACTION * last, curve.converged)):
             return Attempt(None)
         if size <= curve.converged:
             found = CurvePoint(point + move, _tangent(slopes, along), here)

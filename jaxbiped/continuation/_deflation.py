@@ -1,0 +1,204 @@
+"""Deflation: further gaits of one scene, each found by making Newton's method avoid the known.
+
+Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026: the residual is multiplied by
+Π (1/|x − xᵢ|² + 1). As that factor is a scalar, the deflated step is Newton's own with another
+length, by the Sherman–Morrison formula.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxbiped._checks import (
+    check_choice,
+    check_count,
+    check_type,
+    check_unbatched,
+)
+from jaxbiped._progress import stage
+from jaxbiped.continuation._axis import axis_of
+from jaxbiped.continuation._branch_point import BranchPoint
+from jaxbiped.continuation._continuation_setup import (
+    ContinuationSetup,
+    checked_start,
+    continuation_setup,
+)
+from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.gait._pseudo_arclength import Change
+from jaxbiped.gait._rolling_starts import rolling_starts
+from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import GAIT_ACCURACIES
+
+_MOST_STEPS = 40
+_LARGEST = 0.3
+"""Step at most, in the sizes of the components."""
+_HALVINGS = 6
+"""Of a step from whose end the walk does not return."""
+_SAME = 1e-5
+"""Distance up to which two cycles are one."""
+_SPREADS = (0.03, 0.1, 0.3, 0.6)
+"""Largest relative scatter of the starts' components."""
+
+
+class IsolatedGait(NamedTuple):
+    """A gait of a scene that a search found beside others.
+
+    Attributes:
+        state: on the section.
+        point: its measures and multipliers.
+    """
+
+    state: WalkerState
+    point: BranchPoint
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether it is stable; None where the errors leave it open."""
+        return self.point.stable
+
+
+def find_isolated(
+    scene: Scene | RigidScene,
+    *,
+    footsteps: int = 1,
+    known: tuple[WalkerState, ...] = (),
+    starts: int = 24,
+    seed: int = 0,
+    accuracy: str = "balanced",
+    engine: str = "auto",
+) -> tuple[IsolatedGait, ...]:
+    """Finds gaits of so many footsteps without a guess, by deflated Newton's method.
+
+    From each of many scattered starts gaits are sought as long as new ones are found, every search
+    avoiding those that are known with all the places where they cross the section.
+
+    Args:
+        scene: the walker, compliant or rigid.
+        footsteps: how many a cycle has; gaits that repeat themselves after fewer are avoided, but
+            not returned.
+        known: states of gaits to avoid.
+        starts: how many, scattered about the gait that `find_gait` finds.
+        seed: of their random numbers.
+        accuracy: "balanced" or "tight".
+        engine: "xla", "lanes" or "auto" (see `ENGINES`).
+
+    Returns:
+        The gaits in the order in which they were found, none twice.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled.
+    """
+    check_type("scene", scene, Scene, RigidScene)
+    check_unbatched("scene", scene)
+    for name, count in (("footsteps", footsteps), ("starts", starts)):
+        check_count(name, count)
+    check_choice("accuracy", accuracy, GAIT_ACCURACIES)
+    checked = [checked_start(scene, each) for each in known]
+    slope = float(parameter_values(scene)["slope"])
+    axis = axis_of(scene, "slope", (slope, slope + 0.01), None)
+    setup = continuation_setup(
+        scene, axis, footsteps=int(footsteps), accuracy=accuracy, engine=engine
+    )
+    search = _DeflatedNewton(setup, slope)
+    for state in checked:
+        search.learn(setup.recurring(state), keep=False)
+    with stage(f"searching from {starts} starts"):
+        for point in _scattered(setup, int(starts), seed, engine):
+            while (found := search.from_start(point)) is not None:
+                search.learn(found)
+    return search.found()
+
+
+def _scattered(setup: ContinuationSetup, count: int, seed: int, engine: str) -> list[np.ndarray]:
+    """Components of the starts: about the gait that a search without a guess finds, else rolling.
+
+    Walks from most scattered starts end before a cycle is done; near a gait they do not.
+    """
+    scene = setup.scene
+    gait = find_gait(
+        scene, parameters=(), radius_sensitivities=False, accuracy=setup.accuracy, engine=engine
+    )
+    if gait.outcome is not Search.FOUND:
+        rolling = rolling_starts(scene, count, spread=max(_SPREADS), seed=seed)
+        return list(np.stack([np.asarray(leaf) for leaf in rolling[1:]], axis=1))
+    middle, random = setup.recurring(gait.measures.state), np.random.default_rng(seed)
+    spreads = np.resize(_SPREADS, count)
+    spreads[0] = 0.0
+    moves = spreads[:, None] * random.uniform(-1.0, 1.0, (count, len(middle)))
+    return list(middle * (1.0 + moves))
+
+
+class _DeflatedNewton:
+    """Deflated Newton's method, and the cycles that it knows."""
+
+    def __init__(self, setup: ContinuationSetup, value: float) -> None:
+        self._setup, self._value = setup, value
+        self._sizes = setup.curve.sizes[:-1]
+        self._crossings: list[np.ndarray] = []
+        self._gaits: list[IsolatedGait] = []
+
+    def found(self) -> tuple[IsolatedGait, ...]:
+        """The gaits of as many footsteps as were asked for."""
+        return tuple(self._gaits)
+
+    def learn(self, point: np.ndarray, *, keep: bool = True) -> None:
+        """Makes a cycle known, wherever it crosses the section."""
+        cycle = [point]
+        for _ in range(self._setup.footsteps - 1):
+            after, code = self._walk(cycle[-1], 1)
+            if code or self._apart(after, point) < _SAME:
+                break
+            cycle.append(after)
+        self._crossings += [each / self._sizes for each in cycle]
+        place = self._setup.at_value(point, self._value).found
+        if keep and len(cycle) == self._setup.footsteps and place is not None:
+            self._gaits.append(IsolatedGait(self._setup.state(place), self._setup.point(place)))
+
+    def from_start(self, start: np.ndarray) -> np.ndarray | None:
+        """A cycle that is not known yet, None where the search ends without."""
+        point, code = self._walk(start, 1)  # onto the section
+        for _ in range(_MOST_STEPS):
+            here = self._change(point)
+            if code or here.code:
+                return None
+            try:
+                step = np.linalg.solve(here.by_point, -here.value) / self._sizes
+            except np.linalg.LinAlgError:
+                return None
+            if np.linalg.norm(step) <= self._setup.curve.converged:
+                apart = [np.linalg.norm(point / self._sizes - each) for each in self._crossings]
+                return point if min(apart, default=np.inf) > _SAME else None
+            point, code = self._advance(point, self._deflated(point / self._sizes, step))
+        return None
+
+    def _deflated(self, scaled: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Newton's step with the length, or in the sense, that avoids the known crossings."""
+        away = [scaled - each for each in self._crossings]
+        squares = [float(each @ each) for each in away]
+        slopes = [-2.0 * each / (r2 * (r2 + 1.0)) for each, r2 in zip(away, squares, strict=True)]
+        step = step / (1.0 - float(sum(slopes, np.zeros_like(step)) @ step))
+        return step * min(1.0, _LARGEST / float(np.linalg.norm(step)))
+
+    def _advance(self, point: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, int]:
+        """A step on, or as much of it as leads to where the walk returns."""
+        for k in range(_HALVINGS):
+            ahead = point + 0.5**k * step * self._sizes
+            code = self._walk(ahead, self._setup.footsteps)[1]
+            if code == 0:
+                break
+        return ahead, code
+
+    def _walk(self, point: np.ndarray, footsteps: int) -> tuple[np.ndarray, int]:
+        leaf = self._setup.axis.leaf
+        cycle = self._setup.problem.cycle(point, (leaf,), [self._value], footsteps)
+        return np.asarray(cycle.recurring[0]), int(cycle.code[0])
+
+    def _change(self, point: np.ndarray) -> Change:
+        return self._setup.curve.change(point, self._setup.axis.place(self._value))
+
+    def _apart(self, a: np.ndarray, b: np.ndarray) -> float:
+        return float(np.linalg.norm((a - b) / self._sizes))
