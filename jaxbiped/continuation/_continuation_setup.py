@@ -10,20 +10,27 @@ from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import BranchPoint, branch_point, gait_curve
 from jaxbiped.continuation._cycle import CycleProblem
+from jaxbiped.continuation._limit_cause import limit_cause
 from jaxbiped.continuation._trace import Trace
 from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._state import check_state
+from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._pseudo_arclength import Attempt, Curve, CurvePoint, correct
 from jaxbiped.gait._return_map_spec import walking_spec
 from jaxbiped.gait._solver import orbit_solver
+from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import ACCURACIES, precision_of
 from jaxbiped.variational._hybrid_system import section_of
+
+_TOLD_BY_CONTACT = (BranchEnd.BREAKS_OFF, BranchEnd.WALK_ENDS)
+_BEYOND = 5e-3
+"""How far in s behind its end the walk beyond a branch is looked at."""
 
 
 class ContinuationSetup(NamedTuple):
@@ -61,15 +68,28 @@ class ContinuationSetup(NamedTuple):
         """The components of a state that must return."""
         return np.asarray(recurring_components(self.problem.spec.system, state))
 
-    def state(self, found: CurvePoint) -> WalkerState:
-        """The state of a point of the curve."""
-        recurring = found.place[:-1] * self.curve.sizes[:-1]
+    def state_of(self, recurring: np.ndarray) -> WalkerState:
+        """The state of these components."""
         state = type(self.problem.like)(0.0, *recurring.tolist())
         return cast(WalkerState, jtu.tree_map(as_float, state))
 
     def point(self, found: CurvePoint) -> BranchPoint:
         """What is told of a point of the curve."""
         return branch_point(self.curve, self.axis, found)
+
+    def with_cause(self, part: Trace) -> Trace:
+        """A part of a branch whose end is told by touch and slip, where these tell it."""
+        last, scene = part.points[-1], self.scene
+        if not isinstance(scene, Scene) or part.stop.end not in _TOLD_BY_CONTACT:
+            return part
+        beyond = last.place[-1] + _BEYOND * np.sign(last.tangent[-1])
+        here, there = (
+            with_parameters(scene, {self.axis.name: value})
+            for value in (last.value, self.axis.value(float(beyond)))
+        )
+        state = self.state_of(last.recurring)
+        cause = limit_cause(here, there, state, last.period)
+        return part if cause is None else part._replace(stop=part.stop._replace(cause=cause))
 
     def branch(self, before: Trace, after: Trace) -> Branch:
         """The branch of two parts, of which the later begins where the earlier ends."""
@@ -95,7 +115,8 @@ def continuation_setup(
     solver = orbit_solver(None, rigid=not scene.compliant)
     section = section_of(scene, None)
     runs_on = orbit_engine(engine, solver=solver, section=section, leaves=(scene, like))
-    most = ACCURACIES[accuracy].max_solver_steps
+    # A branch may come to gaits that are costlier than those of a search.
+    most = max(each.max_solver_steps for each in ACCURACIES.values())
     spec = walking_spec(scene, section, solver, runs_on, steps=1, most=most)
     problem = CycleProblem(spec, scene, like, precision_of(accuracy, scene))
     return ContinuationSetup(scene, axis, footsteps, accuracy, problem)

@@ -78,7 +78,7 @@ def continue_gait(
         >>> import jaxbiped as jb
         >>> branch = jb.continue_gait(jb.ladder()["rigid"], "slope", bounds=(0.01, 0.11))
         >>> [f"{each.kind} at {each.value:.4f}" for each in branch.bifurcations]
-        ['period-doubling at 0.1012']
+        ['period-doubling at 0.1004']
     """
     check_type("scene", scene, Scene, RigidScene)
     check_unbatched("scene", scene)
@@ -109,6 +109,7 @@ def continue_gait(
         )
         for way in (-1.0, 1.0)
     )
+    before, after = map(setup.with_cause, (before, after))
     return setup.branch(before.reversed(), after)
 
 

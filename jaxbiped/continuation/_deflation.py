@@ -156,7 +156,7 @@ class _DeflatedNewton:
         self._crossings += [each / self._sizes for each in cycle]
         place = self._setup.at_value(point, self._value).found
         if keep and len(cycle) == self._setup.footsteps and place is not None:
-            self._gaits.append(IsolatedGait(self._setup.state(place), self._setup.point(place)))
+            self._gaits.append(IsolatedGait(self._setup.state_of(point), self._setup.point(place)))
 
     def from_start(self, start: np.ndarray) -> np.ndarray | None:
         """A cycle that is not known yet, None where the search ends without."""

@@ -13,6 +13,7 @@ from jaxbiped.continuation._bifurcations import (
     bifurcations_between,
 )
 from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint, branch_point
+from jaxbiped.continuation._limit_cause import NOT_SMOOTH, OF_ENDINGS
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, follow
 from jaxbiped.solve._ending import Ending
@@ -21,6 +22,8 @@ _SMALLEST = 1e-6
 _FIRST = 0.25
 """Of the largest step."""
 _LEAST_COSINE = 0.95
+_DIVERGED = 1e6
+"""Multiplier by which the return map counts as not smooth: near grazing it grows as a root."""
 _AT_BOUND = 1e-9
 _SAME_WAY = 0.9
 """Cosine between the tangents where a branch passes its own beginning once more."""
@@ -108,6 +111,8 @@ def trace(
                 return stopped(BranchEnd.UNFINISHED, f"stopped at the {until}")
         points.append(branch_point(curve, axis, there))
         tell(points[-1])
+        if abs(points[-1].multipliers[0]) > _DIVERGED:
+            return stopped(BranchEnd.BREAKS_OFF, NOT_SMOOTH)
         if is_bound(there):
             return stopped(BranchEnd.REACHED, BOUND)
         if len(points) > 3 and _closes(begin, here, there):
@@ -124,8 +129,8 @@ def reason_of(code: int) -> tuple[BranchEnd, str]:
     if code == NO_WALK:
         return BranchEnd.NO_WALK, "no walk: a foot deep underground, or a step uphill"
     if code:
-        return BranchEnd.WALK_ENDS, str(Ending(code))
-    return BranchEnd.BREAKS_OFF, "the return map is not smooth"
+        return BranchEnd.WALK_ENDS, OF_ENDINGS.get(Ending(code), str(Ending(code)))
+    return BranchEnd.BREAKS_OFF, NOT_SMOOTH
 
 
 def is_bound(point: CurvePoint) -> bool:
