@@ -5,6 +5,7 @@ from typing import NamedTuple, cast
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._checks import ArgumentError, check_type, check_unbatched
 from jaxbiped._types import as_float
 from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._branch import Branch
@@ -23,6 +24,7 @@ from jaxbiped.gait._pseudo_arclength import Attempt, Curve, CurvePoint, correct
 from jaxbiped.gait._return_map_spec import walking_spec
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import ACCURACIES, precision_of
@@ -127,3 +129,14 @@ def checked_start(scene: Scene | RigidScene, start: object) -> WalkerState:
     if isinstance(scene, RigidScene):
         return check_state(start, RigidState, "guess")
     return state_for(scene, start, "guess")
+
+
+def check_followed(scene: object) -> None:
+    """Raises `ArgumentError` for what is no scene, or one in redundant coordinates."""
+    if isinstance(scene, RedundantScene):
+        raise ArgumentError(
+            "scene is not allowed in redundant coordinates: its gaits are those of scene.minimal, "
+            "which can be followed."
+        )
+    check_type("scene", scene, Scene, RigidScene)
+    check_unbatched("scene", scene)

@@ -7,8 +7,6 @@ from jaxbiped._checks import (
     check_choice,
     check_count,
     check_positive,
-    check_type,
-    check_unbatched,
 )
 from jaxbiped._progress import stage
 from jaxbiped._types import as_float
@@ -16,6 +14,7 @@ from jaxbiped.continuation._axis import axis_of, start_of
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._continuation_setup import (
     ContinuationSetup,
+    check_followed,
     checked_start,
     continuation_setup,
 )
@@ -80,8 +79,7 @@ def continue_gait(
         >>> [f"{each.kind} at {each.value:.4f}" for each in branch.bifurcations]
         ['period-doubling at 0.1004']
     """
-    check_type("scene", scene, Scene, RigidScene)
-    check_unbatched("scene", scene)
+    check_followed(scene)
     axis = axis_of(scene, along, bounds, log)
     check_count("footsteps", footsteps)
     check_positive("largest_step", largest_step)

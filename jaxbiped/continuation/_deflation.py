@@ -5,6 +5,8 @@ Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026: the residual
 length, by the Sherman–Morrison formula.
 """
 
+from collections.abc import Iterator
+from itertools import cycle, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -12,14 +14,13 @@ import numpy as np
 from jaxbiped._checks import (
     check_choice,
     check_count,
-    check_type,
-    check_unbatched,
 )
 from jaxbiped._progress import stage
 from jaxbiped.continuation._axis import axis_of
-from jaxbiped.continuation._branch_point import BranchPoint
+from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint
 from jaxbiped.continuation._continuation_setup import (
     ContinuationSetup,
+    check_followed,
     checked_start,
     continuation_setup,
 )
@@ -34,13 +35,15 @@ from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 _MOST_STEPS = 40
-_LARGEST = 0.3
+_LARGEST = 0.1
 """Step at most, in the sizes of the components."""
 _HALVINGS = 6
 """Of a step from whose end the walk does not return."""
+_TRIALS = 20
+"""Starts drawn at most for each that is used: most end before a cycle is done."""
 _SAME = 1e-5
 """Distance up to which two cycles are one."""
-_SPREADS = (0.03, 0.1, 0.3, 0.6)
+_SPREADS = (0.003, 0.01, 0.03, 0.1, 0.3)
 """Largest relative scatter of the starts' components."""
 
 
@@ -66,7 +69,7 @@ def find_isolated(
     *,
     footsteps: int = 1,
     known: tuple[WalkerState, ...] = (),
-    starts: int = 24,
+    starts: int = 32,
     seed: int = 0,
     accuracy: str = "balanced",
     engine: str = "auto",
@@ -92,8 +95,7 @@ def find_isolated(
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
     """
-    check_type("scene", scene, Scene, RigidScene)
-    check_unbatched("scene", scene)
+    check_followed(scene)
     for name, count in (("footsteps", footsteps), ("starts", starts)):
         check_count(name, count)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
@@ -107,29 +109,32 @@ def find_isolated(
     for state in checked:
         search.learn(setup.recurring(state), keep=False)
     with stage(f"searching from {starts} starts"):
-        for point in _scattered(setup, int(starts), seed, engine):
+        drawn = islice(_scattered(setup, int(starts), seed, engine), _TRIALS * int(starts))
+        for point in islice(filter(search.returns, drawn), int(starts)):
             while (found := search.from_start(point)) is not None:
                 search.learn(found)
     return search.found()
 
 
-def _scattered(setup: ContinuationSetup, count: int, seed: int, engine: str) -> list[np.ndarray]:
-    """Components of the starts: about the gait that a search without a guess finds, else rolling.
+def _scattered(
+    setup: ContinuationSetup, count: int, seed: int, engine: str
+) -> Iterator[np.ndarray]:
+    """Components of starts, without end: about the gait that a search finds, itself the first.
 
-    Walks from most scattered starts end before a cycle is done; near a gait they do not.
+    Rolling starts where it finds none.
     """
     scene = setup.scene
     gait = find_gait(
         scene, parameters=(), radius_sensitivities=False, accuracy=setup.accuracy, engine=engine
     )
     if gait.outcome is not Search.FOUND:
-        rolling = rolling_starts(scene, count, spread=max(_SPREADS), seed=seed)
-        return list(np.stack([np.asarray(leaf) for leaf in rolling[1:]], axis=1))
+        rolling = rolling_starts(scene, _TRIALS * count, spread=max(_SPREADS), seed=seed)
+        yield from np.stack([np.asarray(leaf) for leaf in rolling[1:]], axis=1)
+        return
     middle, random = setup.recurring(gait.measures.state), np.random.default_rng(seed)
-    spreads = np.resize(_SPREADS, count)
-    spreads[0] = 0.0
-    moves = spreads[:, None] * random.uniform(-1.0, 1.0, (count, len(middle)))
-    return list(middle * (1.0 + moves))
+    yield middle
+    for spread in cycle(_SPREADS):
+        yield middle * (1.0 + spread * random.uniform(-1.0, 1.0, len(middle)))
 
 
 class _DeflatedNewton:
@@ -147,16 +152,21 @@ class _DeflatedNewton:
 
     def learn(self, point: np.ndarray, *, keep: bool = True) -> None:
         """Makes a cycle known, wherever it crosses the section."""
-        cycle = [point]
+        crossings = [point]
         for _ in range(self._setup.footsteps - 1):
-            after, code = self._walk(cycle[-1], 1)
+            after, code = self._walk(crossings[-1], 1)
             if code or self._apart(after, point) < _SAME:
                 break
-            cycle.append(after)
-        self._crossings += [each / self._sizes for each in cycle]
+            crossings.append(after)
+        self._crossings += [each / self._sizes for each in crossings]
         place = self._setup.at_value(point, self._value).found
-        if keep and len(cycle) == self._setup.footsteps and place is not None:
-            self._gaits.append(IsolatedGait(self._setup.state_of(point), self._setup.point(place)))
+        if keep and len(crossings) == self._setup.footsteps and place is not None:
+            told = self._setup.point(place)
+            self._gaits.append(IsolatedGait(self._setup.state_of(told.recurring), told))
+
+    def returns(self, start: np.ndarray) -> bool:
+        """Whether the walk from a start comes through a cycle."""
+        return self._walk(start, self._setup.footsteps + 1)[1] == 0
 
     def from_start(self, start: np.ndarray) -> np.ndarray | None:
         """A cycle that is not known yet, None where the search ends without."""
@@ -194,8 +204,9 @@ class _DeflatedNewton:
 
     def _walk(self, point: np.ndarray, footsteps: int) -> tuple[np.ndarray, int]:
         leaf = self._setup.axis.leaf
-        cycle = self._setup.problem.cycle(point, (leaf,), [self._value], footsteps)
-        return np.asarray(cycle.recurring[0]), int(cycle.code[0])
+        found = self._setup.problem.cycle(point, (leaf,), [self._value], footsteps)
+        code = int(found.code[0]) or (0 if bool(found.sound[0]) else NO_WALK)
+        return np.asarray(found.recurring[0]), code
 
     def _change(self, point: np.ndarray) -> Change:
         return self._setup.curve.change(point, self._setup.axis.place(self._value))

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import groupby, pairwise
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,7 +27,7 @@ _MEASURES = {
     "peak_normal": NORMAL_FORCE._replace(words="largest normal force"),
     "spectral_radius": Quantity("spectral radius of a cycle", r"$\rho$"),
 }
-_STYLES = {True: "-", False: (0, (5, 2)), None: (0, (1, 1.5))}
+_STYLES: dict[bool | None, Any] = {True: "-", False: (0, (5, 2)), None: (0, (1, 1.5))}
 _WORDS = {True: "stable", False: "unstable", None: "undecided"}
 _MARKS = {
     BranchEvent.FOLD: ("s", "fold"),
@@ -74,6 +75,8 @@ def branch(
     kinds = [kind for kind in _MARKS if any(_draw_marks(ax, each, measure, kind) for each in given)]
     if given[0].axis.log:
         ax.set_xscale("log")
+    if measure == "spectral_radius":
+        ax.axhline(1.0, color=GROUND_COLOUR, linewidth=0.6, zorder=0.5)
     quantity = _MEASURES.get(measure) or STATE_QUANTITIES[measure]
     along = parameter_quantities(given[0].scene)[given[0].along]
     dress(ax, f"Gaits along {along.words}", along.on_axis(), quantity.on_axis())
