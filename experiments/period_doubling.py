@@ -78,8 +78,8 @@ def pair_at(options: Options) -> dict[str, Any]:
         options.say(
             f"{name:<5} gait at {PAIR_SLOPE:g}: θ = {gait.state.theta_2:.14f}, λ = {values}"
         )
-    low, high = rows["long"]["stable_slopes"]
-    options.say(f"long gait stable from {low:g} (where the branch begins) to {high:.6f}")
+    low, doubling = rows["long"]["stable_slopes"][0], rows["long"]["first_doubling"]
+    options.say(f"long gait stable from {low:g}, where the branch begins, to {doubling:.9f}")
     return {**rows, "branches": branches}
 
 
@@ -199,7 +199,7 @@ def draw(options: Options, branches: list[Any], walks: tuple[np.ndarray, ...]) -
     left.set_title("The simplest walker: stance angle after a strike", loc="left")
     slopes, angles, _ = walks
     right.plot(
-        np.repeat(slopes, angles.shape[1]), angles.ravel(), ",", color="#777777",
+        np.repeat(slopes, angles.shape[1]), angles.ravel(), ".", color="#999999", markersize=1.2,
         label="strikes of walks", zorder=0,
     )  # fmt: skip
     plot.branch(branches[1:], "theta_2", ax=right)

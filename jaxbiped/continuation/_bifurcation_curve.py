@@ -36,7 +36,7 @@ from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 _DIFFERENCE = 1e-4
 """Step of the test function's difference quotients, in the sizes of the curve."""
 _CONVERGED = 1e-7
-_SMALLEST = 1e-4
+_SMALLEST, _ASIDE = 1e-4, 0.05
 
 
 class BifurcationCurve(NamedTuple):
@@ -181,7 +181,7 @@ def _follow(
 
     if leaves_range(begin):
         return stopped(BranchEnd.REACHED, BOUND)
-    control = StepControl(0.25 * largest_step, largest_step, _SMALLEST)
+    control = StepControl(0.25 * largest_step, largest_step, _SMALLEST, aside=_ASIDE)
     for attempt in islice(follow(curve, begin, control, low=0.0, high=1.0), max_points):
         if attempt.found is None:
             return stopped(*reason_of(attempt.code))

@@ -21,7 +21,7 @@ from jaxbiped.solve._ending import Ending
 _SMALLEST = 1e-6
 _FIRST = 0.25
 """Of the largest step."""
-_LEAST_COSINE = 0.95
+_LEAST_COSINE, _ASIDE = 0.95, 0.02
 _DIVERGED = 1e6
 """Multiplier by which the return map counts as not smooth: near grazing it grows as a root."""
 _AT_BOUND = 1e-9
@@ -99,7 +99,7 @@ def trace(
 
     if leaves_range(begin):
         return stopped(BranchEnd.REACHED, BOUND)
-    control = StepControl(_FIRST * largest_step, largest_step, _SMALLEST, _LEAST_COSINE)
+    control = StepControl(_FIRST * largest_step, largest_step, _SMALLEST, _LEAST_COSINE, _ASIDE)
     for attempt in islice(follow(curve, here, control, low=0.0, high=1.0), max_points):
         if attempt.found is None:
             return stopped(*reason_of(attempt.code))

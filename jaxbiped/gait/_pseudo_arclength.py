@@ -87,12 +87,16 @@ class StepControl(NamedTuple):
         largest: at most.
         smallest: below which a curve is given up.
         least_cosine: of the angle between the tangents at the two ends of a step.
+        aside: how far a point may lie from where the last tangent points, as a share of the step
+            besides twice that angle: on one smooth curve it is about half the angle, and anywhere
+            on another one.
     """
 
     first: float
     largest: float
     smallest: float
     least_cosine: float = 0.85
+    aside: float = np.inf
 
 
 def correct(
@@ -152,10 +156,8 @@ def follow(
         # The last step ends on the bound, the others where the tangent says.
         border = np.eye(len(here.place))[-1] if length < step else here.tangent
         attempt = correct(curve, here.place + length * here.tangent, border, here.tangent)
-        bent = attempt.found is not None and (
-            attempt.found.tangent @ here.tangent < control.least_cosine
-        )
-        if attempt.found is None or (bent and step > 50.0 * control.smallest):
+        jumps = attempt.found is not None and _jumps(here, attempt.found, length, control)
+        if attempt.found is None or (jumps and step > 50.0 * control.smallest):
             step *= 0.4
             if step < control.smallest:
                 yield Attempt(None, code=attempt.code)
@@ -166,6 +168,14 @@ def follow(
             return
         here = attempt.found
         step = min(control.largest, step * (1.7 if attempt.quick else 1.1))
+
+
+def _jumps(here: CurvePoint, there: CurvePoint, length: float, control: StepControl) -> bool:
+    """Whether a step turned too far, or did not lead where a smooth curve would."""
+    cosine = min(1.0, float(there.tangent @ here.tangent))
+    off = float(np.linalg.norm(there.place - here.place - length * here.tangent))
+    allowed = length * (2.0 * np.arccos(max(-1.0, cosine)) + control.aside)
+    return cosine < control.least_cosine or off > allowed
 
 
 def locate(
