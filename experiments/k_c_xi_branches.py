@@ -70,7 +70,7 @@ def curves_of(options: Options, slope: Any, name: str, bounds: tuple[float, floa
             key=lambda each: abs(abs(each.point.multipliers[0]) - 1.0),
         )
         curve = jb.continuation.bifurcation_curve(
-            slope, event, name, bounds=bounds, max_points=6 if options.quick else 40
+            slope, event, name, bounds=bounds, max_points=2 if options.quick else 40
         )
         found.append(curve)
         ends = ", ".join(f"{stop.end} at {stop.value:.4g} ({stop.cause})" for stop in curve.stops)

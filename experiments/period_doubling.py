@@ -158,7 +158,8 @@ def chaos(options: Options, walks: tuple[np.ndarray, ...]) -> dict[str, Any]:
 def period_three(options: Options) -> tuple[list[Any], dict[str, Any]]:
     """The branches of gaits of three footsteps that deflation finds, and what is known of them."""
     scene = scene_of(PERIOD_THREE)
-    gaits = jb.continuation.find_isolated(scene, footsteps=3, accuracy="tight")
+    starts = 8 if options.quick else 32
+    gaits = jb.continuation.find_isolated(scene, footsteps=3, starts=starts, accuracy="tight")
     rows, branches = [], []
     for gait in gaits:
         options.say(

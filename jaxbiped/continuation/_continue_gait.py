@@ -141,4 +141,8 @@ def first_gait(
         found = setup.at_value(setup.recurring(gait.measures.state), value).found
         if found is not None:
             return found
+        return (
+            f"no gait to begin from: what the search finds at {setup.axis.name} = {value:.6g} is "
+            "lost when it is corrected"
+        )
     return explain_search(scene, gait)

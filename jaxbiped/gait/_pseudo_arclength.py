@@ -15,6 +15,8 @@ _MOST_CORRECTIONS, _PATIENT = 6, 20
 _CONTRACTION = 0.6
 """Share of a correction that the next may have."""
 _MOST_SECANTS = 24
+_BESIDE = 1e-6
+"""Share of an interval by which a search moves aside from where it fails."""
 _ZERO = 1e-10
 """A test function as small as this has been located."""
 
@@ -191,10 +193,10 @@ def locate(
     for _ in range(_MOST_SECANTS):
         (a, b), (u, v) = ends, values
         length = (a * v - b * u) / (v - u)
-        near = here if best is None else best
-        ahead = (length - _advance(here, near)) / (near.tangent @ here.tangent)
-        guess = near.place + ahead * near.tangent
-        found = correct(curve, guess, here.tangent, here.tangent).found
+        found = _at_length(curve, here, best or here, length)
+        if found is None:  # where curves cross the plane of the search is no help: beside it
+            length += _BESIDE * (b - a)
+            found = _at_length(curve, here, best or here, length)
         if found is None:
             return best
         value = test(found)
@@ -207,6 +209,14 @@ def locate(
         else:
             ends, values = [a, length], [0.5 * u, value]
     return best
+
+
+def _at_length(
+    curve: Curve, here: CurvePoint, near: CurvePoint, length: float
+) -> CurvePoint | None:
+    """The point so far along the tangent of `here`, from a nearer one."""
+    ahead = (length - _advance(here, near)) / (near.tangent @ here.tangent)
+    return correct(curve, near.place + ahead * near.tangent, here.tangent, here.tangent).found
 
 
 def _advance(here: CurvePoint, there: CurvePoint) -> float:

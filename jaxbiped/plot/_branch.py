@@ -72,7 +72,8 @@ def branch(
     counts = sorted({each.footsteps for each in given})
     for each in given:
         _draw_lines(ax, each, measure, _COLOURS[counts.index(each.footsteps) % len(_COLOURS)])
-    kinds = [kind for kind in _MARKS if any(_draw_marks(ax, each, measure, kind) for each in given)]
+    drawn = {kind for kind in _MARKS for each in given if _draw_marks(ax, each, measure, kind)}
+    kinds = [kind for kind in _MARKS if kind in drawn]
     if given[0].axis.log:
         ax.set_xscale("log")
     if measure == "spectral_radius":
@@ -165,7 +166,12 @@ def _legend(ax: Axes, given: list[Branch], kinds: list[BranchEvent], counts: lis
     ]
     if len(counts) > 1:
         handles += [
-            Line2D([], [], color=_COLOURS[k % len(_COLOURS)], label=f"{count} footstep" + "s" * (count > 1))
+            Line2D(
+                [],
+                [],
+                color=_COLOURS[k % len(_COLOURS)],
+                label=f"{count} footstep" + "s" * (count > 1),
+            )
             for k, count in enumerate(counts)
         ]
     handles += [
@@ -174,6 +180,10 @@ def _legend(ax: Axes, given: list[Branch], kinds: list[BranchEvent], counts: lis
         for kind in kinds
     ]  # fmt: skip
     legend_below(ax, columns=min(len(handles), 5), handles=handles)
+
+
+def _footsteps(count: int) -> str:
+    return "1 footstep" if count == 1 else f"{count} footsteps"
 
 
 def _is_drawn_undecided(given: list[Branch]) -> bool:
