@@ -29,16 +29,15 @@ def along(name: str, count: int, side: int) -> dict[str, Any]:
     labelling = jb.labelling(scene, parameters=starts.parameters)
     known = [bool(row) for row in labelling.family.rows]
     found = jb.sweep(labelling, starts, look_for_gaits=name == "slope")
-    labels, periods = found["label"].values, found["period"].values
+    labels, cycles = found["label"].values, found["cycle_footsteps"].values
     fractions = [
-        jb.basins.fractions(jb.basins.label_names(labels[k], periods[k]))
-        for k in range(len(values))
+        jb.basins.fractions(jb.basins.label_names(labels[k], cycles[k])) for k in range(len(values))
     ]
     return {"values": values, "gait_known": known, "fractions": fractions}
 
 
 def walking(fractions: dict[str, jb.basins.Fraction]) -> tuple[float, float, float]:
-    """Fraction of starts that walk, whatever the period, with its interval."""
+    """Fraction of starts that walk, whatever the cycle, with its interval."""
     total = sum(part.count for part in fractions.values())
     count = sum(part.count for name, part in fractions.items() if name.startswith("walking"))
     low, high = jb.basins.wilson_interval(count, total)

@@ -18,9 +18,9 @@ def axes(side: int) -> dict[str, np.ndarray]:
 
 
 def codes_on_grid(labelling: jb.Labelling, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """Labels and periods of a square grid, shape (side, side)."""
+    """Labels and cycles' footsteps of a square grid, shape (side, side)."""
     found = jb.sweep(labelling, jb.starts.grid(labelling.scene, axes(side)))
-    return found["label"].values, found["period"].values
+    return found["label"].values, found["cycle_footsteps"].values
 
 
 def in_words(fractions: dict[str, jb.basins.Fraction]) -> dict[str, dict[str, float]]:

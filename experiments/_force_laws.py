@@ -131,7 +131,7 @@ def findings(scene: jb.Scene, repeats: int) -> Findings:
     return Findings(
         outcome=str(first.outcome),
         end_s=DURATION if walks else end_time(scene),
-        attempted_steps=int(first.accepted + first.rejected),
+        attempted_steps=int(first.attempted),
         wall_ms=1e3 * median_time(run, repeats),
         search=str(gait.outcome) if found else f"{gait.outcome}, last walk: {gait.walk_outcome}",
         found_by="search" if found else ("walk" if walked else None),
@@ -160,15 +160,16 @@ MEASURES = {
 def settled(scene: jb.Scene) -> dict[str, float | None] | None:
     """The gait that a long walk settles on, None where it does not; no spectral radius."""
     long = walk(scene, jb.seed_state(), SETTLING)()
-    count = int(long.arrivals)
-    times, places = (np.asarray(row)[:count] for row in (long.t, long.state.hip_x))
+    strikes = long.arrivals
+    count = int(strikes.total)
+    times, places = (np.asarray(row)[:count] for row in (strikes.t, strikes.state.hip_x))
     periods = np.diff(times)
     if long.outcome is not jb.Ending.WALKING or count < 4:
         return None
     if np.ptp(periods[-3:]) > SETTLED * periods[-1]:
         return None
     # Beginning where the foot strikes: so the extremes are those of the gait alone.
-    last = jax.tree_util.tree_map(lambda leaf: leaf[count - 1], long.state)
+    last = jax.tree_util.tree_map(lambda leaf: leaf[count - 1], strikes.state)
     period, length = float(periods[-1]), float(places[-1] - places[-2])
     return {
         "period_s": period,

@@ -11,7 +11,6 @@ import numpy as np
 
 import jaxbiped as jb
 from jaxbiped.compiler import LANES, Program, Request
-from jaxbiped.simulate._by_lanes import lane_request
 
 _WATCH = ("fall", "stop", "stumble")
 _CHAINS, _LENGTH = 24, 2000
@@ -69,7 +68,7 @@ def _compiled(scene: jb.Scene) -> Any:
     """The very program that `simulate` runs, so that it is traced once."""
     options: dict[str, Any] = dict(save="end", engine="lanes", watch=_WATCH)
     run = jb.Simulation.prepare(scene, jb.seed_state(), duration=1.0, **options)
-    return LANES.compile(lane_request(run))
+    return LANES.compile(run.lane_request())
 
 
 def flops_per_step() -> int:
@@ -110,7 +109,7 @@ def scenes(count: int, duration: float, *, quick: bool) -> list[dict[str, Any]]:
         def one(*state: Any, scene: jb.Scene = scene) -> Any:
             options: dict[str, Any] = dict(save="end", engine="lanes", watch=_WATCH)
             end = jb.simulate(scene, jb.State(*state), duration=0.2 * duration, **options)
-            return end.accepted + end.rejected
+            return end.attempted
 
         jax.vmap(one)(*starts)
         began = time.perf_counter()

@@ -103,7 +103,7 @@ def walked(
     def end(start: Any) -> Any:
         if isinstance(scene, jb.RigidScene):
             walk = jb.rigid_walk(scene, start, duration=DURATION, rtol=rtol, engine="lanes")
-            return walk.state, walk.ending
+            return walk.final, walk.ending
         walk = jb.simulate(
             scene,
             start,
@@ -113,7 +113,7 @@ def walked(
             max_solver_steps=MOST_STEPS,
             engine="lanes",
         )
-        return jax.tree.map(lambda leaf: leaf[0], walk.state), walk.ending
+        return walk.final, walk.ending
 
     return jax.jit(end if single else jax.vmap(end))
 

@@ -84,16 +84,17 @@ def _walked(scene: Any, starts: Any, footsteps: int, rtol: float) -> Any:
             max_solver_steps=1_000_000,
             engine="lanes",
         )
-        last = jax.tree.map(lambda leaf: leaf[-1], walk.state)
+        at = walk.arrivals
+        last = jax.tree.map(lambda leaf: leaf[-1], at.state)
         stands = jnp.abs(last.theta_1) < jnp.abs(last.theta_2)
         last = jax.tree.map(
             lambda a, b: jnp.where(stands, a, b), jb.dynamics.exchange_legs(last), last
         )
-        return walk.t, last._replace(hip_x=0.0 * last.hip_x), walk.arrivals
+        return at.t, last._replace(hip_x=0.0 * last.hip_x), at.total
 
     def rigid(start: Any) -> Any:
         walk = jb.rigid_walk(scene, start, footsteps=footsteps, rtol=1e-11, max_arrivals=footsteps)
-        last = jax.tree.map(lambda leaf: leaf[-1], walk.strikes[1])
-        return walk.strikes[0], last._replace(hip_x=0.0 * last.hip_x), walk.footsteps
+        last = jax.tree.map(lambda leaf: leaf[-1], walk.arrivals.state)
+        return walk.arrivals.t, last._replace(hip_x=0.0 * last.hip_x), walk.arrivals.total
 
     return jax.vmap(rigid if isinstance(scene, jb.RigidScene) else compliant)(starts)

@@ -29,9 +29,9 @@ def main() -> None:
     options = parse(__doc__ or "")
     quick = options.quick
     labelling = jb.labelling(jb.seed_scene(slope=SLOPE))
-    codes, periods = _basin_slice.codes_on_grid(labelling, QUICK_SIDE if quick else SIDE)
-    pictures = [draw_slice(options, labelling, codes, periods)]
-    numbers: dict[str, Any] = {"slope": SLOPE} | of_slice(options, codes, periods)
+    codes, cycles = _basin_slice.codes_on_grid(labelling, QUICK_SIDE if quick else SIDE)
+    pictures = [draw_slice(options, labelling, codes, cycles)]
+    numbers: dict[str, Any] = {"slope": SLOPE} | of_slice(options, codes, cycles)
     boundary = _basin_slice.refined(labelling, *(QUICK_COARSE if quick else COARSE))
     pictures.append(draw_refined(options, labelling, boundary))
     numbers["refined"] = of_refined(options, boundary)
@@ -47,8 +47,8 @@ def main() -> None:
     options.finish(numbers | {"pictures": pictures})
 
 
-def of_slice(options: Options, codes: np.ndarray, periods: np.ndarray) -> dict[str, Any]:
-    fractions = jb.basins.fractions(jb.basins.label_names(codes, periods))
+def of_slice(options: Options, codes: np.ndarray, cycles: np.ndarray) -> dict[str, Any]:
+    fractions = jb.basins.fractions(jb.basins.label_names(codes, cycles))
     for name, part in fractions.items():
         options.say(f"{name:<18} {part.estimate:7.2%}  [{part.low:.2%}, {part.high:.2%}]")
     measures = _basin_slice.boundary_measures(codes)
@@ -120,14 +120,14 @@ def mark_of(labelling: jb.Labelling) -> tuple[float, float]:
 
 
 def draw_slice(
-    options: Options, labelling: jb.Labelling, codes: np.ndarray, periods: np.ndarray
+    options: Options, labelling: jb.Labelling, codes: np.ndarray, cycles: np.ndarray
 ) -> str:
     omega, theta = _basin_slice.axes(codes.shape[0]).values()
     figure = plot.basin(
         codes,
         theta,
         omega,
-        period=periods,
+        cycle_footsteps=cycles,
         names=_basin_slice.AXES,
         units=_basin_slice.UNITS,
         mark=mark_of(labelling),

@@ -97,7 +97,7 @@ def mapped(
             )
             end = jb.dynamics.minimal_state(held, jax.tree.map(lambda leaf: leaf[0], walk.state))
             error = jnp.max(jnp.abs(jnp.stack(list(end)) - truth))
-            return walk.highest.position, error, walk.accepted + walk.rejected, walk.ending
+            return walk.highest.position, error, walk.attempted, walk.ending
 
         return jax.vmap(one)(methods)
 

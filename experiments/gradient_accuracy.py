@@ -14,18 +14,6 @@ import matplotlib.pyplot as plt
 from _options import Options, parse
 
 import jaxbiped as jb
-from jaxbiped.gait._orbit import slopes_of
-from jaxbiped.gait._poincare_map import (
-    LinearisedReturn,
-    linearised_return,
-    recurring_components,
-    seed_directions,
-    state_with,
-)
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.gait._stability import stability_of
-from jaxbiped.scene._parameters import select_parameters
-from jaxbiped.solve._accuracy import Precision
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 QUICK_TOLERANCES = (1e-5, 1e-6)
@@ -35,7 +23,6 @@ TANGENT_SHARE = 10.0
 """Tolerance of the columns, in units of the state's."""
 UNHEARD = 1e30
 """Tolerance of the columns where they have no say in the steps."""
-MOST_STEPS = 32768
 STEPPINGS = {
     "plain": (False, False),
     "landing": (True, False),
@@ -118,7 +105,7 @@ class Exact(NamedTuple):
     """A gait's state on the section, and the reference footstep from there."""
 
     start: jb.State
-    orbit: LinearisedReturn
+    orbit: jb.gait.LinearisedReturn
 
 
 def laws(quick: bool) -> dict[str, jb.Scene]:
@@ -136,25 +123,22 @@ def laws(quick: bool) -> dict[str, jb.Scene]:
 
 
 def footstep(
-    scene: jb.Scene, start: jb.State, lands: bool, precision: Precision
-) -> LinearisedReturn:
+    scene: jb.Scene, start: jb.State, lands: bool, rtol: float, tangent_rtol: float
+) -> jb.gait.LinearisedReturn:
     """One footstep from mid-stance, with derivatives with respect to the state and log K.
 
     Landing and tolerances are traced: all of them share one compiled program.
     """
-    spec = ReturnMapSpec(
+    return jb.gait.linearise_return_map(
+        Stepping(scene, jnp.asarray(float(lands))),
+        start,
+        rtol=rtol,
+        tangent_rtol=tangent_rtol,
+        parameters=("K",),
         system=Stepped(),
         section=Stance(),
-        solver=jb.solvers.Rodas4(),
-        max_time=jnp.asarray(10.0),
-        steps=1,
-        max_solver_steps=MOST_STEPS,
         engine="xla",
     )
-    _, active = select_parameters(scene, ("K",))  # whose places are the same in a Stepping
-    seeds, _ = seed_directions(Stepping(scene, jnp.asarray(float(lands))), active, len(start) - 1)
-    traced = Precision(*map(jnp.asarray, precision))
-    return linearised_return(spec, seeds, start, traced, jnp.asarray(False))
 
 
 def exact_gait(scene: jb.Scene, rtol: float) -> Exact:
@@ -162,24 +146,23 @@ def exact_gait(scene: jb.Scene, rtol: float) -> Exact:
 
     `find_gait` would find the same; this needs no other program compiled.
     """
-    system, y = jb.gait.Walking(), jb.seed_state()
-    first = footstep(scene, y, True, Precision(1e-6, 1e-5))
-    x = first.recurring
+    y = jb.seed_state()
+    x = footstep(scene, y, True, 1e-6, 1e-5).recurring
     for tolerance in (1e-6, rtol, rtol, rtol):
-        y = state_with(system, y, x)
-        last = footstep(scene, y, True, Precision(tolerance, tolerance))
+        y = jb.State(jnp.zeros(()), *x)
+        last = footstep(scene, y, True, tolerance, tolerance)
         m, change = len(x), last.recurring - x
         found, x = x, x + jnp.linalg.solve(jnp.eye(m) - last.jacobian[:, :m], change)
         if jnp.max(jnp.abs(change)) < 1e-2 * rtol:
             break
-    return Exact(state_with(system, y, found), last)
+    return Exact(jb.State(jnp.zeros(()), *found), last)
 
 
 def measured(scene: jb.Scene, exact: Exact, stepping: str, rtol: float) -> Point:
     lands, heard = STEPPINGS[stepping]
-    precision = Precision(rtol, TANGENT_SHARE * rtol if heard else UNHEARD)
-    found = footstep(scene, exact.start, lands, precision)
-    slope, true_slope = (float(slopes_of(each).period[0]) for each in (found, exact.orbit))
+    tangent_rtol = TANGENT_SHARE * rtol if heard else UNHEARD
+    found = footstep(scene, exact.start, lands, rtol, tangent_rtol)
+    slope, true_slope = (float(jb.gait.slopes_of(each).period[0]) for each in (found, exact.orbit))
     return Point(
         rtol=rtol,
         steps=int(found.attempted),
@@ -190,19 +173,16 @@ def measured(scene: jb.Scene, exact: Exact, stepping: str, rtol: float) -> Point
     )
 
 
-def unit_error(scene: jb.Scene, start: jb.State, found: LinearisedReturn) -> float:
+def unit_error(scene: jb.Scene, start: jb.State, found: jb.gait.LinearisedReturn) -> float:
     """Distance from 1 of the multiplier of the direction along the orbit."""
-    system = jb.gait.Walking()
-    m = len(found.recurring)
-    velocity = recurring_components(system, jb.dynamics.vector_field(0.0, start, scene))
-    square = found.monodromy[:, :m]
-    return float(stability_of(square, square, velocity, 1e-3).unit_error)
+    velocity = jnp.stack(jb.dynamics.vector_field(0.0, start, scene)[1:])
+    square = found.monodromy[:, : len(velocity)]
+    return float(jb.gait.stability_of(square, square, velocity, 1e-3).unit_error)
 
 
 def residual(exact: Exact) -> float:
     """Largest change of a component of the state over the reference footstep, SI units."""
-    before = recurring_components(jb.gait.Walking(), exact.start)
-    return float(jnp.max(jnp.abs(exact.orbit.recurring - before)))
+    return float(jnp.max(jnp.abs(exact.orbit.recurring - jnp.stack(exact.start[1:]))))
 
 
 def report(options: Options, points: dict[str, list[Point]]) -> None:
@@ -252,7 +232,7 @@ def main() -> None:
         }
         references[law] = {
             "period_s": float(exact.orbit.period),
-            "period_slope_s": float(slopes_of(exact.orbit).period[0]),
+            "period_slope_s": float(jb.gait.slopes_of(exact.orbit).period[0]),
             "steps": int(exact.orbit.attempted),
             "unit_multiplier": unit_error(scene, exact.start, exact.orbit),
             "residual": residual(exact),

@@ -52,7 +52,7 @@ def ours(engine: str, rtol: float) -> Callable[[np.ndarray], tuple[np.ndarray, i
     def one(*start: Any) -> Any:
         options: dict[str, Any] = dict(rtol=rtol, atol=1e-2 * rtol, save="end", engine=engine)
         end = jb.simulate(scene, jb.State(*start), duration=DURATION, **options)
-        return end.final, end.accepted + end.rejected
+        return end.final, end.attempted
 
     many = jax.vmap(one) if engine == "lanes" else jax.jit(jax.vmap(one))
 

@@ -120,7 +120,7 @@ def settled(count: int, long: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             scene_of(slope), start, footsteps=SETTLING + SHOWN, accuracy="tight",
             max_arrivals=SETTLING + SHOWN, max_solver_steps=1 << 20,
         )  # fmt: skip
-        return walk.strikes[1].theta_2[SETTLING:]
+        return walk.arrivals.state.theta_2[SETTLING:]
 
     angles = np.asarray(strikes(jnp.asarray(slopes), states))
     angles = np.where(np.isfinite(angles), angles, np.nan)

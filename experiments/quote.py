@@ -113,6 +113,16 @@ def of_gradient_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
         )
 
 
+def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
+    """In how many fits the intervals hold the truth."""
+    inside = {name: each["inside_95"] for name, each in numbers["parameters"].items()}
+    yield f"{numbers['sets']} times over"
+    yield (
+        f"in {100 * inside['K']:g} % (K), {100 * inside['c']:g} % (c) and "
+        f"{100 * inside['mu_kinetic']:g} % (friction) of the fits"
+    )
+
+
 def of_ladder(numbers: dict[str, Any]) -> Iterator[str]:
     """Measures and costs of the rungs, and the rates of the way to the rigid limit."""
     for name, found in numbers["measures"].items():
@@ -198,6 +208,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "basin_simplest": of_basin_simplest,
     "force_models": of_force_models,
     "gradient_accuracy": of_gradient_accuracy,
+    "identify": of_identify,
     "ladder": of_ladder,
     "period_doubling": of_period_doubling,
     "search_robustness": of_search_robustness,

@@ -70,7 +70,7 @@ def batch_program(lanes: int, tile: int | None) -> tuple[Any, float]:
     def one(start: Any, scene: jb.Scene, rtol: Any) -> tuple[Any, Any]:
         options: dict[str, Any] = dict(rtol=rtol, atol=1e-2 * rtol, save="end")
         end = jb.simulate(scene, jb.State(*start), duration=DURATION, **options)
-        return end.final, end.accepted + end.rejected
+        return end.final, end.attempted
 
     def many(starts: Any, scene: jb.Scene, rtol: Any) -> tuple[Any, Any]:
         all_lanes = jax.vmap(one, in_axes=(0, None, None))

@@ -71,7 +71,7 @@ def ours(name: str) -> Method:
     def solve(scene: jb.Scene, state: jb.State, rtol: Any) -> tuple[Any, Any]:
         options: dict[str, Any] = dict(solver=name, rtol=rtol, atol=1e-2 * rtol, save="end")
         end = jb.simulate(scene, state, duration=DURATION, **options)
-        return jnp.stack(end.final), end.accepted + end.rejected
+        return jnp.stack(end.final), end.attempted
 
     return in_jax(solve)
 

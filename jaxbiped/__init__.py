@@ -20,6 +20,7 @@ from jaxbiped import constraints as constraints
 from jaxbiped import continuation as continuation
 from jaxbiped import dynamics as dynamics
 from jaxbiped import gait as gait
+from jaxbiped import identify as identify
 from jaxbiped import measure as measure
 from jaxbiped.scene import laws as laws
 from jaxbiped.solve import solvers as solvers
@@ -54,16 +55,15 @@ from jaxbiped.dynamics._state import seed_state as seed_state
 # Simulation.
 from jaxbiped._checks import ArgumentError as ArgumentError
 from jaxbiped._checks import ResourceError as ResourceError
-from jaxbiped.simulate._rigid_walk import RigidWalked as RigidWalked
 from jaxbiped.simulate._rigid_walk import rigid_walk as rigid_walk
 from jaxbiped.simulate._simulate import CompiledSimulation as CompiledSimulation
 from jaxbiped.simulate._simulate import Simulation as Simulation
 from jaxbiped.simulate._simulate import simulate as simulate
-from jaxbiped.simulate._swing import Swing as Swing
 from jaxbiped.simulate._swing import swing as swing
 from jaxbiped.solve._accuracy import ACCURACIES as ACCURACIES
-from jaxbiped.solve._ending import Ending as Ending
+from jaxbiped._ending import Ending as Ending
 from jaxbiped.solve._engine import ENGINES as ENGINES
+from jaxbiped.solve._trajectory import Arrivals as Arrivals
 from jaxbiped.solve._trajectory import Trajectory as Trajectory
 
 # Measures of a walk.
@@ -86,6 +86,9 @@ from jaxbiped.gait._rolling_starts import rolling_starts as rolling_starts
 
 # Branches of gaits.
 from jaxbiped.continuation._continue_gait import continue_gait as continue_gait
+
+# Identification.
+from jaxbiped.identify._fit_gait import fit_gait as fit_gait
 
 # Basins and sweeps.
 from jaxbiped.sweep._attractor import Attractor as Attractor

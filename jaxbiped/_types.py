@@ -5,6 +5,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
@@ -36,6 +37,11 @@ Time: TypeAlias = RealScalarLike
 
 VectorField: TypeAlias = Callable[[Time, PyTree, PyTree], PyTree]
 """Rates of change f(t, state, args), in the form that `diffrax.ODETerm` takes."""
+
+
+def select(condition: Scalar, a: SomeTree, b: SomeTree) -> SomeTree:
+    """`a` where the condition holds, else `b`: pytrees of the same structure."""
+    return jtu.tree_map(lambda x, y: jnp.where(condition, x, y), a, b)
 
 
 def as_float(value: Parameter) -> Scalar:

@@ -18,6 +18,7 @@ LAYERS = [
     "measure",
     "gait",
     "continuation",
+    "identify",
     "basins",
     "sweep",
     "plot",

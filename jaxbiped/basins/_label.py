@@ -5,16 +5,17 @@ import enum
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped.solve._ending import Ending
+from jaxbiped._ending import Ending
 
-WALKING_NAME = "walking period-{period}"
+WALKING_NAME = "walking period-{cycle_footsteps}"
 """What a start that walks is called, by the footsteps in a cycle of its gait."""
 
 
 class Label(enum.IntEnum):
-    """What became of a start. `str(label)` is its name in words; every `Ending` is a label.
+    """What became of a start. `str(label)` is its name in words; every `Ending` of a walk is
+    a label.
 
-    - walking: it converges to a periodic gait; see the gait for its period.
+    - walking: it converges to a periodic gait.
     - fell forward, fell back, stopped, stumbled, out of steps, solver failed, timed out: as in
       `Ending`.
     - slid: a foot slid along the ground by more than a leg's length between two footsteps.
@@ -38,12 +39,12 @@ class Label(enum.IntEnum):
         return self.name.lower().replace("_", " ")
 
 
-def label_name(label: int, period: int = 0) -> str:
-    """A label in words, with the period [footsteps] of the gait where it walks.
+def label_name(label: int, cycle_footsteps: int = 0) -> str:
+    """A label in words, where it walks with the footsteps in a cycle of its gait.
 
     Args:
         label: code of a `Label`.
-        period: footsteps in the cycle of the gait.
+        cycle_footsteps: footsteps in the cycle of the gait.
 
     Returns:
         The name.
@@ -57,15 +58,15 @@ def label_name(label: int, period: int = 0) -> str:
         ('walking period-2', 'fell forward')
     """
     walks = label == Label.WALKING
-    return WALKING_NAME.format(period=period) if walks else str(Label(label))
+    return WALKING_NAME.format(cycle_footsteps=cycle_footsteps) if walks else str(Label(label))
 
 
-def label_names(label: npt.ArrayLike, period: npt.ArrayLike) -> np.ndarray:
+def label_names(label: npt.ArrayLike, cycle_footsteps: npt.ArrayLike) -> np.ndarray:
     """`label_name` of every entry; arrays of one shape.
 
     Args:
         label: codes of `Label`, any shape.
-        period: footsteps in the cycle of each gait, a shape that broadcasts with it.
+        cycle_footsteps: footsteps in the cycle of each gait, a shape that broadcasts with it.
 
     Returns:
         Names, of the broadcast shape.
@@ -78,4 +79,4 @@ def label_names(label: npt.ArrayLike, period: npt.ArrayLike) -> np.ndarray:
         >>> jb.basins.label_names([0, 7], [1, 0]).tolist()
         ['walking period-1', 'slid']
     """
-    return np.asarray(np.vectorize(label_name, otypes=[object])(label, period))
+    return np.asarray(np.vectorize(label_name, otypes=[object])(label, cycle_footsteps))

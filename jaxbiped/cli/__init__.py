@@ -13,6 +13,7 @@ from jaxbiped._progress import tell_stages
 from jaxbiped.cli._basin import Basin
 from jaxbiped.cli._constraints import Constraints
 from jaxbiped.cli._continue import ContinueGait
+from jaxbiped.cli._fit import Fit
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
 from jaxbiped.cli._refusal import one_sentence
@@ -23,6 +24,7 @@ _Command = (
     Annotated[Walk, subcommand("walk")]
     | Annotated[FindGait, subcommand("gait")]
     | Annotated[ContinueGait, subcommand("continue")]
+    | Annotated[Fit, subcommand("fit")]
     | Annotated[Basin, subcommand("basin")]
     | Annotated[Models, subcommand("models")]
     | Annotated[Constraints, subcommand("constraints")]

@@ -158,13 +158,13 @@ def basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
         "labelled_in_this_run": fresh,
         "starts_per_s": fresh / seconds,
         "mean_footsteps": float(found.footsteps.mean()),
-        "solver_steps": int(found.attempts.sum()),
+        "solver_steps": int(found.attempted.sum()),
         "gaits": gaits,
     }
 
 
 def _names(found: "xarray.Dataset") -> np.ndarray:
-    return label_names(found.label.values, found.period.values)
+    return label_names(found.label.values, found.cycle_footsteps.values)
 
 
 def _print(report: Report, numbers: JsonObject) -> None:
@@ -178,7 +178,7 @@ def _print(report: Report, numbers: JsonObject) -> None:
     head = ("gait", "period s", "length m", "largest multiplier", "radius")
     rows = [
         (
-            f"period-{gait['period']}" + _at(gait["parameters"]),
+            f"period-{gait['cycle_footsteps']}" + _at(gait["parameters"]),
             f"{gait['duration_s']:.6f}",
             f"{gait['step_length_m']:.6f}",
             f"{math.hypot(*gait['multipliers'][0]):.5f}",
@@ -217,7 +217,7 @@ def _write_results(
             found[x].values,
             found[y].values,
             names=(quantities[x], quantities[y]),
-            period=found.period.values,
+            cycle_footsteps=found.cycle_footsteps.values,
             mark=_mark(known, x, y),
         )
         paths.append(out / "basin.png")

@@ -9,6 +9,7 @@ import numpy as np
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._ending import Ending
 from jaxbiped._progress import stage
 from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.dynamics._redundant_motion import violation
@@ -17,7 +18,6 @@ from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import Simulation
-from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._solvers import SOLVERS
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -171,7 +171,7 @@ def _run(
         max_violation_rate=float(found.highest.rate),
         state_error=error,
         wall_s_run=seconds,
-        steps=int(found.accepted) + int(found.rejected),
+        steps=int(found.attempted),
     )
 
 

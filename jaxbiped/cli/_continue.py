@@ -69,6 +69,7 @@ class ContinueGait:
             max_points=self.max_points,
             accuracy=self.accuracy,
             engine=self.engine,
+            progress=True,
         )
         wall = {
             "import": imported - _clock.IMPORT_BEGAN,

@@ -7,6 +7,7 @@ import numpy as np
 
 from jaxbiped import _clock
 from jaxbiped._checks import ArgumentError
+from jaxbiped._ending import Ending
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._report import Report, table
@@ -14,8 +15,8 @@ from jaxbiped.cli._walk_options import OutputOptions, SolveOptions
 from jaxbiped.cli._warnings import cut_short
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.simulate._rigid_walk import RigidWalked, rigid_walk
-from jaxbiped.solve._ending import Ending
+from jaxbiped.simulate._rigid_walk import rigid_walk
+from jaxbiped.solve._trajectory import Arrivals
 
 _MOST_ROWS = 24
 _MOST_STRIKES = 4096
@@ -53,6 +54,7 @@ def run_rigid_walk(
     with stage(f"simulating {solve.duration:g} s"):
         walk = rigid_walk(scene, state, **options)
         walk.t.block_until_ready()
+    assert walk.arrivals is not None
     finished = time.perf_counter()
     # The first run compiles; what a run takes by itself is the second one's.
     wall = {
@@ -64,17 +66,17 @@ def run_rigid_walk(
         "model": "rigid",
         "ending": str(walk.outcome),
         "slope_rad": float(scene.ground.slope),
-        "duration_s": float(walk.t),
-        "footsteps": max(int(walk.footsteps) - 1, 0),
-        "steps": _footsteps(scene, walk),
+        "duration_s": float(walk.t[-1]),
+        "footsteps": max(int(walk.arrivals.total) - 1, 0),
+        "steps": _footsteps(scene, walk.arrivals),
         "solver": {
             "name": "dopri8",
             "rtol": solve.rtol,
             "engine": walk.engine,
-            "attempted": int(walk.attempts),
+            "attempted": int(walk.attempted),
         },
         "wall_s": wall,
-        "warnings": cut_short(str(walk.outcome), int(walk.attempts)),
+        "warnings": cut_short(str(walk.outcome), int(walk.attempted)),
     }
     if numbers["footsteps"] > len(numbers["steps"]):
         numbers["warnings"].append(f"only the first {len(numbers['steps'])} footsteps are listed")
@@ -86,17 +88,16 @@ def run_rigid_walk(
         from jaxbiped import plot
 
         path = output.out / "leg_angles.png"
-        plot.rigid_leg_angles(scene, state, duration=min(float(walk.t), _SHOWN)).savefig(path)
+        plot.rigid_leg_angles(scene, state, duration=min(float(walk.t[-1]), _SHOWN)).savefig(path)
         report.say(f"wrote {path}")
     report.finish(numbers)
     return 1 if walk.outcome is Ending.SOLVER_FAILED else 0
 
 
-def _footsteps(scene: RigidScene, walk: RigidWalked) -> list[dict[str, float]]:
+def _footsteps(scene: RigidScene, strikes: Arrivals[RigidState]) -> list[dict[str, float]]:
     """Each footstep from one heel strike to the next."""
-    times, states = walk.strikes
-    count = min(int(walk.footsteps), _MOST_STRIKES)
-    at = np.asarray(times)[:count]
+    count, states = min(int(strikes.total), _MOST_STRIKES), strikes.state
+    at = np.asarray(strikes.t)[:count]
     # Where the new stance foot comes down: under its centre, which lies on the leg's axis.
     reach = float(scene.walker.hip_to_foot)
     places = np.asarray(states.hip_x)[:count] + reach * np.sin(np.asarray(states.theta_2)[:count])

@@ -11,6 +11,7 @@ import numpy as np
 from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
+from jaxbiped._ending import Ending
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._held import constraint_numbers, constraint_sentence
@@ -26,7 +27,6 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import Simulation
-from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
+from jaxbiped._ending import Ending
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._energy_ledger import EnergyLedger
 from jaxbiped.measure._samples import at_steps
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._trajectory import Trajectory
 
 AIRBORNE = "airborne"

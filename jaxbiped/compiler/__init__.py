@@ -5,7 +5,6 @@ engines that run a `Program`, `LANES` and its twin `XLA`, each by `can(request)`
 """
 
 from jaxbiped.compiler.passes._operation_counts import count_operations as count_operations
-from jaxbiped.compiler.passes._vertex_elimination import jacobian as jacobian
 from jaxbiped.compiler.runtime._compiled_program import Recorded as Recorded
 from jaxbiped.compiler.runtime._engine import AbstractEngine as AbstractEngine
 from jaxbiped.compiler.runtime._engine import Request as Request

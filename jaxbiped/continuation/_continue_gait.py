@@ -2,6 +2,7 @@
 
 import jax.tree_util as jtu
 import numpy as np
+from tqdm import tqdm
 
 from jaxbiped._checks import (
     check_choice,
@@ -12,6 +13,7 @@ from jaxbiped._progress import stage
 from jaxbiped._types import as_float
 from jaxbiped.continuation._axis import axis_of, start_of
 from jaxbiped.continuation._branch import Branch
+from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.continuation._continuation_setup import (
     ContinuationSetup,
     check_followed,
@@ -45,6 +47,7 @@ def continue_gait(
     max_points: int = 200,
     accuracy: str = "balanced",
     engine: str = "auto",
+    progress: bool = False,
 ) -> Branch:
     """Follows a periodic gait along a parameter, in both directions and around folds.
 
@@ -66,6 +69,7 @@ def continue_gait(
         max_points: points followed in each direction at most.
         accuracy: "balanced" or "tight".
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
+        progress: whether to show a bar on stderr.
 
     Returns:
         The branch; without points where no gait was found, its `stops` then tell why.
@@ -97,16 +101,23 @@ def continue_gait(
     if isinstance(begin, str):
         none = BranchStop(BranchEnd.NO_BEGINNING, begin, float("nan"))
         return setup.branch(Trace([], [], none), Trace([], [], none))
-    before, after = (
-        trace(
-            setup.curve,
-            axis,
-            begin._replace(tangent=way * begin.tangent),
-            largest_step=float(largest_step),
-            max_points=int(max_points),
+    with tqdm(unit=" gaits", disable=not progress) as bar:
+
+        def tell(point: BranchPoint) -> None:
+            bar.update()
+            bar.set_postfix_str(f"{along} = {point.value:.6g}", refresh=False)
+
+        before, after = (
+            trace(
+                setup.curve,
+                axis,
+                begin._replace(tangent=way * begin.tangent),
+                largest_step=float(largest_step),
+                max_points=int(max_points),
+                tell=tell,
+            )
+            for way in (-1.0, 1.0)
         )
-        for way in (-1.0, 1.0)
-    )
     before, after = map(setup.with_cause, (before, after))
     return setup.branch(before.reversed(), after)
 

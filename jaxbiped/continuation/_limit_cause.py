@@ -4,12 +4,12 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from jaxbiped._ending import Ending
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import simulate
-from jaxbiped.solve._ending import Ending
 
 NOT_SMOOTH = "grazing: the return map is not smooth"
 OF_ENDINGS = {

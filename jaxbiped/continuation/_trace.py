@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxbiped._ending import Ending
 from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._bifurcations import (
     BifurcationPoint,
@@ -16,7 +17,6 @@ from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint, branch_poi
 from jaxbiped.continuation._limit_cause import NOT_SMOOTH, OF_ENDINGS
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, follow
-from jaxbiped.solve._ending import Ending
 
 _SMALLEST = 1e-6
 _FIRST = 0.25

@@ -1,11 +1,11 @@
 """Explanation of a search for a gait, in a sentence."""
 
+from jaxbiped._ending import Ending
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameters import parameter_values
-from jaxbiped.solve._ending import Ending
 
 _MOST_NAMED = 4
 """Parameters that are named; of more, how many there are."""

@@ -8,14 +8,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.gait._newton import (
     Method,
     Progress,
     Stage,
     initial_progress,
     newton_iteration,
-    select,
 )
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,

@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
+from jaxbiped._ending import Ending
 from jaxbiped._quantity import Quantity
 from jaxbiped._summary import summary
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import Recording
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._fixed_point_search import Found, Search
 from jaxbiped.gait._orbit import Orbit, Slopes, orbit_of
@@ -23,7 +23,6 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameters import parameter_quantities
-from jaxbiped.solve._ending import Ending
 
 _NOTHING = 1e-9
 """A measure (SI units) that is zero but for the solve's error has no elasticity."""
@@ -223,13 +222,7 @@ def _path(last: LinearisedReturn, like: WalkerState) -> tuple[Scalar, PyTree]:
     """Times and states of a cycle's nodes, leaves of shape (footsteps, nodes); NaN beyond them."""
     nodes = last.nodes
     assert nodes is not None
-    if isinstance(nodes.ends, Recording):
-        times, *states = jax.vmap(Recording.columns)(nodes.ends, nodes.start)
-    else:
-        known = jnp.arange(nodes.ends.shape[-2]) < nodes.steps[..., None]
-        ends = jnp.where(known[..., None], nodes.ends, jnp.nan)
-        rows = jnp.concatenate([nodes.start[..., None, :], ends], axis=-2)
-        times, *states = jnp.moveaxis(rows, -1, 0)
+    times, *states = jax.vmap(lambda ends, start: ends.columns(start))(nodes.ends, nodes.start)
     return times, jtu.tree_unflatten(jtu.tree_structure(like), states)
 
 

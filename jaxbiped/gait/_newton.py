@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import optax
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, SomeTree
+from jaxbiped._types import RealScalarLike, Scalar, select
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.linalg._small_matrices import solve
 
@@ -211,8 +211,3 @@ def _descent_step(
     assert isinstance(step, jax.Array)
     # A trial that did not return: go half way back.
     return jnp.where(better, step, 0.5 * (now.trial - base)), state
-
-
-def select(condition: Scalar, new: SomeTree, old: SomeTree) -> SomeTree:
-    """One of two trees of the same structure."""
-    return jax.tree.map(lambda a, b: jnp.where(condition, a, b), new, old)

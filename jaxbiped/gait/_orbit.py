@@ -83,7 +83,7 @@ def orbit_of(
     _, sizes = seed_directions(args, active, m)
     radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
     if _second_derivatives(spec, active, radius):
-        # Lanes take both at once; XLA would compute in lockstep and compile for longer.
+        # Lanes take both at once; XLA would compute in lockstep.
         each_of = jax.vmap if spec.engine == "lanes" else _map_over_rows
         radius_slopes, looser_slopes = each_of(
             lambda each: _radius_slopes(spec, args, active, guess, each)
@@ -99,7 +99,14 @@ def _second_derivatives(spec: ReturnMapSpec, active: tuple[int, ...], radius: bo
 
 
 def slopes_of(last: LinearisedReturn) -> Slopes:
-    """x(p) = P(x(p), p) differentiated: dx = (I − P_x)⁻¹ P_p, and all else by the chain rule."""
+    """x(p) = P(x(p), p) differentiated: dx = (I − P_x)⁻¹ P_p, and all else by the chain rule.
+
+    Args:
+        last: a return to where it began, with p directions of parameters.
+
+    Returns:
+        Derivatives of the orbit, in units of the parameters' sizes.
+    """
     m = last.recurring.shape[0]
     by_state, by_parameter = last.jacobian[:, :m], last.jacobian[:, m:]
     recurring = solve(jnp.eye(m) - by_state, by_parameter)

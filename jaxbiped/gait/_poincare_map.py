@@ -13,6 +13,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
+from jaxbiped.compiler import Recorded
 from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import Precision
@@ -36,19 +37,23 @@ PARAMETER_FLOOR = 1e-4
 
 
 class LinearisedReturn(NamedTuple):
-    """One return. With m recurring components, p parameters and n = m + p directions:
+    """One return, with derivatives along n = m + p directions.
+
+    Those of the m recurring components come first, then each of the p parameters' in units of its
+    size (1 where it is zero).
 
     Attributes:
-        recurring: the m components that must return.
+        recurring: the components that must return, SI units, shape (m,).
         jacobian: their derivatives on the section, shape (m, n).
         monodromy: their derivatives at a fixed time, shape (m, n).
         velocity: their rates where the cycle ends, shape (m,).
-        period: duration [s]; `period_row` its derivatives, shape (n,).
-        advance: what the cyclic coordinates gained, shape (d,); `advance_rows` (d, n).
-        peak: largest load; `peak_row` (n,). Zeros where the system has none.
+        period, period_row: duration [s], and its derivatives, shape (n,).
+        advance, advance_rows: what the d cyclic coordinates gained, shape (d,), and (d, n).
+        peak, peak_row: largest load, and (n,). Zeros where the system has none.
         code: 0 or that of an `Ending`.
         attempted: solver steps attempted.
-        jumps: crossings where the vector field itself jumped; `missed` of them had no correction.
+        jumps, missed: crossings where the vector field itself jumped, and how many of them had no
+            correction.
         nodes: the ends of the steps of each solve to the section, leaves (steps, …), where saved.
     """
 
@@ -174,6 +179,7 @@ def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) 
     state, columns = along_columns(lambda s, a: minimal_state(a, s), found.y, args)
     nodes = found.nodes
     if nodes is not None:
+        assert isinstance(nodes.ends, Recorded)
         structure = jtu.tree_structure(found.y.state)
 
         def left(rows: Scalar) -> Scalar:
@@ -181,7 +187,8 @@ def _exit_coordinates(spec: ReturnMapSpec, found: SectionArrival, args: Seeded) 
             outside = jtu.tree_leaves(minimal_state(args.args, inside))
             return jnp.stack([rows[..., 0], *outside], axis=-1)
 
-        nodes = Nodes(left(nodes.start), left(nodes.ends), left(nodes.arrival), nodes.steps)
+        ends = Recorded(left(jnp.asarray(nodes.ends.values)), nodes.ends.counts)  # type: ignore[arg-type]
+        nodes = Nodes(left(nodes.start), ends, left(nodes.arrival), nodes.steps)
     return found._replace(y=Tangents(state, as_columns(columns)), nodes=nodes)
 
 

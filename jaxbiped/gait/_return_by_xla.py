@@ -8,7 +8,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import Precision
@@ -112,10 +112,6 @@ def reset_on_arrival(
     spec: ReturnMapSpec, args: PyTree, state: PyTree, time: Scalar, code: Scalar
 ) -> tuple[PyTree, Scalar, Scalar]:
     return select(code == 0, spec.system.reset_map(args, state), state), time, code
-
-
-def select(condition: Scalar, a: PyTree, b: PyTree) -> PyTree:
-    return jtu.tree_map(lambda x, y: jnp.where(condition, x, y), a, b)
 
 
 def _dense(tangents: PyTree, like: PyTree) -> list[Scalar]:

@@ -9,13 +9,13 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice, check_positive
-from jaxbiped._types import Scalar, Time, as_float
+from jaxbiped._types import Scalar, Time, as_float, select
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._engine import check_holds_none, orbit_engine
 from jaxbiped.gait._gradient_modes import AbstractGradient, Forward, Reverse, check_anywhere
 from jaxbiped.gait._return_by_lanes import forward_by_lanes, reverse_by_lanes
-from jaxbiped.gait._return_by_xla import forward_by_xla, reverse_by_xla, select
+from jaxbiped.gait._return_by_xla import forward_by_xla, reverse_by_xla
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.scene._abstract_scene import is_rigid

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._fixed_point_search import Found, Search, search
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
-from jaxbiped.gait._newton import Method, select
+from jaxbiped.gait._newton import Method
 from jaxbiped.gait._origin import FoundBy, Origin
 from jaxbiped.gait._poincare_map import recurring_components, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec

@@ -1,6 +1,7 @@
 """Settled walks: where walking forwards from many starts ends that does not fall."""
 
 from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +10,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import exchange_legs
@@ -18,6 +19,7 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.simulate._simulate import simulate
+from jaxbiped.solve._trajectory import Trajectory
 
 _FOOTSTEPS = 40
 _ALIKE = 1e-2
@@ -37,9 +39,7 @@ def settle_walks(scene: Scene | RigidScene, starts: PyTree, *, most: int = 4) ->
     Returns:
         States on the section without hip_x, each of shape (m,), apart from each other.
     """
-    walked: Callable[..., tuple[Scalar | None, PyTree]] = (
-        _arrivals if scene.compliant else _rigid_arrivals
-    )
+    walked: Callable[..., tuple[Scalar, PyTree]] = _arrivals if scene.compliant else _rigid_arrivals
     counts, last = walked(scene, starts)
     points = np.stack([np.asarray(leaf) for leaf in last[1:]], axis=-1)
     walking = np.flatnonzero(np.asarray(counts) >= _FOOTSTEPS)
@@ -71,10 +71,10 @@ def component_sizes(scene: AbstractScene, state: WalkerState) -> np.ndarray:
 
 
 @cached_jit
-def _arrivals(scene: Scene, starts: PyTree) -> tuple[Scalar | None, PyTree]:
+def _arrivals(scene: Scene, starts: PyTree) -> tuple[Scalar, PyTree]:
     """Arrivals at mid-stance of each walk, and the states at the last ones, leg 2 standing."""
 
-    def one(start: PyTree) -> tuple[Scalar | None, PyTree]:
+    def one(start: PyTree) -> tuple[Scalar, PyTree]:
         walk = simulate(
             scene,
             start,
@@ -84,20 +84,25 @@ def _arrivals(scene: Scene, starts: PyTree) -> tuple[Scalar | None, PyTree]:
             max_arrivals=_FOOTSTEPS,
             engine="lanes",
         )
-        last = jtu.tree_map(lambda leaf: leaf[-1 - _DEPTH :], walk.state)
+        total, last = _last_arrivals(walk)
         stands = jnp.abs(last.theta_1) < jnp.abs(last.theta_2)
-        last = jtu.tree_map(lambda a, b: jnp.where(stands, a, b), exchange_legs(last), last)
-        return walk.arrivals, last
+        return total, select(stands, exchange_legs(last), last)
 
     return jax.vmap(one)(starts)
 
 
 @cached_jit
-def _rigid_arrivals(scene: RigidScene, starts: PyTree) -> tuple[Scalar | None, PyTree]:
+def _rigid_arrivals(scene: RigidScene, starts: PyTree) -> tuple[Scalar, PyTree]:
     """Heel strikes of each walk, and the states just after the last ones."""
 
-    def one(start: PyTree) -> tuple[Scalar | None, PyTree]:
+    def one(start: PyTree) -> tuple[Scalar, PyTree]:
         walk = rigid_walk(scene, start, footsteps=_FOOTSTEPS, max_arrivals=_FOOTSTEPS)
-        return walk.footsteps, jtu.tree_map(lambda leaf: leaf[-1 - _DEPTH :], walk.strikes[1])
+        return _last_arrivals(walk)
 
     return jax.vmap(one)(starts)
+
+
+def _last_arrivals(walk: Trajectory[Any]) -> tuple[Scalar, PyTree]:
+    """How many arrivals a walk has, and the last states that there is room for."""
+    assert walk.arrivals is not None
+    return walk.arrivals.total, jtu.tree_map(lambda leaf: leaf[-1 - _DEPTH :], walk.arrivals.state)

@@ -60,6 +60,9 @@ def stability_of(
         witness: the same from a looser solve.
         velocity: rates of the recurring components at the orbit, shape (m,).
         closeness: distance from the unit circle that counts as on it, at least.
+
+    Returns:
+        The multipliers but the trivial one, with their errors and directions.
     """
     values, vectors, unit_error = _nontrivial(monodromy, velocity)
     looser, _, _ = _nontrivial(witness, velocity)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from jaxbiped._checks import check_type
 from jaxbiped._parameter import parameter_infos
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._energy import energies
@@ -38,10 +39,12 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
         The dataset, one entry along `time` for each time saved.
 
     Raises:
+        ArgumentError: a rigid walker's scene.
         ValueError: a batch of trajectories.
     """
     import xarray
 
+    check_type("scene", scene, Scene, RedundantScene)
     if np.ndim(trajectory.t) != 1:
         raise ValueError("This is a batch of trajectories: take one of them at a time.")
     state = trajectory.state

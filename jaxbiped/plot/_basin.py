@@ -32,7 +32,7 @@ def basin(
     *,
     names: tuple[str | Quantity, str | Quantity],
     units: tuple[str, str] = ("", ""),
-    period: npt.ArrayLike | None = None,
+    cycle_footsteps: npt.ArrayLike | None = None,
     gait: npt.ArrayLike | None = None,
     mark: tuple[float, float] | None = None,
     title: str = "",
@@ -47,9 +47,9 @@ def basin(
         names, units: what the axes are, as ("angle of the stance leg", …) and ("rad", …). A
             coordinate's or a parameter's own name, as "theta_swing", says it all by itself; so
             does a `jaxbiped.laws.Quantity`, as those of `jaxbiped.starts.coordinate_quantities`.
-        period: footsteps in the cycle of the gait that each start walks to, a shape that
+        cycle_footsteps: footsteps in the cycle of the gait that each start walks to, a shape that
             broadcasts to (ny, nx); only for codes. Unless given, it is not said.
-        gait: which gait that is, from 0, to tell apart those of one period; only for codes.
+        gait: which gait that is, from 0, to tell apart those of cycles alike; only for codes.
         mark: where the gait is, in the units of the axes.
         title: above the axes.
         ax: axes to draw into; a new figure unless given.
@@ -60,7 +60,7 @@ def basin(
     Raises:
         ArgumentError: shapes that do not fit, an empty grid, coordinates that do not increase.
     """
-    words = names_of(labels, period, gait)
+    words = names_of(labels, cycle_footsteps, gait)
     x_edges, y_edges = _edges("x", x, words.shape[1]), _edges("y", y, words.shape[0])
     ax = axes_or_new(ax, 7.2, 4.4)
     draw_labels(ax, words, x_edges, y_edges)
@@ -70,10 +70,10 @@ def basin(
 
 def names_of(
     labels: npt.ArrayLike,
-    period: npt.ArrayLike | None = None,
+    cycle_footsteps: npt.ArrayLike | None = None,
     gait: npt.ArrayLike | None = None,
 ) -> np.ndarray:
-    """Names on a grid of two dimensions, from names or codes, periods and gaits.
+    """Names on a grid of two dimensions, from names or codes, footsteps in a cycle and gaits.
 
     Raises:
         ArgumentError: not a grid of two dimensions, a code that is not known, or shapes that do
@@ -87,10 +87,10 @@ def names_of(
     if grid.dtype.kind not in "iu":
         return grid.astype(str).astype(object)
     check_known(grid)
-    if period is None:
+    if cycle_footsteps is None:
         words = np.vectorize(lambda code: str(Label(code)), otypes=[object])(grid)
     else:
-        words = label_names(grid, _fitting_names("period", period, grid.shape))
+        words = label_names(grid, _fitting_names("cycle_footsteps", cycle_footsteps, grid.shape))
     if gait is not None:
         which = _fitting_names("gait", gait, grid.shape)
         walks = grid == Label.WALKING

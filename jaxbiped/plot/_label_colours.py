@@ -18,7 +18,7 @@ _COLOURS = {
 }
 """Okabe and Ito's colours, told apart by colour-blind readers; greys where nothing is known."""
 _BLUES = ("#0072B2", "#56B4E9", "#0B3C5D", "#A6D8F5", "#3A6EA5", "#1E90FF")
-"""Walking: shades by gait, or else by period; they repeat after six."""
+"""Walking: shades by gait, or else by the cycle's length; they repeat after six."""
 _WALKING_MARKERS = "os8hpH"
 _MARKERS = "D^vPX*<>d."
 _ORDER = list(_COLOURS)
@@ -49,7 +49,7 @@ def _place(name: str) -> int:
 
 
 def _shade(name: str) -> int:
-    """Of what walks, by its gait, or else by its period."""
+    """Of what walks, by its gait, or else by the length of its cycle."""
     numbers = [int(number) for number in re.findall(r"\d+", name)]
     return numbers[-1] if len(numbers) > 1 else (numbers or [1])[0] - 1
 

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._ending import Ending
 from jaxbiped._types import Numbers
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.plot._arrows import direction_arrows
@@ -22,7 +23,6 @@ from jaxbiped.plot.style import (
     legend_below,
 )
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._trajectory import Trajectory
 
 _FAINT = 0.35

@@ -37,7 +37,8 @@ def rigid_leg_angles(
     check_positive("duration", duration, "s")
     times = duration * jnp.linspace(1.0 / _SAMPLES, 1.0, _SAMPLES)
     walks = jax.vmap(lambda t: rigid_walk(scene, state, duration=t))(times)
-    odd = np.asarray(walks.footsteps) % 2 == 1
-    one, two = np.asarray(walks.state.theta_1), np.asarray(walks.state.theta_2)
+    assert walks.arrivals is not None
+    odd = np.asarray(walks.arrivals.total) % 2 == 1
+    one, two = np.asarray(walks.final.theta_1), np.asarray(walks.final.theta_2)
     angles = (np.where(odd, two, one), np.where(odd, one, two))
     return draw_leg_angles(times, angles, "Leg angles on rigid feet", ax)

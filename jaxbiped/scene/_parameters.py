@@ -6,6 +6,7 @@ from typing import Any, TypeAlias, TypeVar
 
 import equinox as eqx
 import jax.tree_util as jtu
+from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice
 from jaxbiped._parameter import parameter_infos
@@ -90,9 +91,11 @@ def _quantity(part: object, name: str, path: _Path) -> Quantity:
 
 
 def select_parameters(
-    scene: AbstractScene, parameters: tuple[str, ...] | None
+    scene: PyTree, parameters: tuple[str, ...] | None
 ) -> tuple[tuple[str, ...], tuple[int, ...]]:
     """Names of the parameters asked for, all for None, and the positions of their leaves.
+
+    Leaves of anything but a scene have names in the same way.
 
     Raises:
         ArgumentError: a name that the scene does not have.
@@ -138,8 +141,9 @@ def _replace(part: _Part, path: _Path, value: Parameter) -> _Part:
     return dataclasses.replace(part, **{name: new})
 
 
-def _names_by_leaf(scene: AbstractScene) -> list[str]:
-    paths = [path for path, _ in jtu.tree_flatten_with_path(scene.minimal)[0]]
+def _names_by_leaf(scene: PyTree) -> list[str]:
+    modelled = scene.minimal if isinstance(scene, AbstractScene) else scene
+    paths = [path for path, _ in jtu.tree_flatten_with_path(modelled)[0]]
     own = [_format(path[-1:]) for path in paths]
     return [
         name if own.count(name) == 1 else _format(path)

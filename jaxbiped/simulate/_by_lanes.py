@@ -18,7 +18,7 @@ from jaxbiped.simulate._recorded_steps import recorded_steps
 from jaxbiped.solve._adaptive_program import Solve, Solved
 from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._saved_outputs import Saved
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 from jaxbiped.solve.controllers._footstep_limit import PATIENCE
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._differentiable_solve import (
@@ -39,7 +39,7 @@ _QUICK = 100_000
 
 def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
     """Runs a request; see `simulate`. What it asks of lanes may be known, see `lane_request`."""
-    dense, recorded, setting = None, None, _setting(run)
+    dense, arrivals, setting = None, None, _setting(run)
     solve: Solve = (lane_request(run) if request is None else request).inputs
     if run.save_steps:
         ended, t, state, dense = _step_by_step(run, solve, setting)
@@ -48,18 +48,17 @@ def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
             ended = solve_scene(solve, setting)
         else:
             ended, _ = solve_and_save(solve, setting)
-        t = jnp.reshape(ended.t, (1,))
-        state = jtu.tree_map(lambda leaf: jnp.reshape(leaf, (1,)), ended.state)
+        t, state = single_time(ended.t, ended.state)
     else:
         times = None if run.times is None else np.asarray(run.times)
         room = 0 if run.section is None else run.max_arrivals
         ended, recorded = solve_and_save(solve, setting, times=times, room=room)
         assert recorded is not None
         # As diffrax has it: infinite where the solve ended before.
-        reached = jnp.arange(recorded.values.shape[0]) < recorded.counts
-        values = jnp.where(reached[:, None], recorded.values, jnp.inf)
-        t = values[:, 0]
-        state = type(run.state)(*[values[:, 1 + i] for i in range(len(run.state))])
+        saved = arrivals_among(recorded.values, jnp.asarray(recorded.counts), run.state)
+        t, state = saved.t, saved.state
+        if run.section is not None:
+            arrivals, (t, state) = saved, single_time(ended.t, ended.state)
     return Trajectory(
         t=t,
         state=state,
@@ -67,7 +66,7 @@ def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
         accepted=ended.accepted,
         rejected=ended.rejected,
         dense=dense,
-        arrivals=None if run.section is None or recorded is None else jnp.asarray(recorded.counts),
+        arrivals=arrivals,
         lowest=ended.lowest,
         highest=ended.highest,
         engine="lanes",

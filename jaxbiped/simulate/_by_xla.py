@@ -10,10 +10,11 @@ import jax.tree_util as jtu
 from jaxtyping import Array, PyTree
 
 from jaxbiped._caches import cached_jit
+from jaxbiped._ending import Ending
 from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._accuracy import rms_norm
-from jaxbiped.solve._ending import Ending, ending_code, ending_events
+from jaxbiped.solve._ending import ending_code, ending_events
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.controllers._extremes import Extremes

@@ -1,6 +1,5 @@
 """Walks of the rigid walker."""
 
-import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
@@ -12,54 +11,20 @@ from jaxbiped._checks import (
     check_type,
     check_unbatched,
 )
-from jaxbiped._summary import summary
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import as_float
 from jaxbiped.compiler import LANES, XLA, Request
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import check_state
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._start import check_single_scene, in_one_precision, in_own_precision
 from jaxbiped.solve._accuracy import ACCURACIES
-from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve._rigid_program import rigid_program
-from jaxbiped.solve._rigid_steps import (
-    RigidWalk,
-)
+from jaxbiped.solve._rigid_steps import RigidWalk
+from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 
 _PATIENCE = 50.0
 """Time allowed for each footstep, in units of √(l/g)."""
-
-
-class RigidWalked(eqx.Module):
-    """A walk of the rigid walker; under `vmap` every array gains the batch's axes.
-
-    Attributes:
-        t: its duration [s].
-        state: in which it ended; after a footstep, just after the impact, leg 2 standing.
-        ending: code of an `Ending`; `outcome` names it.
-        footsteps: number of heel strikes.
-        attempts: number of attempted steps of the integrator.
-        strikes: times [s] and states just after the first heel strikes, leaves of shape
-            (max_arrivals,), infinite beyond the last.
-        engine: what computed it.
-    """
-
-    t: Scalar
-    state: RigidState
-    ending: Scalar
-    footsteps: Scalar
-    attempts: Scalar
-    strikes: tuple[Scalar, RigidState]
-    engine: str = eqx.field(static=True)
-
-    def __repr__(self) -> str:
-        return summary(self, like=self.t, code=self.ending, names=Ending, engine=self.engine)
-
-    @property
-    def outcome(self) -> Ending:
-        """How the walk ended, by name; for one walk, not a batch."""
-        return Ending(int(self.ending))
 
 
 def rigid_walk(
@@ -73,7 +38,7 @@ def rigid_walk(
     max_arrivals: int = 0,
     max_solver_steps: int = 65536,
     engine: str = "auto",
-) -> RigidWalked:
+) -> Trajectory[RigidState]:
     """Walks a rigid walker for a number of footsteps, a time, or whichever ends first.
 
     Explicit steps of eighth order (Dormand and Prince) under error control, each footstep ended by
@@ -93,7 +58,8 @@ def rigid_walk(
         engine: "xla", "lanes" or "auto" (see `ENGINES`).
 
     Returns:
-        Where and how the walk ended, and its first `max_arrivals` heel strikes.
+        When, where and how the walk ended: after a footstep, just after the impact, leg 2
+        standing. Its `arrivals` count the heel strikes, and hold the first `max_arrivals`.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
@@ -103,7 +69,7 @@ def rigid_walk(
         >>> scene = jb.ladder()["rigid"]
         >>> start = jb.dynamics.rigid_state(jb.seed_state())
         >>> walk = jb.rigid_walk(scene, start, footsteps=2, engine="lanes")
-        >>> str(walk.outcome), int(walk.footsteps)
+        >>> str(walk.outcome), int(walk.arrivals.total)
         ('walking', 2)
     """
     check_type("scene", scene, RigidScene)
@@ -142,17 +108,15 @@ def rigid_walk(
     program = rigid_program(max_arrivals > 0, duration is None)
     request = Request(program, walk, room=int(max_arrivals), quick=True)
     found, recorded, _ = (LANES if chosen == "lanes" else XLA).run(request)
-    strikes = jnp.full((int(max_arrivals), 1 + len(state)), jnp.inf, state.theta_1.dtype)
-    if recorded is not None:
-        reached = jnp.arange(strikes.shape[0]) < recorded.counts
-        strikes = jnp.where(reached[:, None], recorded.values, strikes)
-    states = RigidState(*[strikes[:, 1 + i] for i in range(len(state))])
-    return RigidWalked(
-        t=found.t,
-        state=found.state,
+    no_rows = jnp.zeros((0, 1 + len(state)), state.theta_1.dtype)
+    rows = no_rows if recorded is None else recorded.values
+    t, end = single_time(found.t, found.state)
+    return Trajectory(
+        t=t,
+        state=end,
         ending=found.ending,
-        footsteps=found.footsteps,
-        attempts=found.attempts,
-        strikes=(strikes[:, 0], states),
+        accepted=found.accepted,
+        rejected=found.rejected,
+        arrivals=arrivals_among(rows, found.footsteps, state),
         engine=chosen,
     )

@@ -20,6 +20,7 @@ from jaxbiped._checks import (
     check_unbatched,
 )
 from jaxbiped._types import Numbers, Scalar
+from jaxbiped.compiler import Request
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
@@ -87,8 +88,9 @@ def simulate(
             because friction saturates, and derivatives do not.
         save: "steps" for every step and the continuous solution, "end" for the final state, an
             array of increasing times [s], shape (n,), at which to save, or a section (by lanes
-            only), at whose arrivals to save: `HeelStrike()` saves the footsteps. The legs take
-            turns there as in `return_map`, but the states saved keep their own names.
+            only), whose `arrivals` to save beside the final state: `HeelStrike()` saves the
+            footsteps. The legs take turns there as in `return_map`, but the states saved keep
+            their own names.
         max_arrivals: how many arrivals at a section there is room for.
         extremes: a function of (scene, state) whose least and largest values, number by number,
             over the ends of all steps are wanted.
@@ -271,16 +273,18 @@ class Simulation(eqx.Module):
 
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
-        request = able_request(self)
+        request = self.lane_request()
         return trim(by_xla(self)) if request is None else by_lanes(self, request)
+
+    def lane_request(self) -> Request | None:
+        """What it asks of `jaxbiped.compiler.LANES`; None where XLA runs it."""
+        return able_request(self)
 
     def compile(self) -> "CompiledSimulation":
         """Compiles the solve, so that its run can be timed by itself."""
-        request = able_request(self)
-        if request is not None:
+        if (request := self.lane_request()) is not None:
             return CompiledSimulation(prepare_lanes(self, request), self)
-        program = by_xla.lower(self).compile()
-        return CompiledSimulation(program, self)
+        return CompiledSimulation(by_xla.lower(self).compile(), self)
 
 
 class CompiledSimulation:

@@ -1,13 +1,13 @@
 """Swing of a linkage in gravity."""
 
 import diffrax
-import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._checks import ArgumentError, check_count, check_finite, check_positive, check_type
+from jaxbiped._ending import Ending
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
 from jaxbiped.constraints._independence import check_independent
@@ -19,28 +19,9 @@ from jaxbiped.simulate._start import check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
 from jaxbiped.solve._projected_solver import check_adjoint, wrap_projected
 from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.controllers._wrapped_control import StepControl
-
-
-class Swing(eqx.Module):
-    """How a linkage moved. Under `vmap` every array gains the batch's axes.
-
-    Attributes:
-        t: times that were saved [s], shape (n,).
-        state: states at those times, leaves of shape (n,).
-        violation: ‖Φ‖ at those times [m], shape (n,).
-        corrected: how far the start was from its constraints, ‖Φ‖ [m].
-        attempted: number of the solver's steps.
-        succeeded: whether the solve came to its end with a finite state (boolean).
-    """
-
-    t: Scalar
-    state: LinkageState
-    violation: Scalar
-    corrected: Scalar
-    attempted: Scalar
-    succeeded: Scalar
 
 
 def swing(
@@ -55,7 +36,7 @@ def swing(
     dt: float | None = None,
     max_solver_steps: int = 65536,
     adjoint: diffrax.AbstractAdjoint | None = None,
-) -> Swing:
+) -> Trajectory[LinkageState]:
     """Simulates a linkage from a start, which is first put on its constraints.
 
     Works under `jit`, `vmap` and differentiation.
@@ -67,7 +48,8 @@ def swing(
         solver, accuracy, rtol, atol, dt, max_solver_steps, adjoint: as in `simulate`.
 
     Returns:
-        States at the `times`, and how far each is off its constraints [m], leaves of shape (n,).
+        States at the `times`, and how far each is off its constraints, leaves of shape (n,). Its
+        `ending` is "finished", "out of steps" or "solver failed".
 
     Raises:
         ArgumentError: an argument that is not allowed, or constraints that the method cannot hold,
@@ -110,7 +92,7 @@ def _solve(
     dt: float | None,
     most: int,
     adjoint: diffrax.AbstractAdjoint,
-) -> Swing:
+) -> Trajectory[LinkageState]:
     if isinstance(scene.method, AbstractProjectingMethod):
         solver = wrap_projected(solver, _correct_step, adjoint)
     off = _distance(constraints_of(scene.linkage, *state))
@@ -131,13 +113,17 @@ def _solve(
     )
     found: PyTree = solution.ys
     finite = jnp.isfinite(sum(leaf[-1] for leaf in jtu.tree_leaves(found)))
-    return Swing(
+    out_of_steps = jnp.asarray(solution.result == diffrax.RESULTS.max_steps_reached)
+    done = finite & jnp.asarray(solution.result == diffrax.RESULTS.successful)
+    ending = jnp.where(out_of_steps, int(Ending.OUT_OF_STEPS), int(Ending.SOLVER_FAILED))
+    return Trajectory(
         t=jnp.asarray(solution.ts),
         state=found,
+        ending=jnp.where(done, int(Ending.FINISHED), ending),
+        accepted=solution.stats["num_accepted_steps"],
+        rejected=solution.stats["num_rejected_steps"],
+        correction=off,
         violation=_distance(constraints_of(scene.linkage, *found)),
-        corrected=off,
-        attempted=solution.stats["num_steps"],
-        succeeded=finite & jnp.asarray(solution.result == diffrax.RESULTS.successful),
     )
 
 

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Numbers, RealScalarLike, Scalar
+from jaxbiped._types import Numbers, RealScalarLike, Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._state import State
@@ -150,7 +150,7 @@ class AdaptiveSolve:
             now.t, now.next_t, now.state, y1, solve.scene, error, self._error_order(), now.control
         )
         t, next_t = clip_step(keep, t, next_t, solve.duration, solve.almost)
-        state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), y1, now.state)
+        state = select(keep, y1, now.state)
         one = jnp.where(keep, 1, 0)
         events, none = [], jnp.asarray(True)
         for happens in self.events.values():

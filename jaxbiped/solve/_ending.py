@@ -1,6 +1,5 @@
-"""Endings of a simulation, and the events that bring them."""
+"""Events that end a simulation, and what an ending is told by."""
 
-import enum
 from collections.abc import Callable, Mapping
 
 import jax.numpy as jnp
@@ -8,6 +7,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
+from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import Foot, feet, touches
@@ -29,35 +29,6 @@ _REST_ENERGY = 1e-10
 """Kinetic energy of a walker at rest, in units of its weight times l."""
 _STUMBLE_SPEED = 1e-3
 """Speed at which a rear foot comes down, in units of √(g l), from which it counts as a stumble."""
-
-
-class Ending(enum.IntEnum):
-    """How a simulation ended. `str(ending)` is its name in words.
-
-    - walking: the time or the footsteps asked for are done.
-    - fell forward: the hip came down moving downhill; or the swing leg turned back too late, its
-      foot ahead but so deep under the ground that the reaction bars its way.
-    - fell back: the hip came down moving uphill.
-    - stopped: the stance leg came to rest in single support (under the paper's clearance rule it
-      would then lose its ground and sink), or the whole walker stands still on the ground.
-    - stumbled: the foot behind came down, moving forward, while the one ahead carried; or the
-      swing leg was so barred before it had passed the other.
-    - out of steps: the solver's cap on steps was reached.
-    - solver failed: the state is no longer a number.
-    - timed out: no footstep, or no arrival at a section, came in all the time allowed for it.
-    """
-
-    WALKING = 0
-    FELL_FORWARD = 1
-    FELL_BACK = 2
-    STOPPED = 3
-    STUMBLED = 4
-    OUT_OF_STEPS = 5
-    SOLVER_FAILED = 6
-    TIMED_OUT = 9  # 7 and 8 are labels that no single simulation ends with
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
 
 
 def has_fallen(scene: Scene, state: State) -> Scalar:

@@ -25,7 +25,8 @@ class RigidSolved(NamedTuple):
     state: RigidState
     ending: Scalar
     footsteps: Scalar
-    attempts: Scalar
+    accepted: Scalar
+    rejected: Scalar
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
@@ -37,7 +38,8 @@ def rigid_program(records: bool, waits: bool) -> Program:
 
     def finish(walk: RigidWalk, now: RigidProgress) -> RigidSolved:
         code = ending_of(walk, now, jnp.asarray(waits))
-        return RigidSolved(now.t, state_with_hip(walk, now), code, now.footsteps, now.attempts)
+        counts = (now.footsteps, now.accepted, now.rejected)
+        return RigidSolved(now.t, state_with_hip(walk, now), code, *counts)
 
     return Program(initial_progress, attempt_step, finish, record=_record if records else None)
 

@@ -3,14 +3,14 @@
 from typing import NamedTuple
 
 import jax.numpy as jnp
-import jax.tree_util as jtu
 
 from jaxbiped._circular import sine_cosine
-from jaxbiped._types import Scalar, SomeTree
+from jaxbiped._ending import Ending
+from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.solve._ending import Ending, rigid_ending
+from jaxbiped.solve._ending import rigid_ending
 from jaxbiped.solve._quintic import Quintic
 from jaxbiped.solve._rolling_step import ORDER, Rates, accelerations, advance, rolling_step
 
@@ -63,7 +63,7 @@ class RigidProgress(NamedTuple):
         landing: number of Newton steps onto a heel strike, 0 in free motion.
         struck: whether the last attempt ended by a heel strike.
         footsteps: how many so far.
-        attempts: how many so far.
+        accepted, rejected: attempted steps so far, by what became of them.
         code: of the `Ending` that came, 0 for none.
     """
 
@@ -78,7 +78,8 @@ class RigidProgress(NamedTuple):
     landing: Scalar
     struck: Scalar
     footsteps: Scalar
-    attempts: Scalar
+    accepted: Scalar
+    rejected: Scalar
     code: Scalar
 
 
@@ -106,7 +107,8 @@ def initial_progress(walk: RigidWalk) -> RigidProgress:
         landing=none,
         struck=no,
         footsteps=none,
-        attempts=none,
+        accepted=none,
+        rejected=none,
         code=none,
     )
 
@@ -129,15 +131,20 @@ def attempt_step(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Sc
     strike = _strike(walk, trial, roughly)
     free, kept = _after_free_step(walk, now, trial, error, roughly, strike)
     landing = now.landing > 0
-    after = _where(landing, _landing(walk, now, trial, strike), free)
-    after = _where(after.struck, _after_strike(walk, after, strike), after)
+    after = select(landing, _landing(walk, now, trial, strike), free)
+    after = select(after.struck, _after_strike(walk, after, strike), after)
     # The last stage is the first one of the next step, after an impact from the new state.
-    rates = accelerations(walk.scene, _where(after.struck, strike.state, trial))
-    rates = _where(landing | kept, rates, now.rates)
-    after = after._replace(rates=rates, attempts=now.attempts + 1)
+    rates = accelerations(walk.scene, select(after.struck, strike.state, trial))
+    accepted = landing | kept
+    rates = select(accepted, rates, now.rates)
+    one = jnp.where(accepted, 1, 0)
+    after = after._replace(
+        rates=rates, accepted=now.accepted + one, rejected=now.rejected + (1 - one)
+    )
     enough = (walk.footsteps > 0.0) & (after.footsteps.astype(after.t.dtype) >= walk.footsteps)
     done = enough | ((after.landing == 0) & (after.t >= walk.duration))
-    tired = after.attempts.astype(after.t.dtype) >= walk.max_attempts
+    attempts = (after.accepted + after.rejected).astype(after.t.dtype)
+    tired = attempts >= walk.max_attempts
     code = jnp.where((after.code == 0) & tired & ~done, int(Ending.OUT_OF_STEPS), after.code)
     return after._replace(code=code), done | (code != 0)
 
@@ -237,7 +244,7 @@ def _after_free_step(
     lost = ~jnp.isfinite(pace) | (pace <= _ROUNDING * t)
     after = now._replace(
         t=t,
-        state=_where(keep, trial, now.state),
+        state=select(keep, trial, now.state),
         step=jnp.where(closes, back, _step(walk, t, pace, now.due, now.period)),
         pace=pace,
         landing=jnp.where(closes, 1, 0),
@@ -265,7 +272,3 @@ def _landing(
 def _opening(state: RigidState) -> tuple[Scalar, Scalar]:
     """Sum of the leg angles and its rate: above zero while the swing foot ahead is off ground."""
     return state.theta_1 + state.theta_2, state.omega_1 + state.omega_2
-
-
-def _where(condition: Scalar, a: SomeTree, b: SomeTree) -> SomeTree:
-    return jtu.tree_map(lambda x, y: jnp.where(condition, x, y), a, b)

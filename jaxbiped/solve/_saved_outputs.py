@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.scene._scene import Scene
@@ -130,4 +130,4 @@ class Saved(NamedTuple):
 
 def _with_leg_names(changed: Scalar, state: State) -> State:
     """The state with its legs' names exchanged, where they are."""
-    return jtu.tree_map(lambda a, b: jnp.where(changed, a, b), exchange_legs(state), state)
+    return select(changed, exchange_legs(state), state)

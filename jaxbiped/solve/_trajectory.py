@@ -1,5 +1,7 @@
 """Trajectory: the result of a simulation."""
 
+from typing import TYPE_CHECKING, Generic, NamedTuple
+
 import diffrax
 import equinox as eqx
 import jax
@@ -10,45 +12,79 @@ import numpy.typing as npt
 from jaxtyping import Array, Float, Int, PyTree
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._ending import Ending
 from jaxbiped._summary import summary
+from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._state import State
 from jaxbiped.solve._dense_output import evaluate_dense
-from jaxbiped.solve._ending import Ending
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeVar
+
+    SomeState = TypeVar("SomeState", default=State)
+else:
+    from typing import TypeVar
+
+    SomeState = TypeVar("SomeState")
 
 
-class Trajectory(eqx.Module):
+class Arrivals(NamedTuple, Generic[SomeState]):
+    """Arrivals at a section, of which the first n were saved.
+
+    Attributes:
+        total: how many there were, also of those that there was no room for.
+        t: their times [s], shape (n,), infinite beyond the last.
+        state: states at them, leaves of shape (n,), infinite likewise.
+    """
+
+    total: Int[Array, "..."]
+    t: Float[Array, "..."]
+    state: SomeState
+
+
+class Trajectory(eqx.Module, Generic[SomeState]):
     """A simulated motion and how it ended. Under `vmap` every leaf gains the batch's axes.
 
     Attributes:
         t: times that were saved [s], shape (n,).
-        state: states at those times, leaves of shape (n,).
+        state: states at those times, leaves of shape (n,): those of a `State`, or of a bristle,
+            redundant, rigid or linkage state, as it began.
         ending: code of an `Ending`; `Ending(int(code))` names it.
         accepted, rejected: numbers of the solver's steps.
         dense: the continuous solution, where all steps were saved.
-        arrivals: how many arrivals at a section there were, where these were saved; those beyond
-            the room for them are lost. The times of missing ones are infinite.
+        arrivals: at a section, where these were asked for; of a rigid walker its heel strikes,
+            just after them.
         lowest, highest: extremes over the ends of the steps, where they were asked for.
-        correction: how a redundant start was put on its constraints, a `Consistent`.
+        correction: how a redundant start was put on its constraints, a `Consistent`; of a linkage,
+            how far off it was, ‖Φ‖ [m].
+        violation: distance of a linkage from its constraints, ‖Φ‖ at the times saved [m],
+            shape (n,).
         engine: what computed it, "xla" or "lanes".
     """
 
     t: Float[Array, "..."]
-    state: State
+    state: SomeState
     ending: Int[Array, "..."]
     accepted: Int[Array, "..."]
     rejected: Int[Array, "..."]
-    dense: diffrax.DenseInterpolation | None
-    arrivals: Int[Array, "..."] | None = None
+    dense: diffrax.DenseInterpolation | None = None
+    arrivals: Arrivals[SomeState] | None = None
     lowest: PyTree = None
     highest: PyTree = None
     correction: PyTree = None
+    violation: Float[Array, "..."] | None = None
     engine: str = eqx.field(static=True, default="xla")
 
     def __repr__(self) -> str:
         return summary(self, like=self.t, code=self.ending, names=Ending, engine=self.engine)
 
     @property
-    def final(self) -> State:
+    def attempted(self) -> Int[Array, "..."]:
+        """How many steps the solver attempted, accepted or not."""
+        return self.accepted + self.rejected
+
+    @property
+    def final(self) -> SomeState:
         """The last state saved."""
         return jtu.tree_map(lambda leaf: leaf[..., -1], self.state)
 
@@ -57,7 +93,7 @@ class Trajectory(eqx.Module):
         """How it ended, by name; for one simulation, not a batch."""
         return Ending(int(self.ending))
 
-    def at(self, t: npt.ArrayLike) -> State:
+    def at(self, t: npt.ArrayLike) -> SomeState:
         """States at times `t` [s] of any shape, to the order of the solver's dense output.
 
         Under `jit`, `vmap` or derivatives, where it cannot raise, they are NaN outside of the
@@ -86,11 +122,24 @@ class Trajectory(eqx.Module):
         """
         if self.dense is None:
             raise ValueError(
-                'Nothing is known between the saved times: simulate with save="steps".'
+                "Nothing is known between the saved times: only `simulate` keeps that, with "
+                'save="steps".'
             )
         if jnp.ndim(self.t) != 1:
             raise ValueError("This is a batch of trajectories: look at one of them at a time.")
         return self.dense
+
+
+def arrivals_among(rows: Numbers, total: Scalar, like: SomeState) -> Arrivals[SomeState]:
+    """The arrivals that a program recorded: rows of a time and a state `like` this one."""
+    reached = jnp.arange(rows.shape[0]) < total
+    t, *leaves = jnp.where(reached[:, None], rows, jnp.inf).T
+    return Arrivals(total, t, jtu.tree_unflatten(jtu.tree_structure(like), leaves))
+
+
+def single_time(t: Scalar, state: SomeState) -> tuple[Scalar, SomeState]:
+    """A time and the state then as a trajectory has them, leaves of shape (1,)."""
+    return jtu.tree_map(lambda leaf: jnp.reshape(leaf, (1,)), (t, state))
 
 
 def _check_inside(dense: diffrax.DenseInterpolation, times: np.ndarray) -> None:

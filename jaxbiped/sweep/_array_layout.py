@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 FIELDS: dict[str, tuple[str, float, str, str]] = {
     "label": ("i1", int(Label.PENDING), "", "what became of the start"),
     "gait": ("i2", -1, "", "position of the gait that it converges to"),
-    "period": ("i2", 0, "footsteps", "cycle of the gait that it converges to"),
+    "cycle_footsteps": ("i2", 0, "footsteps", "cycle of the gait that it converges to"),
     "footsteps": ("i4", 0, "", "heel strikes until the label was certain"),
     "time": ("f8", np.nan, "s", "simulated time until the label was certain"),
     "distance": ("f8", np.nan, "m", "distance walked until the label was certain"),
     "rate": ("f8", np.nan, "", "share of the distance from the gait left after a footstep"),
     "closest": ("f8", np.nan, "", "smallest distance from a gait, in its metric"),
-    "attempts": ("i4", 0, "", "attempted steps of the solver"),
+    "attempted": ("i4", 0, "", "attempted steps of the solver"),
 }
 """Of each field: dtype, value before it is known, unit, and what it is."""
 

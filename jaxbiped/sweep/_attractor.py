@@ -21,7 +21,7 @@ class Attractor(NamedTuple):
     """A stable gait of a scene, its state without hip_x having m components.
 
     Attributes:
-        period: footsteps in its cycle.
+        cycle_footsteps: footsteps in its cycle.
         duration: of the cycle [s].
         step_length: advance along the slope in a cycle [m].
         state: on the section, a `State` or `RigidState` of numbers.
@@ -32,7 +32,7 @@ class Attractor(NamedTuple):
             up to there came nearer in one cycle. Negative where it was not measured, or none did.
     """
 
-    period: int
+    cycle_footsteps: int
     duration: float
     step_length: float
     state: PyTree
@@ -51,8 +51,10 @@ class Attractor(NamedTuple):
         return np.linalg.norm((states - self.point) @ self.metric.T, axis=1)
 
 
-def attractor_without_radius(scene: Scene | RigidScene, gait: Gait, period: int) -> Attractor:
+def attractor_without_radius(scene: Scene | RigidScene, gait: Gait, length: int) -> Attractor:
     """A gait's metric, from its return map's derivative; its radius is not known yet.
+
+    `length` counts the footsteps in its cycle.
 
     The metric is Lyapunov's for the derivative A on the section: with a contraction q between the
     spectral radius and 1, P = Σ (A/q)ᵏᵀ S (A/q)ᵏ gives |A e| ≤ q |e|, S measuring each component
@@ -77,7 +79,7 @@ def attractor_without_radius(scene: Scene | RigidScene, gait: Gait, period: int)
     squared = scipy.linalg.solve_discrete_lyapunov(slopes.T / contraction, weights)
     factor = np.linalg.cholesky(0.5 * (squared + squared.T))
     return Attractor(
-        period=period,
+        cycle_footsteps=length,
         duration=float(gait.measures.period),
         step_length=float(gait.measures.step_length),
         state=state,

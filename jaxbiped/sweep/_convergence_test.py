@@ -30,7 +30,7 @@ class ArrivalHistory(NamedTuple):
         repeats: for cycles of 1, 2, … footsteps, how many arrivals in a row repeated one.
         verdict: code of the `Label` that is certain, `UNDECIDED` before.
         goal: position of the gait that it converges to, −1 for none.
-        period: footsteps in the cycle that it converges to, 0 for none.
+        cycle_footsteps: footsteps in the cycle that it converges to, 0 for none.
     """
 
     recent: tuple[tuple[Scalar, ...], ...]
@@ -40,22 +40,22 @@ class ArrivalHistory(NamedTuple):
     repeats: tuple[Scalar, ...]
     verdict: Scalar
     goal: Scalar
-    period: Scalar
+    cycle_footsteps: Scalar
 
 
-def empty_history(zero: Scalar, size: int, periods: tuple[int, ...]) -> ArrivalHistory:
+def empty_history(zero: Scalar, size: int, cycles: tuple[int, ...]) -> ArrivalHistory:
     """Before the first arrival; states have `size` components, the gaits' cycles these lengths."""
     none = jnp.zeros((), dtype=jnp.int64)
     far = zero + jnp.inf
     return ArrivalHistory(
         recent=tuple([tuple([far] * size)] * DEPTH),
-        distances=tuple(tuple([far] * period) for period in periods),
+        distances=tuple(tuple([far] * length) for length in cycles),
         closest=far,
         rate=zero + jnp.nan,
         repeats=tuple([none] * DEPTH),
         verdict=none + UNDECIDED,
         goal=none - 1,
-        period=none,
+        cycle_footsteps=none,
     )
 
 
@@ -63,7 +63,7 @@ def after_arrival(
     trace: ArrivalHistory,
     state: tuple[Scalar, ...],
     goals: Goals,
-    periods: tuple[int, ...],
+    cycles: tuple[int, ...],
     gap: Scalar,
 ) -> ArrivalHistory:
     """After an arrival in this state.
@@ -72,12 +72,12 @@ def after_arrival(
     before, or within `gap` of the state then: at the gait itself rounding decides which is nearer.
     Where each of several arrivals in a row differs from the one a cycle before by less
     than `gap` (in units of the scales, root mean square), and no known gait comes nearer, it
-    converges to some other one: the verdict is then "unresolved", with the period.
+    converges to some other one: the verdict is then "unresolved", with the cycle's footsteps.
     """
     repeats = _repeats(trace, state, goals, gap)
     distances, certain, rates = [], [], []
     nearing = jnp.asarray(False)
-    for g, period in enumerate(periods):
+    for g, length in enumerate(cycles):
         distance = _distance(goals, g, state)
         before = trace.distances[g][-1]
         nearer = distance < before
@@ -85,24 +85,24 @@ def after_arrival(
         # Of a longer cycle only the arrivals tell that are near the point itself.
         for other in trace.distances[g][:-1]:
             nearing |= other < _NEARING * distance
-        if period <= DEPTH:
-            nearer |= repeats[period - 1] > 0
+        if length <= DEPTH:
+            nearer |= repeats[length - 1] > 0
         certain.append((distance <= goals.radii[g]) & jnp.isfinite(before) & nearer)
-        rates.append((distance / before) ** (1.0 / period))
+        rates.append((distance / before) ** (1.0 / length))
         distances.append((distance, *trace.distances[g][:-1]))
-    verdict, cycle, goal = trace.verdict, trace.period, trace.goal
+    verdict, cycle, goal = trace.verdict, trace.cycle_footsteps, trace.goal
     for length in range(DEPTH, 0, -1):
         again = (repeats[length - 1] >= _AGAIN) & ~nearing
         verdict = jnp.where(again, int(Label.UNRESOLVED), verdict)
         cycle = jnp.where(again, length, cycle)
     nearest, rate = jnp.full_like(trace.closest, jnp.inf), trace.rate
-    for g in range(len(periods)):
+    for g in range(len(cycles)):
         nearer = distances[g][0] < nearest
         # Far from every gait the nearest one tells the rate.
         known = jnp.isfinite(trace.distances[g][-1]) & jnp.isfinite(rates[g])
         rate = jnp.where(nearer & known, rates[g], rate)
         nearest = jnp.minimum(nearest, distances[g][0])
-    for g, length in reversed(list(enumerate(periods))):
+    for g, length in reversed(list(enumerate(cycles))):
         verdict = jnp.where(certain[g], int(Label.WALKING), verdict)
         cycle = jnp.where(certain[g], length, cycle)
         goal = jnp.where(certain[g], g, goal)
@@ -117,7 +117,7 @@ def after_arrival(
         repeats=repeats,
         verdict=verdict,
         goal=goal,
-        period=cycle,
+        cycle_footsteps=cycle,
     )
 
 

@@ -33,11 +33,11 @@ class Family(NamedTuple):
     scales: np.ndarray
 
     @property
-    def periods(self) -> tuple[int, ...]:
+    def cycles(self) -> tuple[int, ...]:
         """Cycle lengths for which the labelling loop has room: for every row's gaits."""
         most: Counter[int] = Counter()
         for row in self.rows:
-            most |= Counter(gait.period for gait in row)
+            most |= Counter(gait.cycle_footsteps for gait in row)
         return tuple(sorted(most.elements())) or (1,)
 
     def goals(
@@ -48,21 +48,21 @@ class Family(NamedTuple):
         Raises:
             ArgumentError: parameters for which no gait was looked for.
         """
-        periods = self.periods
-        tables = [self._goals_of(k, periods) for k in range(len(self.rows))]
+        cycles = self.cycles
+        tables = [self._goals_of(k, cycles) for k in range(len(self.rows))]
         if not self.names:
             # The gaits are those of the scene's own parameters, not of others.
             own = tables[0]
             if parameters:
                 own = own._replace(radii=np.full_like(own.radii, NO_GAIT))
-            return broadcast_leaves(own, count), periods
+            return broadcast_leaves(own, count), cycles
         rows = self.row_of(parameters)
         columns = zip(*tables, strict=True)
-        return Goals(*[np.stack(column)[rows] for column in columns]), periods
+        return Goals(*[np.stack(column)[rows] for column in columns]), cycles
 
     def places_in(self, other: "Family") -> np.ndarray:
         """Where another family, with more gaits, has what this one has at each position."""
-        own, new = self.periods, other.periods
+        own, new = self.cycles, other.cycles
         if not any(self.rows):
             return np.zeros(1, dtype=int)
         return np.array([new.index(p) + i - own.index(p) for i, p in enumerate(own)])
@@ -99,7 +99,7 @@ class Family(NamedTuple):
                 "parameters": dict(zip(self.names, map(float, values), strict=True)),
                 "gaits": [
                     {
-                        "period": gait.period,
+                        "cycle_footsteps": gait.cycle_footsteps,
                         "duration_s": float(gait.duration),
                         "step_length_m": float(gait.step_length),
                         "multipliers": [[float(v.real), float(v.imag)] for v in gait.multipliers],
@@ -112,28 +112,28 @@ class Family(NamedTuple):
             for values, row in zip(self.table, self.rows, strict=True)
         ]
 
-    def _goals_of(self, k: int, periods: tuple[int, ...]) -> Goals:
+    def _goals_of(self, k: int, cycles: tuple[int, ...]) -> Goals:
         size = self.scales.shape[1]
-        count = len(periods)
+        count = len(cycles)
         goals = Goals(
             np.zeros((count, size)),
             np.zeros((count, size - 1, size)),
             np.full(count, NO_GAIT),
             self.scales[k],
         )
-        for place, gait in zip(_places(self.rows[k], periods), self.rows[k], strict=True):
+        for place, gait in zip(_places(self.rows[k], cycles), self.rows[k], strict=True):
             goals.points[place] = gait.point
             goals.metrics[place] = gait.metric
             goals.radii[place] = gait.radius
         return goals
 
 
-def _places(row: tuple[Attractor, ...], periods: tuple[int, ...]) -> list[int]:
+def _places(row: tuple[Attractor, ...], cycles: tuple[int, ...]) -> list[int]:
     """Where each gait of a row stands among the cycles that there is room for."""
-    free = list(range(len(periods)))
+    free = list(range(len(cycles)))
     places = []
     for gait in row:
-        place = next(i for i in free if periods[i] == gait.period)
+        place = next(i for i in free if cycles[i] == gait.cycle_footsteps)
         free.remove(place)
         places.append(place)
     return places

@@ -59,18 +59,18 @@ def with_gaits(
     effort: Effort,
     found: Mapping[int, Sequence[tuple[int, PyTree]]],
 ) -> Family:
-    """The family with more gaits in some rows, searched from these periods and states."""
+    """The family with more gaits in some rows, searched from these cycles' footsteps and states."""
     rows = list(family.rows)
     for k, guesses in found.items():
         own = scene_with(scene, family.names, family.table[k])
-        for period, guess in guesses:
+        for length, guess in guesses:
             new = [
                 gait
-                for gait in _found(own, [guess], period, effort)
+                for gait in _found(own, [guess], length, effort)
                 if not any(_same(gait, old) for old in rows[k])
             ]
-            # Stable by period, so that positions follow from the cycles' lengths.
-            rows[k] = tuple(sorted([*rows[k], *new], key=lambda gait: gait.period))
+            # Stable by the cycles' lengths, from which positions follow.
+            rows[k] = tuple(sorted([*rows[k], *new], key=lambda gait: gait.cycle_footsteps))
     # What starts take that they are not told stays, else they would be other starts.
     return family._replace(rows=tuple(rows))
 
@@ -82,19 +82,19 @@ def scene_with(scene: SomeScene, names: Sequence[str], values: np.ndarray) -> So
 
 
 def _found(
-    scene: Scene | RigidScene, guesses: Sequence[PyTree], period: int, effort: Effort
+    scene: Scene | RigidScene, guesses: Sequence[PyTree], length: int, effort: Effort
 ) -> tuple[Attractor, ...]:
     """The stable gait that the first successful guess leads to, or none."""
     for guess in guesses:
         gait = find_gait(
             scene,
             None if guess is None else jtu.tree_map(as_float, guess),
-            footsteps=period,
+            footsteps=length,
             parameters=(),
             radius_sensitivities=False,
         )
         if bool(gait.stable):
-            return (with_radius(scene, attractor_without_radius(scene, gait, period), effort),)
+            return (with_radius(scene, attractor_without_radius(scene, gait, length), effort),)
     return ()
 
 
@@ -117,7 +117,7 @@ def _family(
 
 def _same(a: Attractor, b: Attractor) -> bool:
     return (
-        a.period == b.period
+        a.cycle_footsteps == b.cycle_footsteps
         and abs(a.duration / b.duration - 1.0) < _SAME
         and abs(a.step_length / b.step_length - 1.0) < _SAME
     )

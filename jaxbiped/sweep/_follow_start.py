@@ -56,7 +56,7 @@ def follow_starts(
     scene: Scene | RigidScene,
     states: PyTree,
     goals: Goals,
-    periods: tuple[int, ...],
+    cycles: tuple[int, ...],
     effort: Effort,
 ) -> Outcome[np.ndarray]:
     """Follows n starts; leaves of scene, states and goals are NumPy's arrays (n, …)."""
@@ -85,7 +85,7 @@ def follow_starts(
     starts = Start(solve, goals, same(effort.gap), waits)
     if not count:
         return _empty_outcome(len(states) - 1)
-    program = _program(scene.compliant, effort.solver, periods, effort.engine)
+    program = _program(scene.compliant, effort.solver, cycles, effort.engine)
     engine = LANES if effort.engine == "lanes" else XLA
     given = jtu.tree_map(np.asarray, starts)
     outcome: Outcome[np.ndarray] = engine.run(Request(program, given, batch=True)).outputs
@@ -94,11 +94,11 @@ def follow_starts(
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
 def _program(
-    compliant: bool, solver: AbstractRosenbrock, periods: tuple[int, ...], engine: str
+    compliant: bool, solver: AbstractRosenbrock, cycles: tuple[int, ...], engine: str
 ) -> Program:
-    loop: AbstractLabellingLoop = RigidLabelling(periods)
+    loop: AbstractLabellingLoop = RigidLabelling(cycles)
     if compliant:
-        loop = CompliantLabelling(solver, periods, fenced=engine == "xla")
+        loop = CompliantLabelling(solver, cycles, fenced=engine == "xla")
     return Program(loop.begin, loop.attempt, loop.finish)
 
 
@@ -107,12 +107,12 @@ def _empty_outcome(size: int) -> Outcome[np.ndarray]:
     return Outcome(
         label=whole,
         goal=whole,
-        period=whole,
+        cycle_footsteps=whole,
         footsteps=whole,
         time=real,
         distance=real,
         rate=real,
         closest=real,
-        attempts=whole,
+        attempted=whole,
         final=tuple([real] * size),
     )

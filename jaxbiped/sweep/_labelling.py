@@ -43,34 +43,35 @@ class Labelled(NamedTuple):
 
     Attributes:
         label: code of a `Label`.
-        gait: the gait that it converges to, by its position in `Family.periods`; −1 for none.
-        period: footsteps in that gait's cycle. Where the label is "unresolved" it is that of a
-            cycle which the last footsteps repeated, of a gait that is not among the attractors.
+        gait: the gait that it converges to, by its position in `Family.cycles`; −1 for none.
+        cycle_footsteps: footsteps in that gait's cycle. Where the label is "unresolved" it is that
+            of a cycle which the last footsteps repeated, of a gait that is not among the
+            attractors.
         footsteps: heel strikes until the label was certain.
         time: simulated until then [s].
         distance: walked along the slope until then [m].
         rate: share of the distance from the gait that is left after a footstep, over the last
             cycle; NaN without a cycle, and where nothing but rounding is left of the distance.
         closest: smallest distance from any of the gaits, in its metric; infinite without arrival.
-        attempts: of the solver's steps.
+        attempted: how many steps the solver attempted.
         final: last states on the section without hip_x, shape (n, m); infinite without arrival.
     """
 
     label: np.ndarray
     gait: np.ndarray
-    period: np.ndarray
+    cycle_footsteps: np.ndarray
     footsteps: np.ndarray
     time: np.ndarray
     distance: np.ndarray
     rate: np.ndarray
     closest: np.ndarray
-    attempts: np.ndarray
+    attempted: np.ndarray
     final: np.ndarray
 
     @property
     def names(self) -> np.ndarray:
         """The labels in words, "walking period-1" and so on, shape (n,)."""
-        return label_names(self.label, self.period)
+        return label_names(self.label, self.cycle_footsteps)
 
 
 class Labelling(eqx.Module):
@@ -112,23 +113,23 @@ class Labelling(eqx.Module):
         given = {name: _column(name, value, count) for name, value in values.items()}
         scene = with_parameters(self.scene, {k: jnp.asarray(v) for k, v in given.items()})
         scene = jtu.tree_map(lambda leaf: _spread(leaf, count), scene)
-        goals, periods = self.family.goals(given, count)
-        outcome = follow_starts(scene, states, goals, periods, self.effort)
+        goals, cycles = self.family.goals(given, count)
+        outcome = follow_starts(scene, states, goals, cycles, self.effort)
         label = outcome.label.astype(np.int8)
         if given and not self.family.names:
             # No gait is known to compare with: a cycle that repeats itself has to do.
-            repeats = (label == int(Label.UNRESOLVED)) & (outcome.period > 0)
+            repeats = (label == int(Label.UNRESOLVED)) & (outcome.cycle_footsteps > 0)
             label = np.where(repeats, np.int8(Label.WALKING), label)
         return Labelled(
             label=label,
             gait=outcome.goal.astype(np.int16),
-            period=outcome.period.astype(np.int16),
+            cycle_footsteps=outcome.cycle_footsteps.astype(np.int16),
             footsteps=outcome.footsteps.astype(np.int32),
             time=outcome.time,
             distance=outcome.distance,
             rate=outcome.rate,
             closest=outcome.closest,
-            attempts=outcome.attempts.astype(np.int32),
+            attempted=outcome.attempted.astype(np.int32),
             final=np.stack(outcome.final, axis=1),
         )
 

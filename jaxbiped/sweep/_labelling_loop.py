@@ -10,10 +10,9 @@ from typing import Generic, NamedTuple, TypeVar
 import equinox.internal as eqxi
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Parameter, Scalar, select
 from jaxbiped.basins._label import Label
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
@@ -58,13 +57,13 @@ class Outcome(NamedTuple, Generic[_Number]):
 
     label: _Number
     goal: _Number
-    period: _Number
+    cycle_footsteps: _Number
     footsteps: _Number
     time: _Number
     distance: _Number
     rate: _Number
     closest: _Number
-    attempts: _Number
+    attempted: _Number
     final: tuple[_Number, ...]
 
 
@@ -104,22 +103,22 @@ class CompliantLabelling(AbstractLabellingLoop):
     """Of the compliant walker, which arrives at mid-stance, on whichever leg.
 
     Attributes:
-        periods: footsteps in a cycle of each known gait.
+        cycles: footsteps in a cycle of each known gait.
         steps: the solver's steps and endings.
     """
 
     def __init__(
-        self, solver: AbstractRosenbrock, periods: tuple[int, ...], *, fenced: bool
+        self, solver: AbstractRosenbrock, cycles: tuple[int, ...], *, fenced: bool
     ) -> None:
         """`fenced`: whether XLA is to compile it."""
-        self.periods = periods
+        self.cycles = cycles
         saved = Saved(times=True)  # the last step's continuous solution
         self.steps = AdaptiveSolve(solver, WATCHES, counting=True, saved=saved, fenced=fenced)
 
     def begin(self, start: Start) -> Progress:
         solve: Solve = start.solve
         zero = jnp.zeros_like(solve.duration)
-        trace = empty_history(zero, len(solve.state) - 1, self.periods)
+        trace = empty_history(zero, len(solve.state) - 1, self.cycles)
         landed = contact_places(solve.scene, solve.state)
         return Progress(self.steps.start(solve), trace, zero, landed)
 
@@ -147,7 +146,7 @@ class CompliantLabelling(AbstractLabellingLoop):
             footsteps=count,
             time=solved.t,
             distance=solved.state.hip_x - start.solve.state.hip_x,
-            attempts=solved.accepted + solved.rejected,
+            attempted=solved.accepted + solved.rejected,
         )
 
     def _traced(self, start: Start, now: Progress, after: PyTree) -> ArrivalHistory:
@@ -176,7 +175,7 @@ class CompliantLabelling(AbstractLabellingLoop):
 
             time = _root(value, last.t, after.t)
             return after_arrival(
-                now.trace, _recurring_components(at(time)), start.goals, self.periods, start.gap
+                now.trace, _recurring_components(at(time)), start.goals, self.cycles, start.gap
             )
 
         return _trace_or(arrives, on_section, now.trace)
@@ -209,16 +208,16 @@ class RigidLabelling(AbstractLabellingLoop):
     """Of the rigid walker, which arrives just after its impacts.
 
     Attributes:
-        periods: footsteps in a cycle of each known gait.
+        cycles: footsteps in a cycle of each known gait.
     """
 
-    def __init__(self, periods: tuple[int, ...]) -> None:
-        self.periods = periods
+    def __init__(self, cycles: tuple[int, ...]) -> None:
+        self.cycles = cycles
 
     def begin(self, start: Start) -> Progress:
         walk: RigidWalk = start.solve
         zero = jnp.zeros_like(walk.duration)
-        trace = empty_history(zero, len(walk.state) - 1, self.periods)
+        trace = empty_history(zero, len(walk.state) - 1, self.cycles)
         return Progress(initial_progress(walk), trace, zero, None)
 
     def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
@@ -226,7 +225,7 @@ class RigidLabelling(AbstractLabellingLoop):
 
         def on_section() -> ArrivalHistory:
             return after_arrival(
-                now.trace, _recurring_components(after.state), start.goals, self.periods, start.gap
+                now.trace, _recurring_components(after.state), start.goals, self.cycles, start.gap
             )
 
         trace = _trace_or(after.struck, on_section, now.trace)
@@ -244,7 +243,7 @@ class RigidLabelling(AbstractLabellingLoop):
             footsteps=walked.footsteps,
             time=walked.t,
             distance=state_with_hip(start.solve, walked).hip_x - start.solve.state.hip_x,
-            attempts=walked.attempts,
+            attempted=walked.accepted + walked.rejected,
         )
 
 
@@ -255,7 +254,7 @@ def _outcome(
     footsteps: Scalar,
     time: Scalar,
     distance: Scalar,
-    attempts: Scalar,
+    attempted: Scalar,
 ) -> Outcome[Scalar]:
     """A failure is certain; all footsteps walked without a verdict are not."""
     kind = trace.verdict.dtype
@@ -267,13 +266,13 @@ def _outcome(
     return Outcome(
         label=label,
         goal=jnp.where(walks, trace.goal, -1),
-        period=jnp.where(converges, trace.period, 0),
+        cycle_footsteps=jnp.where(converges, trace.cycle_footsteps, 0),
         footsteps=footsteps,
         time=time,
         distance=distance,
         rate=trace.rate,
         closest=trace.closest,
-        attempts=attempts,
+        attempted=attempted,
         final=trace.recent[0],
     )
 
@@ -284,7 +283,7 @@ def _trace_or(
     """A new trace where the condition holds; made only if it does in any start of the batch."""
 
     def made() -> ArrivalHistory:
-        return jtu.tree_map(lambda a, b: jnp.where(condition, a, b), make(), old)
+        return select(condition, make(), old)
 
     trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(condition), made, lambda: old)
     return trace

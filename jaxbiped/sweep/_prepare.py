@@ -20,7 +20,7 @@ from jaxbiped.sweep.starts._starts import AbstractStarts
 _ALIKE = 0.05
 """Distance of two starts' last states, in the components' scales, that count as one guess."""
 _MOST_GUESSES = 8
-"""Of one period for one combination of parameters."""
+"""Of one cycle length for one combination of parameters."""
 
 
 def labelling(
@@ -101,7 +101,7 @@ def with_gaits_met(labelling: Labelling, starts: AbstractStarts, *, count: int =
 
 
 Guesses = dict[int, list[tuple[int, list[float]]]]
-"""By row of a family: periods, and states on the section without hip_x, from which to search."""
+"""By row of a family: footsteps in a cycle and states, without hip_x, from which to search."""
 
 
 def guesses_among(labelling: Labelling, starts: AbstractStarts, numbers: np.ndarray) -> Guesses:
@@ -109,17 +109,17 @@ def guesses_among(labelling: Labelling, starts: AbstractStarts, numbers: np.ndar
     batch = starts.at(labelling, numbers)
     found = labelling(batch.states, parameters=batch.parameters)
     family = labelling.family
-    open_ = np.flatnonzero((found.label == int(Label.UNRESOLVED)) & (found.period > 0))
+    open_ = np.flatnonzero((found.label == int(Label.UNRESOLVED)) & (found.cycle_footsteps > 0))
     if not len(open_) or (batch.parameters and not family.names):
         return {}
     rows = np.zeros(len(found.label), dtype=int)
     if family.names:
         rows = family.row_of(batch.parameters)
     guesses: Guesses = {}
-    for row, period in sorted({(int(rows[i]), int(found.period[i])) for i in open_}):
-        among = open_[(rows[open_] == row) & (found.period[open_] == period)]
+    for row, length in sorted({(int(rows[i]), int(found.cycle_footsteps[i])) for i in open_}):
+        among = open_[(rows[open_] == row) & (found.cycle_footsteps[open_] == length)]
         for i in among[_apart(found.final[among] / family.scales[row])]:
-            guesses.setdefault(row, []).append((period, found.final[i].tolist()))
+            guesses.setdefault(row, []).append((length, found.final[i].tolist()))
     return guesses
 
 
@@ -129,7 +129,7 @@ def with_guesses(labelling: Labelling, guesses: Guesses) -> Labelling:
         return labelling
     family = labelling.family
     states = {
-        row: [(period, type(family.states[row])(0.0, *point)) for period, point in each]
+        row: [(length, type(family.states[row])(0.0, *point)) for length, point in each]
         for row, each in guesses.items()
     }
     more = with_gaits(labelling.scene, family, labelling.effort, states)

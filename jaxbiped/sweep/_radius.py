@@ -40,12 +40,12 @@ def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort)
     offsets = (_SHELLS[:, None, None] * directions).reshape(-1, size - 1) @ back.T
     states = _displace(attractor.state, offsets)
     count = len(offsets)
-    strikes = attractor.period + (1 if scene.compliant else 0)
+    strikes = attractor.cycle_footsteps + (1 if scene.compliant else 0)
     outcome = follow_starts(
         broadcast_leaves(scene, count),
         states,
         _no_goals(scene, attractor, count),
-        (attractor.period,),
+        (attractor.cycle_footsteps,),
         effort._replace(footsteps=strikes, gap=0.0),
     )
     final = np.stack(outcome.final, axis=1)

@@ -87,7 +87,11 @@ def sweep(
     quantities = coordinate_quantities(labelling.scene)
     units = {name: quantity.unit for name, quantity in quantities.items()}
     layout = Layout.of(starts, int(chunk), units)
-    own = {"starts": starts.described(), "chunk_shape": list(layout.chunk_shape)}
+    own = {
+        "fields": list(FIELDS),
+        "starts": starts.described(),
+        "chunk_shape": list(layout.chunk_shape),
+    }
     writer = provenance(labelling.scene, labelling.effort.solver, starts)
     if store is not None:
         ZarrStore.check(Path(store), labelling.settings() | own, writer, any_version=any_version)
@@ -168,6 +172,6 @@ def _guesses(labelling: Labelling, layout: Layout, results: AbstractStore) -> Gu
 
 def _open(results: AbstractStore, chunk: int) -> np.ndarray:
     """Places of a chunk's starts that are unresolved but repeat a cycle."""
-    fields = results.read(chunk, ("label", "period"))
+    fields = results.read(chunk, ("label", "cycle_footsteps"))
     unresolved = fields["label"] == int(Label.UNRESOLVED)
-    return np.asarray(np.flatnonzero(unresolved & (fields["period"] > 0)))
+    return np.asarray(np.flatnonzero(unresolved & (fields["cycle_footsteps"] > 0)))

@@ -1,16 +1,16 @@
-"""Adjoint solve of the second variation along a known motion, by lanes."""
+"""Adjoint solve of the second variation along a known motion."""
 
 from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
+from jax.flatten_util import ravel_pytree
 from jaxtyping import PyTree, PyTreeDef
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import LANES, Program, Recording, Request
+from jaxbiped.compiler import AbstractEngine, Program, Recorded, Recording, Request
 from jaxbiped.variational._adjoint_step import Adjoints, adjoint_step
 from jaxbiped.variational._collocated_step import Rows, linearise_about
 from jaxbiped.variational._first_variation import (
@@ -22,7 +22,7 @@ from jaxbiped.variational._first_variation import (
 )
 from jaxbiped.variational._flow import Arrival, Flow
 from jaxbiped.variational._hybrid_system import AbstractSystem
-from jaxbiped.variational._jets import Jet, reset_jet
+from jaxbiped.variational._section_tangents import after_reset, on_section
 from jaxbiped.variational._solve_to_section import Nodes
 from jaxbiped.variational._switch_crossings import earlier_at
 from jaxbiped.variational._tangents import Seeded
@@ -55,28 +55,31 @@ class _Now(NamedTuple):
     count: Scalar  # type: ignore[assignment]
 
 
-def carry_tangents(flow: Flow, nodes: Nodes, leading: Scalar) -> tuple[FirstVariation, Recording]:
+def carry_tangents(
+    engine: AbstractEngine, flow: Flow, nodes: Nodes, leading: Scalar
+) -> tuple[FirstVariation, Recording | Recorded]:
     """Leading tangents (v, c) carried along a motion to its arrival; and the steps of that."""
-    given = FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, leading, nodes.steps)
+    count = nodes.steps.astype(leading.dtype)
     request = Request(
-        _program(_kind(flow), None),
-        given,
-        room=nodes.ends.recorder.room,
+        _program(_Kind.of(engine, flow), None),
+        FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, leading, count),
+        room=nodes.ends.room,
         stream=nodes.ends,
         quick=True,
         keeps_records=True,
         reads_once=True,
     )
-    found = LANES.run(request)
+    found = engine.run(request)
     assert found.recording is not None
     return found.outputs, found.recording
 
 
 def pull_back(
+    engine: AbstractEngine,
     flow: Flow,
     nodes: Nodes,
     leading: FirstVariation,
-    steps: Recording,
+    steps: Recording | Recorded,
     after: Adjoints,
     *,
     final: bool,
@@ -84,6 +87,7 @@ def pull_back(
     """Adjoints where a motion starts, from those behind its arrival.
 
     Args:
+        engine: what computes.
         flow: what moves.
         nodes: of the motion.
         leading, steps: from `carry_tangents` along it.
@@ -91,22 +95,23 @@ def pull_back(
         final: whether the cycle ends there: of that arrival tangents on the section are told.
     """
     given = _Given(flow.args.args, nodes.arrival, leading, after)
-    request = Request(_program(_kind(flow), final), given, stream=steps, quick=True)
-    adjoints: Adjoints = LANES.run(request).outputs
+    program = _program(_Kind.of(engine, flow), final)
+    adjoints: Adjoints = engine.run(Request(program, given, stream=steps, quick=True)).outputs
     return adjoints
 
 
 class _Kind(NamedTuple):
     """What programs are compiled for."""
 
+    engine: AbstractEngine
     system: AbstractSystem
     arrival: Arrival
     active: tuple[int, ...]
     state: PyTreeDef
 
-
-def _kind(flow: Flow) -> _Kind:
-    return _Kind(flow.system, flow.arrival, flow.args.active, flow.structure)
+    @staticmethod
+    def of(engine: AbstractEngine, flow: Flow) -> "_Kind":
+        return _Kind(engine, flow.system, flow.arrival, flow.args.active, flow.structure)
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
@@ -122,36 +127,41 @@ def _program(kind: _Kind, final: bool | None) -> Program:
 
     c = kind.state.num_leaves
     if final is None:
-        return FirstVariationSolve(flow, 1 + c).program()
-    return _AdjointSolve(flow, Step.shape(c, COUNT), final).program()
+        return FirstVariationSolve(kind.engine, flow, 1 + c).program()
+    return _AdjointSolve(kind.engine, flow, Step.zero(c, COUNT), final).program()
 
 
 class _AdjointSolve:
     """The functions of the program: its input stream's rows are steps, read backwards."""
 
-    def __init__(self, flow: Callable[[_Given], Flow], step: Step, final: bool) -> None:
-        self.flow, self.step, self.final = flow, step, final
+    def __init__(
+        self, engine: AbstractEngine, flow: Callable[[_Given], Flow], step: Step, final: bool
+    ) -> None:
+        self.engine, self.flow, self.final = engine, flow, final
+        row, self.read = ravel_pytree(step)
+        self.size = len(row)
 
     def program(self) -> Program:
         """The program."""
-        size = sum(leaf.size for leaf in jtu.tree_leaves(self.step))
-        return Program(self.start, self.attempt, self.finish, stream=size, backwards=True)
+        return Program(self.start, self.attempt, self.finish, stream=self.size, backwards=True)
 
     def start(self, given: _Given) -> _Now:
         """Adjoints before the arrival: all of it is linear in what is there."""
         flow = self.flow(given)
         order, parameters = field_order(flow)
-        state = flow.earlier(given.arrival, parameters)[1:]
-        z = jnp.concatenate([state, parameters])
-        after = given.after
+        z = jnp.concatenate([flow.earlier(given.arrival, parameters)[1:], parameters])
+        after, c = given.after, len(given.after.family)
+        jacobian = self.engine.jacobian(lambda z: flow.rates(z[:c], z[c:]), list(z))
 
         def behind(before: Adjoints) -> tuple[Scalar, Scalar]:
-            first = jnp.concatenate([given.leading.leading, before.family[None]]).T
-            idle = jnp.zeros((COUNT, len(parameters)))
-            seeds = jnp.concatenate([idle, before.parameters[None]]).T
-            jet = Jet(first, before.second.T[:, None, :])
-            found = reset_jet(flow, z, jet, seeds, COUNT, final=self.final)
-            return found.first[:, COUNT], found.second[:, 0].T
+            family, every = jnp.concatenate([before.family, before.parameters]), []
+            for leading, second in zip(given.leading.leading, before.second, strict=True):
+                v, q = jnp.concatenate([leading, jnp.zeros_like(parameters)]), family
+                if self.final:
+                    v, q, second = on_section(flow, jacobian, z, v, q, second)
+                reached, second = after_reset(flow, z, v, q, second)
+                every.append(second)
+            return reached, jnp.stack(every)
 
         _, pull = jax.vjp(behind, jax.tree.map(jnp.zeros_like, after))
         (before,) = pull((after.family, after.second))
@@ -163,15 +173,14 @@ class _AdjointSolve:
         return _Now(adjoints, given.leading.state, jnp.zeros(()))
 
     def attempt(self, given: _Given, now: _Now, row: Scalar) -> tuple[_Now, Scalar]:
-        flow = self.flow(given)
+        flow, step = self.flow(given), self.read(row)
         order, parameters = field_order(flow)
-        step = Step.read(row, self.step)
-        rows = Rows(flow.apart, order, list(parameters))
+        rows = Rows(self.engine, flow.rates, order, list(parameters))
         crossed, ends = step.which > 0.0, (step.before, now.state)
         linear = linearise_about(rows, *ends, step.points, step.share, crossed)
         early = jax.lax.cond(
             crossed,
-            lambda: earlier_at(flow, flow.surfaces, now.state, step.which, parameters),
+            lambda: earlier_at(flow, now.state, step.which, parameters),
             lambda: jnp.zeros(len(now.state) + len(parameters)),
         )
         before, count = adjoint_step(rows, linear, step, early, now.adjoints), now.count + 1.0

@@ -1,9 +1,11 @@
-"""Adjoint step of the second variation, backwards in time, for lanes.
+"""Adjoint step of the second variation, backwards in time.
 
-A weighted sum of the mixed second tangents C of `_curvature` at the end of a step is a sum of what
-was before it: C there, and linearly the family's tangent Q and the parameters, which enter the
-source f''[V, Q] and the jump (J₊ − J₋) V (dg·Q)/ġ. So the weights go backwards, two rows for C and
-one for Q, however many families there are. All components are in order.
+For two tangents V and Q of a motion its mixed second tangent C follows C' = J C + f''[V, Q]. Across
+a switch g = 0, crossed at the rate ġ, the Jacobian J jumps, so its derivative holds a pulse that no
+derivative taken through solver steps can see: C jumps by (J₊ − J₋) V (dg·Q)/ġ. A weighted sum of C
+at the end of a step is a sum of what was before it: C there, and linearly the family's tangent Q
+and the parameters, which enter the source and the jump. So the weights go backwards, two rows for C
+and one for Q, however many families there are. All components are in order.
 """
 
 from typing import NamedTuple
@@ -33,7 +35,7 @@ def adjoint_step(
     order, stages = rows.order, linear.stages
     c, d, count = len(order.every), order.direct, len(step.leading)
     nowhere = jnp.zeros(c)
-    begun, lost = without_flow(step.leading, linear.velocity, step.fresh)
+    begun, lost = without_flow(step.leading, linear.velocity, step.fresh > 0.0)
     at_stages = stages.carried(begun)
     ends = [stages.pulled(jnp.stack([nowhere, nowhere, each])) for each in after.second]
     second = jnp.stack([start for start, _ in ends])
@@ -72,5 +74,5 @@ def _with_flow(linear: Linear, step: Step, lost: Scalar, after: Adjoints) -> Adj
     if d:
         follows = [jnp.zeros(d), rate[:d], jnp.zeros(c - 2 * d)]
         family = family + jnp.concatenate(follows)
-    part = jnp.where(step.fresh, 0.0, shift / (velocity @ velocity))
+    part = jnp.where(step.fresh > 0.0, 0.0, shift / (velocity @ velocity))
     return Adjoints(after.second, family + part * velocity, after.parameters + pulled[c:])

@@ -1,7 +1,6 @@
-"""Collocated step: the vector field about one step by Radau IIA, for lanes.
+"""Collocated step: the vector field about one step by Radau IIA.
 
-The method is that of `_radau`; here the components whose rate is a component are eliminated by
-hand, and the step is one, not many.
+Components whose rate is a component are eliminated by hand.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,10 +10,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import jacobian
+from jaxbiped.compiler import AbstractEngine
 from jaxbiped.linalg._elimination import BlockFactors, factorise
 from jaxbiped.solve.rosenbrock._linearisation import linearise
-from jaxbiped.variational._radau_collocation import RADAU, Path
+from jaxbiped.variational._radau_collocation import RADAU, KnownStep
 from jaxbiped.variational._switch_crossings import SIDES, jump_of
 from jaxbiped.variational._switch_locator import MARGIN
 
@@ -131,8 +130,11 @@ class Stages(NamedTuple):
 class Rows:
     """Rates and their derivatives at one point, of `field` for components in this `order`."""
 
-    def __init__(self, field: Field, order: Order, parameters: Sequence[Scalar]) -> None:
+    def __init__(
+        self, engine: AbstractEngine, field: Field, order: Order, parameters: Sequence[Scalar]
+    ) -> None:
         self.field, self.order, self.parameters = field, order, list(parameters)
+        self.jacobian = engine.jacobian
         # Compiled by themselves, these are traced once, not at each use.
         self.by_state, self.curved = jax.jit(self._by_state), jax.jit(self._curved)
 
@@ -141,7 +143,7 @@ class Rows:
 
     def _by_state(self, y: Scalar) -> Scalar:
         """Derivatives of the kept rates with respect to the components, (k, c)."""
-        return self.order.sorted(jacobian(lambda z: self._kept(z, self.parameters), list(y)))
+        return self.order.sorted(self.jacobian(lambda z: self._kept(z, self.parameters), list(y)))
 
     def gradient(self, y: Scalar) -> Scalar:
         """Derivatives of the kept rates, (k, n)."""
@@ -172,7 +174,7 @@ class Rows:
 
     def _by_all(self, function: Callable[..., list[Scalar]], y: list[Scalar]) -> Scalar:
         c = len(y)
-        found = jacobian(lambda z: function(z[:c], z[c:]), [*y, *self.parameters])
+        found = self.jacobian(lambda z: function(z[:c], z[c:]), [*y, *self.parameters])
         return jnp.concatenate([self.order.sorted(found[:, :c]), found[:, c:]], axis=1)
 
 
@@ -196,16 +198,16 @@ class Linear(NamedTuple):
     jump: Scalar
 
 
-def collocate_step(rows: Rows, path: Path, crossed: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """A step whose leaves have no leading axis: its collocation points, (3, c), in their own order.
+def collocate_step(rows: Rows, step: KnownStep) -> tuple[Scalar, Scalar, Scalar]:
+    """A step's collocation points, (3, c), in the components' own order.
 
     Also their shares of time, (3,), and the rates where it begins.
     """
-    part, share = (each[0] for each in jax.tree.map(lambda x: x[None], path).clock())
-    begins, ends = rows.velocity(path.before), rows.velocity(path.after)
-    points = _correct(rows, path, part, share, begins, ends)
+    part, share = step.clock()
+    begins, ends = rows.velocity(step.before), rows.velocity(step.after)
+    points = _correct(rows, step, part, share, begins, ends)
     # A step that ends on a switch belongs to the old side; a corrected point may lie beyond.
-    short = jnp.where(crossed, path.after - MARGIN * ends, points[2])
+    short = jnp.where(step.crossed, step.after - MARGIN * ends, points[2])
     return jnp.concatenate([points[:2], short[None]]), share, begins
 
 
@@ -220,7 +222,7 @@ def linearise_about(
 
     def jump() -> Scalar:
         sides = after + jnp.asarray(SIDES)[:, None] * rows.velocity(after)
-        return jump_of(jax.lax.map(rows.by_state, sides)[None])[0]
+        return jump_of(jax.lax.map(rows.by_state, sides))
 
     jumps = jax.lax.cond(crossed, jump, lambda: jnp.zeros_like(found[3, :, :c]))
     return Linear(
@@ -229,17 +231,17 @@ def linearise_about(
 
 
 def _correct(
-    rows: Rows, path: Path, part: Scalar, share: Scalar, begins: Scalar, ends: Scalar
+    rows: Rows, step: KnownStep, part: Scalar, share: Scalar, begins: Scalar, ends: Scalar
 ) -> Scalar:
     """The collocation points: a cubic, once corrected."""
     order = rows.order
-    h, change = path.span, path.after - path.before
+    h, change = step.span, step.after - step.before
     start, end = h * begins, h * ends
     second, third = 3.0 * change - 2.0 * start - end, start + end - 2.0 * change
     s = part[:, None]
-    points = path.before + s * (start + s * (second + s * third))
+    points = step.before + s * (start + s * (second + s * third))
     velocities, found = jax.lax.map(lambda y: (rows.velocity(y), rows.by_state(y)), points)
     stages = Stages.of(order, share, found)
-    residual = order.sorted(points - path.before - (RADAU * share) @ velocities)
+    residual = order.sorted(points - step.before - (RADAU * share) @ velocities)
     unforced = jnp.zeros((3, len(order.kept)))
     return points - order.restored(stages.solve(residual, unforced))

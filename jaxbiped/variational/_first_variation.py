@@ -1,6 +1,11 @@
-"""First variation along a known motion in two directions, and the steps it takes, by lanes.
+"""First variation along a known motion in two directions, and the steps that it takes.
 
 The adjoint solve reads these steps backwards, with all that it needs of the motion in them.
+
+A tangent may hold much of the flow itself: where a parameter makes the motion later, it does. Of
+that part the second tangents are known exactly, and yet it is the largest and changes fastest. So
+at every step's start what a tangent has of the flow is taken out, which is only to read the motion
+at other times.
 """
 
 from collections.abc import Callable
@@ -8,16 +13,22 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jax.flatten_util import ravel_pytree
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import Program
+from jaxbiped.compiler import AbstractEngine, Program
 from jaxbiped.variational._collocated_step import Order, Rows, Stages, collocate_step, order_of
-from jaxbiped.variational._curvature import LONG_AGO, SETTLED
 from jaxbiped.variational._flow import Flow
-from jaxbiped.variational._radau_collocation import Path
+from jaxbiped.variational._radau_collocation import KnownStep
 from jaxbiped.variational._switch_crossings import crossing_of
 from jaxbiped.variational._tangents import active_leaves
+
+LONG_AGO = 1.0
+"""Time [s] since the last switch, where none is known."""
+SETTLED = 1e-9
+"""How long after a switch the first step ends at the earliest [s], however short the solve's own
+are: penetrations that are mostly rounding make the singular second derivatives there noise."""
 
 
 class Step(NamedTuple):
@@ -26,8 +37,8 @@ class Step(NamedTuple):
     Attributes:
         before: state where it starts, (c,).
         points, share: as from `collocate_step`.
-        fresh: whether it starts on a switch.
-        which: the number of the switch that it ends on, as in `Crossings`.
+        fresh: 1 where it starts on a switch, else 0.
+        which: the number of the switch that it ends on, as in `Crossing`.
         leading: these tangents where it starts, in order, with the flow still in them, (v, c).
     """
 
@@ -40,34 +51,19 @@ class Step(NamedTuple):
 
     def row(self) -> Scalar:
         """One number after the other."""
-        return jnp.concatenate([jnp.ravel(leaf).astype(float) for leaf in jax.tree.leaves(self)])
+        return ravel_pytree(self)[0]
 
     @staticmethod
-    def read(row: Scalar, like: "Step") -> "Step":
-        """Of a row, with arrays as large as those of another step."""
-        leaves, structure = jax.tree.flatten(like)
-        parts, place = [], 0
-        for leaf in leaves:
-            part = row[place : place + leaf.size].reshape(leaf.shape)
-            parts.append(part > 0.5 if leaf.dtype == bool else part)
-            place += leaf.size
-        return jax.tree.unflatten(structure, parts)
-
-    @staticmethod
-    def shape(components: int, count: int) -> "Step":
-        """Shapes of a step's arrays."""
-
-        def numbers(*shape: int) -> PyTree:
-            return jax.ShapeDtypeStruct(shape, jnp.float64)
-
-        flag: PyTree = jax.ShapeDtypeStruct((), jnp.bool_)
+    def zero(components: int, count: int) -> "Step":
+        """A step of so many components and tangents."""
+        c = components
         return Step(
-            before=numbers(components),
-            points=numbers(3, components),
-            share=numbers(3),
-            fresh=flag,
-            which=numbers(),
-            leading=numbers(count, components),
+            before=jnp.zeros(c),
+            points=jnp.zeros((3, c)),
+            share=jnp.zeros(3),
+            fresh=jnp.zeros(()),
+            which=jnp.zeros(()),
+            leading=jnp.zeros((count, c)),
         )
 
 
@@ -124,12 +120,14 @@ class FirstVariationSolve:
     """The functions of the program, whose input stream is time and state at the ends of steps.
 
     The motion ends at the arrival, not at the last node, and begins and ends before its section:
-    that may be a switch, as touchdown is. At every step's start that is on no switch the part of
-    the flow is taken out of the tangents; see `_curvature`.
+    that may be a switch, as touchdown is. Where a step starts on a switch, the part of the flow
+    stays in the tangents.
     """
 
-    def __init__(self, flow: Callable[[FirstVariationInputs], Flow], row: int) -> None:
-        self.flow, self.row = flow, row
+    def __init__(
+        self, engine: AbstractEngine, flow: Callable[[FirstVariationInputs], Flow], row: int
+    ) -> None:
+        self.engine, self.flow, self.row = engine, flow, row
 
     def program(self) -> Program:
         """The program."""
@@ -140,7 +138,6 @@ class FirstVariationSolve:
         order, parameters = field_order(flow)
         node_row = flow.earlier(given.start, parameters)
         t, state = node_row[0], node_row[1:]
-        shape = Step.shape(len(state), given.leading.shape[0])
         none, zero = jnp.asarray(False), jnp.zeros(())
         return _Now(
             node=state,
@@ -151,7 +148,7 @@ class FirstVariationSolve:
             leading=order.sorted(given.leading),
             read=zero,
             taken=zero,
-            step=jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape),
+            step=Step.zero(len(state), given.leading.shape[0]),
             ends=none,
         )
 
@@ -162,18 +159,19 @@ class FirstVariationSolve:
         over = read >= given.steps
         node_row = jnp.where(over, flow.earlier(given.arrival, parameters), row)
         t, node = node_row[0], node_row[1:]
-        crossing = crossing_of(flow, flow.surfaces, now.node, node, parameters)
+        crossing = crossing_of(flow, now.node, node, parameters)
         end = t - crossing.past
-        path = Path(
+        known = KnownStep(
             before=now.state,
             after=crossing.landed,
             start=now.t,
             span=jnp.maximum(end - now.t, 0.0),
             switched=now.switched,
             fresh=now.fresh,
+            crossed=crossing.crossed,
         )
-        rows = Rows(flow.apart, order, list(parameters))
-        points, share, velocity = collocate_step(rows, path, crossing.crossed)
+        rows = Rows(self.engine, flow.rates, order, list(parameters))
+        points, share, velocity = collocate_step(rows, known)
         stages = Stages.of(order, share, jax.lax.map(rows.by_state, points))
         begun, _ = without_flow(now.leading, order.sorted(velocity), now.fresh)
         after = _Now(
@@ -189,7 +187,7 @@ class FirstVariationSolve:
                 before=now.state,
                 points=points,
                 share=share,
-                fresh=now.fresh,
+                fresh=now.fresh.astype(float),
                 which=crossing.which.astype(float),
                 leading=now.leading,
             ),
@@ -223,4 +221,4 @@ def field_order(flow: Flow) -> tuple[Order, Scalar]:
     """The order of components, and the active parameters."""
     parameters = [jnp.asarray(leaf) for leaf in active_leaves(flow.args)]
     state = [jnp.ones(())] * flow.structure.num_leaves
-    return order_of(flow.apart, state, parameters), jnp.stack(parameters)
+    return order_of(flow.rates, state, parameters), jnp.stack(parameters)

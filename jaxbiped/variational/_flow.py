@@ -21,7 +21,7 @@ Arrival = Callable[[PyTree, PyTree], tuple[Scalar, Scalar]]
 
 
 class Flow(eqx.Module):
-    """What moves c components under p active parameters. Called, it gives their rates.
+    """What moves c components under p active parameters.
 
     Components and parameters come one by one to the rates, because pulling back through arrays of
     them makes programs that compile for seconds; to the rest as one vector z, shape (c + p,).
@@ -40,13 +40,15 @@ class Flow(eqx.Module):
     args: Seeded
     structure: PyTreeDef = eqx.field(static=True)
 
-    def __call__(self, z: Sequence[Scalar]) -> list[Scalar]:
-        state, scene = self._parts(z)
+    def rates(self, y: Sequence[Scalar], parameters: Sequence[Scalar]) -> list[Scalar]:
+        """The rates of the components."""
+        state, scene = self._parts([*y, *parameters])
         return jtu.tree_leaves(self.field(jnp.zeros(()), state, scene))
 
-    def apart(self, y: Sequence[Scalar], parameters: Sequence[Scalar]) -> list[Scalar]:
-        """The rates of components and parameters that come apart."""
-        return self([*y, *parameters])
+    def velocity(self, z: Scalar) -> Scalar:
+        """The same, shape (c,)."""
+        c = self.structure.num_leaves
+        return jnp.stack(self.rates(list(z[:c]), list(z[c:])))
 
     def surfaces(self, z: Scalar) -> tuple[Switch, ...]:
         """The switches."""
@@ -65,7 +67,7 @@ class Flow(eqx.Module):
 
     def earlier(self, row: Scalar, parameters: Scalar) -> Scalar:
         """Time and components, (1 + c,), as little earlier as tells a switch's sides apart."""
-        rates = jnp.stack(self([*row[1:], *parameters]))
+        rates = self.velocity(jnp.concatenate([row[1:], parameters]))
         return row - MARGIN * jnp.concatenate([jnp.ones(1), rates])
 
     def _parts(self, z: Sequence[Scalar] | Scalar) -> tuple[PyTree, PyTree]:

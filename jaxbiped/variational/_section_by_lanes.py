@@ -5,7 +5,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
-from jaxbiped.compiler import Recording
+from jaxbiped.compiler import Recorded, Recording
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import Nodes, SectionArrival
@@ -54,7 +54,7 @@ def solve_to_section_by_lanes(
     )
 
 
-def _nodes(start: PyTree, found: VariationalSolution, recording: Recording) -> Nodes:
+def _nodes(start: PyTree, found: VariationalSolution, recording: Recording | Recorded) -> Nodes:
     first = jnp.stack([jnp.zeros(()), *jtu.tree_leaves(start)])
     last = jnp.stack([found.t, *jtu.tree_leaves(found.state)])
     return Nodes(first, recording, last, found.accepted)

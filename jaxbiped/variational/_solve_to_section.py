@@ -9,9 +9,10 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time, VectorField
+from jaxbiped.compiler import Recorded, Recording
 from jaxbiped.solve._accuracy import Precision, rms_norm
-from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.variational._switch_locator import (
@@ -40,14 +41,14 @@ class Nodes(NamedTuple):
 
     Attributes:
         start: where the first step begins, shape (1 + c,).
-        ends: shape (room, 1 + c), by lanes a `Recording` of them. The last one lies just past the
-            section; no numbers are beyond it.
+        ends: records of rows, `Recorded` or by lanes a `Recording`. The last one lies just past
+            the section.
         arrival: on the section, shape (1 + c,).
         steps: how many there are.
     """
 
     start: Scalar
-    ends: PyTree
+    ends: Recorded | Recording
     arrival: Scalar
     steps: Scalar
 
@@ -158,7 +159,9 @@ def _nodes(times: Scalar, states: PyTree, time: Scalar, y: PyTree) -> Nodes:
     """From times and states of which the first are those of the start; infinite beyond the last."""
     rows = jnp.stack([times, *jtu.tree_leaves(states)], axis=-1)
     arrival = jnp.stack([time, *jtu.tree_leaves(plain_state(y))])
-    return Nodes(rows[0], rows[1:], arrival, jnp.sum(jnp.isfinite(times)) - 1)
+    steps = jnp.sum(jnp.isfinite(times)) - 1
+    ends = Recorded(rows[1:], steps)  # type: ignore[arg-type]
+    return Nodes(rows[0], ends, arrival, steps)
 
 
 def _plain_node(t: Time, y: PyTree, args: PyTree) -> PyTree:

@@ -13,10 +13,10 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Program
 from jaxbiped.solve._accuracy import rms_norm
-from jaxbiped.solve._ending import Ending
 from jaxbiped.solve._final_step import clip_step
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock

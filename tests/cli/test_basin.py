@@ -53,7 +53,7 @@ def test_json(numbers):
     assert sum(f[0] for f in numbers["fractions"].values()) == pytest.approx(1.0)
     assert "walking period-1" in numbers["fractions"]
     (gait,) = numbers["gaits"]
-    assert gait["period"] == 1
+    assert gait["cycle_footsteps"] == 1
     assert gait["duration_s"] == pytest.approx(0.4408349, abs=1e-6)
     assert np.hypot(*gait["multipliers"][0]) == pytest.approx(0.457064, abs=1e-4)
 

@@ -63,7 +63,9 @@ def test_figures_and_dataset(followed):
 
 def test_what_is_printed(capsys):
     assert _run("--model", "rigid", "--from", "0.018", "--to", "0.022") == 0
-    said = capsys.readouterr().out
+    printed = capsys.readouterr()
+    assert "gaits" in printed.err
+    said = printed.out
     assert "slope rad" in said
     assert "last end at slope = 0.022: reached (the range ends)" in said
     assert _run("--model", "rigid", "--from", "0.018", "--to", "0.022", "--json", "-") == 0

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from jaxbiped._ending import Ending
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch_point import NO_WALK, is_stable
 from jaxbiped.continuation._trace import trace
 from jaxbiped.gait._continuation import BranchEnd
-from jaxbiped.solve._ending import Ending
 from tests.continuation.maps import (
     begin_at,
     curve_of,

@@ -123,8 +123,8 @@ def test_a_swing_keeps_energy_to_the_tolerance(rtol):
     scene = WALKERS[0]
     start = jb.dynamics.RigidState(*map(jnp.asarray, (0.0, -0.24, 0.24, -1.09, -1.64)))
     swing = jb.rigid_walk(scene, start, duration=0.3, rtol=rtol)
-    assert int(swing.footsteps) == 0
-    before, after = float(energy(scene, start)), float(energy(scene, swing.state))
+    assert int(swing.arrivals.total) == 0
+    before, after = float(energy(scene, start)), float(energy(scene, swing.final))
     # In units of the kinetic energy, which the rates' tolerance is felt in.
     assert abs(after - before) < 3.0 * rtol * 0.33
 

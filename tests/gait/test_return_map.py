@@ -181,7 +181,8 @@ def _orbit(spec, args, guess):
     return orbit_of(spec, args, (0,), guess, found, radius=True)
 
 
-def test_van_der_pol_multiplier_and_its_sensitivities():
+@pytest.mark.parametrize("engine", ["xla", "lanes"])
+def test_van_der_pol_multiplier_and_its_sensitivities(engine):
     """λ = exp(∮ μ (1 − x²) dt); period, amplitude and λ against SciPy, and their derivatives."""
 
     def reference(mu):
@@ -200,7 +201,7 @@ def test_van_der_pol_multiplier_and_its_sensitivities():
             y, total, period = s.y_events[0][k][:2], s.y_events[0][k][2], s.t_events[0][k]
         return np.array([y[0], period, math.exp(total)])
 
-    spec = ReturnMapSpec(VanDerPol(), TURNING_POINT, jb.solvers.Rodas4(), 20.0, 1, 32768, "xla")
+    spec = ReturnMapSpec(VanDerPol(), TURNING_POINT, jb.solvers.Rodas4(), 20.0, 1, 32768, engine)
     orbit = jax.jit(lambda mu: _orbit(spec, mu, (jnp.asarray(-2.1), jnp.asarray(0.1))))(
         jnp.asarray(1.0)
     )

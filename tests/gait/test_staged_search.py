@@ -107,7 +107,7 @@ def test_rigid_gaits_are_found(slope):
     )
     assert walk.outcome is jb.Ending.WALKING
     if bool(gait.stable):
-        last = float(walk.strikes[0][-1] - walk.strikes[0][-2])
+        last = float(walk.arrivals.t[-1] - walk.arrivals.t[-2])
         assert float(gait.measures.period) == pytest.approx(last, abs=1e-6)
 
 

@@ -71,3 +71,8 @@ def test_every_law_goes_into_a_file(name, short_walk, tmp_path):
             assert read.attrs[f"{part}.{field}"] == float(value)
         assert set(state._fields) <= set(read.data_vars)
         assert np.isfinite(read.normal_force).all()
+
+
+def test_a_rigid_walker_is_refused(seed_walk):
+    with pytest.raises(jb.ArgumentError, match="scene = RigidScene"):
+        jb.trajectory_dataset(jb.ladder()["rigid"], seed_walk[1])

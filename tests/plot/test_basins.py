@@ -56,7 +56,7 @@ def test_names_of_coordinates_say_words_symbol_and_unit():
 
 
 def test_edges_and_names_draw_the_same():
-    by_code = basin(CODES, X, Y, period=1, **AXES).axes[0]
+    by_code = basin(CODES, X, Y, cycle_footsteps=1, **AXES).axes[0]
     names = jb.basins.label_names(CODES, 1)
     by_name = basin(names, [0.5, 1.5, 2.5, 3.5], [-2.0, 0.0, 2.0], **AXES).axes[0]
     np.testing.assert_array_equal(_colours(by_code), _colours(by_name))
@@ -65,7 +65,7 @@ def test_edges_and_names_draw_the_same():
 
 
 def test_legend_says_each_labels_fraction():
-    (ax,) = basin(CODES, X, Y, period=2, mark=(2.0, 0.0), **AXES).axes
+    (ax,) = basin(CODES, X, Y, cycle_footsteps=2, mark=(2.0, 0.0), **AXES).axes
     assert _legend(ax) == [
         "walking period-2: 60.0 %",
         "fell forward: 20.0 %",
@@ -73,7 +73,7 @@ def test_legend_says_each_labels_fraction():
         "pending: 1 of 6",
         "gait",
     ]
-    # Where the period is not known it is not said.
+    # Where the cycle is not known it is not said.
     assert _legend(basin(CODES, X, Y, **AXES).axes[0])[0] == "walking: 60.0 %"
 
 
@@ -97,7 +97,7 @@ def test_pending_cells_are_hatched_and_the_gait_is_marked():
 
 def test_a_label_has_one_colour_everywhere_and_no_other_has_it():
     names = [str(label) for label in jb.basins.Label if label != jb.basins.Label.WALKING]
-    names += [jb.basins.label_name(jb.basins.Label.WALKING, period) for period in range(1, 7)]
+    names += [jb.basins.label_name(jb.basins.Label.WALKING, cycle) for cycle in range(1, 7)]
     assert len({label_colour(name) for name in names}) == len(names)
     assert len({(label_colour(name), label_marker(name)) for name in names}) == len(names)
     alone = basin(np.full((1, 2), "stopped"), [0.0, 1.0], [0.0, 1.0], **AXES).axes[0]
@@ -106,7 +106,7 @@ def test_a_label_has_one_colour_everywhere_and_no_other_has_it():
 
 def test_gaits_of_one_period_have_shades_of_their_own():
     gait = np.array([[0, 1, 0], [0, 0, 2]])
-    (ax,) = basin(CODES, X, Y, period=1, gait=gait, **AXES).axes
+    (ax,) = basin(CODES, X, Y, cycle_footsteps=1, gait=gait, **AXES).axes
     colours = _colours(ax)
     assert len({colours[0, 0], colours[0, 1], colours[1, 2]}) == 3
     assert _legend(ax)[:3] == [f"walking period-1, gait {k}: 20.0 %" for k in range(3)]
@@ -115,13 +115,15 @@ def test_gaits_of_one_period_have_shades_of_their_own():
 
 def test_all_labels_at_once_and_nothing_is_cut_off():
     labels = np.arange(-1, 10)[:, None] * np.ones((1, 12), dtype=int)
-    period = np.tile(np.arange(1, 7), (11, 2))
-    figure = basin(labels, np.arange(12.0), np.arange(11.0), period=period, mark=(0, 9), **AXES)
+    cycle = np.tile(np.arange(1, 7), (11, 2))
+    figure = basin(
+        labels, np.arange(12.0), np.arange(11.0), cycle_footsteps=cycle, mark=(0, 9), **AXES
+    )
     assert isinstance(figure, Figure)
     assert len(_legend(figure.axes[0])) == 10 + 6 + 1
     _nothing_is_cut_off(figure)
     names = [
-        jb.basins.label_name(label, k) for label, k in zip(labels.flat, period.flat, strict=True)
+        jb.basins.label_name(label, k) for label, k in zip(labels.flat, cycle.flat, strict=True)
     ]
     known = labels.ravel() >= 0
     expected = np.where(known, [label_colour(name) for name in names], "")
@@ -210,7 +212,10 @@ def test_stacked_fractions_add_up_to_one():
         (lambda: basin(CODES, X[::-1], Y, **AXES), ("x", "increase")),
         (lambda: basin(CODES, X, [0.0, np.nan], **AXES), ("y", "nan", "finite")),
         (lambda: basin(CODES[:1], X, [0.0], **AXES), ("y", "one centre", "edges")),
-        (lambda: basin(CODES, X, Y, period=[1, 2], **AXES), ("period", "(2,)", "(2, 3)")),
+        (
+            lambda: basin(CODES, X, Y, cycle_footsteps=[1, 2], **AXES),
+            ("cycle_footsteps", "(2,)", "(2, 3)"),
+        ),
         (lambda: basin(CODES, X, Y, gait=[1, 2], **AXES), ("gait", "(2,)", "(2, 3)")),
         (lambda: basin(CODES, X, Y, mark=(1.0,), **AXES), ("mark", "two numbers")),
         (lambda: refined_basin(CODES, **AXES), ("boundary", "RefinedBoundary")),

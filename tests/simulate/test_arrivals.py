@@ -25,29 +25,32 @@ def test_heel_strikes_are_the_walks_footsteps(seed_walk):
     scene, whole = seed_walk
     expected = jb.heel_strikes(scene, whole).time_s
     walk = _walk(save=jb.HeelStrike(), max_arrivals=6)
-    count = int(walk.arrivals)
+    strikes = walk.arrivals
+    count = int(strikes.total)
     assert (walk.engine, count) == ("lanes", len(expected))
-    np.testing.assert_allclose(walk.t[:count], expected, atol=1e-7)
-    assert np.all(np.isinf(walk.t[count:]))
-    at = whole.at(walk.t[:count])
-    for ours, theirs in zip(walk.state, at, strict=True):
+    np.testing.assert_allclose(strikes.t[:count], expected, atol=1e-7)
+    assert np.all(np.isinf(strikes.t[count:]))
+    assert walk.t.tolist() == [DURATION]
+    np.testing.assert_allclose(walk.final, whole.final, atol=2e-5)
+    at = whole.at(strikes.t[:count])
+    for ours, theirs in zip(strikes.state, at, strict=True):
         np.testing.assert_allclose(ours[:count], theirs, atol=2e-5)
 
 
 def test_arrivals_without_room_are_counted():
-    walk = _walk(save=jb.HeelStrike(), max_arrivals=2)
-    assert walk.t.shape == (2,)
-    assert int(walk.arrivals) == 4
+    strikes = _walk(save=jb.HeelStrike(), max_arrivals=2).arrivals
+    assert strikes.t.shape == (2,)
+    assert int(strikes.total) == 4
 
 
 def test_mid_stances_are_the_return_maps():
-    walk = _walk(save=jb.MidStance())
+    stances = _walk(save=jb.MidStance()).arrivals
     once = jb.return_map(jb.seed_scene(), jb.seed_state(), accuracy="tight")
     twice = jb.return_map(jb.seed_scene(), jb.seed_state(), footsteps=2, accuracy="tight")
-    np.testing.assert_allclose(walk.t[:2], [once.time, twice.time], atol=1e-7)
+    np.testing.assert_allclose(stances.t[:2], [once.time, twice.time], atol=1e-7)
     # The first one names its legs the other way round, the second one as the start.
-    np.testing.assert_allclose(walk.state.theta_2[0], once.state.theta_1, atol=1e-7)
-    np.testing.assert_allclose(walk.state.theta_1[1], twice.state.theta_1, atol=1e-7)
+    np.testing.assert_allclose(stances.state.theta_2[0], once.state.theta_1, atol=1e-7)
+    np.testing.assert_allclose(stances.state.theta_1[1], twice.state.theta_1, atol=1e-7)
 
 
 def test_any_function_is_a_section():
@@ -57,10 +60,10 @@ def test_any_function_is_a_section():
     def anywhere(scene, state):
         return jnp.asarray(True)
 
-    walk = _walk(save=jb.Section(falls, anywhere), duration=0.5)
-    count = int(walk.arrivals)
+    found = _walk(save=jb.Section(falls, anywhere), duration=0.5).arrivals
+    count = int(found.total)
     assert count >= 1
-    np.testing.assert_allclose(walk.state.hip_vz[:count], 0.0, atol=1e-10)
+    np.testing.assert_allclose(found.state.hip_vz[:count], 0.0, atol=1e-10)
 
 
 @pytest.mark.parametrize("engine", ["lanes", "xla"])

@@ -25,12 +25,12 @@ def test_the_gait_goes_on(engine):
     )
     assert walk.outcome is jb.Ending.WALKING
     assert walk.engine == engine
-    times, states = walk.strikes
+    times, states = walk.arrivals.t, walk.arrivals.state
     np.testing.assert_allclose(np.diff(np.asarray(times)[:5]), 0.443780329, atol=1e-8)
     np.testing.assert_allclose(np.diff(np.asarray(states.hip_x)[:5]), 0.190414759, atol=1e-8)
     np.testing.assert_allclose(np.asarray(states.theta_2)[:5], GAIT.theta_2, atol=1e-8)
     assert np.isinf(np.asarray(times)[5])
-    assert float(walk.t) == float(times[4])
+    assert float(walk.t[-1]) == float(times[4])
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -45,7 +45,7 @@ def test_endings(engine):
     assert walk(-1.6, footsteps=5, max_solver_steps=20).outcome is jb.Ending.OUT_OF_STEPS
     bounded = walk(-1.64274847822, duration=1.0)
     assert bounded.outcome is jb.Ending.WALKING
-    assert (float(bounded.t), int(bounded.footsteps)) == (1.0, 2)
+    assert (float(bounded.t[-1]), int(bounded.arrivals.total)) == (1.0, 2)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -56,9 +56,9 @@ def test_a_walker_at_rest_waits_in_vain(engine):
     state = jb.dynamics.RigidState(*map(jnp.asarray, (0.0,) * 5))
     walk = jb.rigid_walk(scene, state, footsteps=1, engine=engine)
     assert walk.outcome is jb.Ending.TIMED_OUT
-    assert int(walk.footsteps) == 0
-    assert float(walk.t) == pytest.approx(50.0 * np.sqrt(0.4 / 9.8), rel=1e-12)
-    assert [float(leaf) for leaf in walk.state] == [0.0] * 5
+    assert int(walk.arrivals.total) == 0
+    assert float(walk.t[-1]) == pytest.approx(50.0 * np.sqrt(0.4 / 9.8), rel=1e-12)
+    assert [float(leaf) for leaf in walk.final] == [0.0] * 5
 
 
 @settings(deadline=None, max_examples=8)
@@ -74,12 +74,13 @@ def test_engines_agree(moves):
         for engine in ("lanes", "xla")
     )
     assert first.outcome is second.outcome
-    assert int(first.footsteps) == int(second.footsteps)
+    struck, again = first.arrivals, second.arrivals
+    assert int(struck.total) == int(again.total)
     # A fall is seen at the end of a step, and the steps differ by rounding: heel strikes do not.
-    for ours, theirs in zip(*map(jax.tree.leaves, (first.strikes, second.strikes)), strict=True):
+    for ours, theirs in zip(*map(jax.tree.leaves, (struck, again)), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=1e-7)
     if first.outcome is jb.Ending.WALKING:
-        np.testing.assert_allclose(np.array(first.state), np.array(second.state), atol=1e-7)
+        np.testing.assert_allclose(np.array(first.final), np.array(second.final), atol=1e-7)
 
 
 def test_error_follows_the_tolerance():
@@ -87,7 +88,7 @@ def test_error_follows_the_tolerance():
     errors = []
     for rtol in (1e-4, 1e-6, 1e-8):
         walk = jb.rigid_walk(rigid_seed(), GAIT, footsteps=4, rtol=rtol)
-        errors.append(float(np.abs(np.array(walk.state) - np.array(exact.state)).max()))
+        errors.append(float(np.abs(np.array(walk.final) - np.array(exact.final)).max()))
     assert errors[0] < 1e-4
     assert errors[1] < 1e-6
     assert errors[2] < 1e-8
@@ -96,10 +97,10 @@ def test_error_follows_the_tolerance():
 
 def test_steady_footsteps_need_no_search_for_their_strikes():
     few, many = (jb.rigid_walk(rigid_seed(), GAIT, footsteps=steps, rtol=1e-4) for steps in (3, 23))
-    assert int(many.attempts - few.attempts) / 20 <= int(few.attempts) / 3 - 0.5
+    assert int(many.attempted - few.attempted) / 20 <= int(few.attempted) / 3 - 0.5
     exact = jb.rigid_walk(rigid_seed(), GAIT, footsteps=23, rtol=1e-12)
-    assert float(many.t) == pytest.approx(float(exact.t), rel=1e-5)
-    np.testing.assert_allclose(np.array(many.state[1:]), np.array(exact.state[1:]), atol=1e-4)
+    assert float(many.t[-1]) == pytest.approx(float(exact.t[-1]), rel=1e-5)
+    np.testing.assert_allclose(np.array(many.final[1:]), np.array(exact.final[1:]), atol=1e-4)
 
 
 def test_batches_and_bad_lanes():
@@ -121,7 +122,7 @@ def test_batches_and_bad_lanes():
     alone = jb.rigid_walk(
         rigid_seed(), GAIT._replace(omega_2=omega[9]), footsteps=3, engine="lanes"
     )
-    assert float(many.t[9]) == float(alone.t)
+    assert float(many.t[9, -1]) == float(alone.t[-1])
 
 
 def test_a_strike_is_found_though_the_legs_opened_just_before_the_step():
@@ -135,9 +136,9 @@ def test_the_simplest_walkers_gaits_attract_and_repel():
     scene = simplest_walker(0.009)
     near = lambda published, d: simplest_state(published[0] + d, published[1])
     settled = jb.rigid_walk(scene, near(STABLE, 1e-3), footsteps=60)
-    assert float(settled.state.theta_2) == pytest.approx(STABLE[0], abs=1e-7)
+    assert float(settled.final.theta_2) == pytest.approx(STABLE[0], abs=1e-7)
     left = jb.rigid_walk(scene, near(UNSTABLE, 1e-6), footsteps=30)
-    assert abs(float(left.state.theta_2) - UNSTABLE[0]) > 1e-3
+    assert abs(float(left.final.theta_2) - UNSTABLE[0]) > 1e-3
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ def test_a_simulation_from_numpy_s_float32_is_solved_in_it():
     assert walk.final.theta_1.dtype == jnp.float32
     rolling = jb.RigidScene(SEED.walker, SEED.ground)
     rolled = jb.rigid_walk(rolling, jb.dynamics.rigid_state(start), footsteps=1, accuracy="fast")
-    assert rolled.state.theta_1.dtype == jnp.float32
+    assert rolled.final.theta_1.dtype == jnp.float32
     assert rolled.outcome is jb.Ending.WALKING
 
 

@@ -48,14 +48,29 @@ def swings():
 def test_the_pendulum_by_seven_methods(swings, angles):
     worst = {name: float(jnp.max(each.violation)) for name, each in swings.items()}
     for name, each in swings.items():
-        assert bool(each.succeeded)
-        assert int(each.attempted) == 20000
+        assert each.outcome is jb.Ending.FINISHED
+        assert (int(each.accepted), int(each.rejected)) == (20000, 0)
         error = np.abs(np.array([each.state.q[2][-1], each.state.q[5][-1]]) - angles).max()
         assert error < 0.02, name
     for name in PROJECTING:
         assert worst[name] < 1e-14
     for name in ("baumgarte", "penalty", "augmented"):
         assert 1e-8 < worst[name] < 0.5 * worst["standard"]
+
+
+@pytest.mark.parametrize(
+    ("how", "ending"),
+    [
+        (dict(max_solver_steps=20), jb.Ending.OUT_OF_STEPS),
+        (dict(solver="euler", dt=0.1), jb.Ending.SOLVER_FAILED),
+    ],
+)
+def test_a_swing_that_does_not_finish_says_why(how, ending):
+    """Explicit steps far too long for constraints that are pulled back at 1e20 1/s run away."""
+    scene = jb.LinkageScene(pinned_pendulum(), jb.constraints.Baumgarte(a=1e20, b=1e20))
+    found = jb.swing(scene, START, times=TIMES, **how)
+    assert found.outcome is ending
+    assert repr(found).startswith(f"Trajectory({ending}, engine=xla, shape=(201,), dtype=float64")
 
 
 def test_projected_steps_agree_with_scipy(angles):

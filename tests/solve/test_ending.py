@@ -117,5 +117,6 @@ def test_names_in_words():
         "out of steps",
         "solver failed",
         "timed out",
+        "finished",
     ]
-    assert [int(ending) for ending in Ending] == [0, 1, 2, 3, 4, 5, 6, 9]
+    assert [int(ending) for ending in Ending] == [0, 1, 2, 3, 4, 5, 6, 9, 10]

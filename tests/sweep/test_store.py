@@ -28,7 +28,7 @@ def test_what_is_written_is_read_and_in_the_dataset(store):
     label = np.arange(16, dtype=np.int8) % 7
     assert list(store.missing()) == list(range(LAYOUT.chunks))
     store.write(1, {"label": label})
-    read = store.read(1, ("label", "period"))
+    read = store.read(1, ("label", "cycle_footsteps"))
     np.testing.assert_array_equal(read["label"], label)
     read["label"][:] = 3
     np.testing.assert_array_equal(store.read(1, ("label",))["label"], label)

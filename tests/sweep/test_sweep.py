@@ -32,7 +32,7 @@ def test_labels_do_not_depend_on_the_chunks(late, monkeypatch):
     assert whole.label.dims == ("theta_stance", "omega_stance")
     assert set(np.unique(whole.label)) == {0, 1, 2}
     (gait,) = json.loads(whole.attrs["gaits"])[0]["gaits"]
-    assert gait["period"] == 1
+    assert gait["cycle_footsteps"] == 1
     assert gait["point"][1] == pytest.approx(STABLE[0], abs=1e-8)
     for chunk in (1, 3, 16):
         same_results(jb.sweep(LABELLING, STARTS, chunk=chunk), whole)
@@ -86,13 +86,13 @@ def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, write
 
 
 def test_positions_of_gaits_follow_when_more_are_met():
-    def gait(period):
+    def gait(length):
         nothing = np.zeros(0)
-        return jb.Attractor(period, 1.0, 1.0, None, nothing, nothing, 0.5, 0.1)
+        return jb.Attractor(length, 1.0, 1.0, None, nothing, nothing, 0.5, 0.1)
 
     rows = ((),), ((gait(1),), (gait(2),)), ((gait(1), gait(1)), (gait(2),))
     few, one, two = (LABELLING.family._replace(rows=each) for each in rows)
-    assert one.periods == (1, 2)
-    assert two.periods == (1, 1, 2)
+    assert one.cycles == (1, 2)
+    assert two.cycles == (1, 1, 2)
     np.testing.assert_array_equal(one.places_in(two), [0, 2])
     np.testing.assert_array_equal(few.places_in(one), [0])

@@ -132,6 +132,17 @@ def test_a_store_of_another_version_is_refused_unless_asked_for(tmp_path, name):
         _swept(path)
 
 
+def test_a_store_of_other_fields_is_refused_though_any_version_may_continue(tmp_path):
+    """As one of 0.1.0, whose settings named no fields and whose cycles were called periods."""
+    _swept(tmp_path / "store")
+    group = zarr.open_group(str(tmp_path / "store"), mode="r+")
+    settings = json.loads(group.attrs["settings"])
+    del settings["fields"]
+    group.attrs.update({"settings": json.dumps(settings)})
+    with pytest.raises(jb.ArgumentError, match="other settings: fields is not in the store"):
+        jb.sweep(LABELLING, STARTS, store=tmp_path / "store", chunk=16, any_version=True)
+
+
 def test_another_version_is_refused_before_gaits_are_sought(tmp_path, monkeypatch):
     _swept(tmp_path / "store")
     zarr.open_group(str(tmp_path / "store"), mode="r+").attrs.update({"git_revision": "other"})

@@ -53,9 +53,6 @@ class Arithmetic:
     def choose(self, condition: Value, a: Value | float, b: Value | float) -> Value:
         return self.block.add("select", condition, self.real(a), self.real(b), kind=Kind.F64)
 
-    def either(self, a: Value, b: Value) -> Value:
-        return self.block.add("or", a, b)
-
     def both(self, a: Value, b: Value) -> Value:
         return self.block.add("and", a, b)
 

@@ -9,10 +9,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
+import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import PyTree
+from jaxtyping import Array, PyTree
 
+from jaxbiped._types import Numbers
 from jaxbiped.compiler.codegen._lane_kernel import ENTRY, kernel_text
 from jaxbiped.compiler.codegen._lane_scheduler import FIELDS
 from jaxbiped.compiler.runtime._buffer_pool import BufferPool
@@ -45,6 +47,17 @@ class Recorded(NamedTuple):
 
     values: np.ndarray
     counts: np.ndarray
+
+    @property
+    def room(self) -> int:
+        """For how many records there was room."""
+        return int(self.values.shape[-2])
+
+    def columns(self, first: Numbers) -> list[Array]:
+        """Of one simulation, as `Recording.columns`."""
+        known = jnp.arange(self.room) < self.counts
+        rows = jnp.where(known[:, None], self.values, jnp.nan)
+        return list(jnp.concatenate([jnp.asarray(first)[None], rows]).T)
 
 
 class Ran(NamedTuple):

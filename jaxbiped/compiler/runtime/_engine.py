@@ -1,12 +1,14 @@
 """Engines: what runs programs. Each tells what it cannot do, and runs what it can."""
 
 import abc
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._types import Scalar
 from jaxbiped.compiler.runtime._compiled_program import Recorded
 from jaxbiped.compiler.runtime._primitive import Recording
 from jaxbiped.compiler.runtime._program import Program
@@ -23,12 +25,12 @@ class Request(NamedTuple):
         inputs: of one simulation; of a `batch` NumPy's arrays with a leading axis of n.
         room: records that each simulation has room for.
         times: increasing times of the records, shape (m,), where the program has such.
-        stream: rows that the program reads: an array (rows, numbers), or the `Recording` of
-            another simulation.
+        stream: rows that the program reads: an array (rows, numbers), or the `Recording` or
+            `Recorded` of another simulation by the same engine.
         quick: whether a single simulation is over before a user could interrupt.
         batch: whether the inputs are those of n simulations; they are not traced.
-        keeps_records: whether records stay on the host as a `Recording`, which `reads_once` says
-            is read but once.
+        keeps_records: whether records are for another simulation to read; by lanes they stay on
+            the host as a `Recording`, which `reads_once` says is read but once.
     """
 
     program: Program
@@ -54,12 +56,12 @@ class Result(NamedTuple):
     Attributes:
         outputs: of the program's `finish`; of a batch NumPy's arrays (n, …).
         records: as arrays.
-        recording: of records that stay on the host.
+        recording: of records that another simulation may read.
     """
 
     outputs: PyTree
     records: Recorded | None = None
-    recording: Recording | None = None
+    recording: Recording | Recorded | None = None
 
 
 class AbstractEngine(abc.ABC):
@@ -72,3 +74,10 @@ class AbstractEngine(abc.ABC):
     @abc.abstractmethod
     def run(self, request: Request) -> Result:
         """Runs a request that it can run, at once or as part of a program of JAX."""
+
+    @abc.abstractmethod
+    def jacobian(
+        self, function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]
+    ) -> Scalar:
+        """Derivatives of scalars with respect to scalars, shape (outputs, inputs), in the way that
+        makes the better program here."""

@@ -1,11 +1,15 @@
 """Lane engine: programs as vector machine code for the host's CPU, one simulation a lane."""
 
+from collections.abc import Callable, Sequence
+
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
+from jaxbiped._types import Scalar
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
+from jaxbiped.compiler.passes._vertex_elimination import jacobian
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result, Shapes
 from jaxbiped.compiler.runtime._primitive import Schedule, call, call_recording
@@ -55,6 +59,12 @@ class LaneEngine(AbstractEngine):
             quick=quick,
         )
         return Result(outputs, records)
+
+    def jacobian(
+        self, function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]
+    ) -> Scalar:
+        """By eliminating vertices: fewest operations."""
+        return jacobian(function, inputs)
 
     def compile(self, request: Request) -> CompiledProgram:
         """The compiled program of requests with inputs of these shapes, traced when needed."""

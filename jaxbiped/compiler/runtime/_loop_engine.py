@@ -1,5 +1,7 @@
 """Loop engine: the same programs as loops that XLA compiles, on every device."""
 
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TypeAlias
 
 import jax
@@ -16,8 +18,8 @@ from jaxbiped.compiler.runtime._program import Program
 
 _ROUND = 128
 """Attempted steps after which slots that are over take the next simulations."""
-_Loop: TypeAlias = tuple[PyTree, Scalar, Scalar, list[Array]]
-"""What is carried, whether it is over, records so far and the arrays that hold them."""
+_Loop: TypeAlias = tuple[PyTree, Scalar, Scalar, Scalar, Array | None]
+"""What is carried, whether it is over, attempts and records so far, and the array of these."""
 
 
 class LoopEngine(AbstractEngine):
@@ -35,46 +37,71 @@ class LoopEngine(AbstractEngine):
         """None, or which part of a request only lanes have."""
         if request.times is not None or request.program.scheduled:
             return "records at given times are the lanes'"
-        if request.stream is not None or request.program.stream:
-            return "programs that read a stream are the lanes'"
-        if request.keeps_records or (request.batch and request.room):
-            return "records that stay on the host, or of a batch, are the lanes'"
+        if request.batch and (request.room or request.program.stream):
+            return "records and streams of a batch are the lanes'"
         return None
 
     def run(self, request: Request) -> Result:
         """See `AbstractEngine.run`."""
         if request.batch:
             return Result(_run_batch(request.program, request.inputs, self.slots))
-        return Result(*_run_one(request.program, request.inputs, request.room))
+        outputs, records = _run_one(request.program, request.inputs, request.stream, request.room)
+        return Result(outputs, records, records if request.keeps_records else None)
+
+    def jacobian(
+        self, function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]
+    ) -> Scalar:
+        """By reverse mode, all outputs at once: XLA compiles that in two thirds of the time."""
+        outputs, pull = jax.vjp(function, list(inputs))
+        found = jax.vmap(lambda *row: pull(list(row))[0])(*jnp.eye(len(outputs)))
+        return jnp.stack(found, axis=-1)
 
 
 @cached_jit
-def _run_one(program: Program, inputs: PyTree, room: int) -> tuple[PyTree, Recorded | None]:
+def _run_one(
+    program: Program, inputs: PyTree, stream: Recorded | Array | None, room: int
+) -> tuple[PyTree, Recorded | None]:
     first = program.start(inputs)
     never = jnp.asarray(jnp.inf)
-    records: list[Array] = []
+    records = None
+    if isinstance(stream, jax.Array):
+        stream = Recorded(stream, jnp.asarray(len(stream)))  # type: ignore[arg-type]
     if program.record is not None:
-        _, values = jax.eval_shape(program.record, inputs, first, never)
-        records = [jnp.zeros(room, value.dtype) for value in values]
+        _, row = jax.eval_shape(partial(_record, program), inputs, first, never)
+        records = jnp.zeros((room, *row.shape), row.dtype)
+
+    def read(attempts: Scalar) -> tuple[Array, ...]:
+        """The row that an attempt reads, if any."""
+        if stream is None:
+            return ()
+        last = jnp.asarray(stream.counts) - 1
+        place = jnp.minimum(attempts, last)
+        place = last - place if program.backwards else place
+        return (jax.lax.dynamic_index_in_dim(jnp.asarray(stream.values), place, keepdims=False),)
 
     def advance(loop: _Loop) -> _Loop:
-        now, _, count, kept = loop
-        after, over = program.attempt(inputs, now)
-        if program.record is not None:
-            is_one, values = program.record(inputs, after, never)
+        now, _, attempts, count, kept = loop
+        after, over = program.attempt(inputs, now, *read(attempts))
+        if kept is not None:
+            is_one, row = _record(program, inputs, after, never)
             # Where there is none, the place is past the end, and nothing is written.
-            place = jnp.where(is_one, count, room)
-            kept = [
-                each.at[place].set(value, mode="drop")
-                for each, value in zip(kept, values, strict=True)
-            ]
+            kept = kept.at[jnp.where(is_one, count, room)].set(row, mode="drop")
             count = count + is_one.astype(count.dtype)
-        return after, over, count, kept
+        return after, over, attempts + 1, count, kept
 
-    begin = (first, jnp.asarray(False), jnp.asarray(0), records)
-    end, _, count, kept = jax.lax.while_loop(lambda loop: ~loop[1], advance, begin)
-    recorded = None if program.record is None else Recorded(jnp.stack(kept, axis=-1), count)  # type: ignore[arg-type]
+    begin = (first, jnp.asarray(False), jnp.asarray(0), jnp.asarray(0), records)
+    end, _, _, count, kept = jax.lax.while_loop(lambda loop: ~loop[1], advance, begin)
+    recorded = None if kept is None else Recorded(kept, count)  # type: ignore[arg-type]
     return program.finish(inputs, end), recorded
+
+
+def _record(
+    program: Program, inputs: PyTree, now: PyTree, next_time: Scalar
+) -> tuple[Scalar, Array]:
+    """Whether there is something to record, and its numbers one behind the other."""
+    assert program.record is not None
+    is_one, values = program.record(inputs, now, next_time)
+    return is_one, jnp.concatenate([jnp.ravel(value) for value in values])
 
 
 def _run_batch(program: Program, inputs: PyTree, slots: int) -> PyTree:

@@ -67,6 +67,11 @@ class Recording(eqx.Module):
     numbers: Numbers
     recorder: Recorder = eqx.field(static=True)
 
+    @property
+    def room(self) -> int:
+        """For how many records there was room."""
+        return self.recorder.room
+
     def columns(self, first: Numbers) -> list[Array]:
         """For each of the first k numbers `first`'s and then those recorded, NaN beyond the last.
 
@@ -129,14 +134,8 @@ def _params(
     recorder: Recorder | None = None,
 ) -> dict[str, Any]:
     """Of the operation: what is run and how, and which part of what that gives is wanted."""
-    return dict(
-        compiled=compiled,
-        schedule=schedule,
-        room=room,
-        quick=quick,
-        wants=wants,
-        recorder=recorder,
-    )
+    how = dict(compiled=compiled, schedule=schedule, room=room, quick=quick)
+    return how | dict(wants=wants, recorder=recorder)
 
 
 def _numbers(inputs: PyTree) -> Numbers:

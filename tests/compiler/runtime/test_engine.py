@@ -70,7 +70,67 @@ def test_engines_say_what_hinders():
     assert XLA.can(Request(ROOT, number)) is None
     assert "'erf'" in LANES.can(Request(ERF, number))
     assert XLA.can(Request(ERF, number)) is None
-    assert LANES.can(Request(STREAM, number)) is None
-    assert "read a stream" in XLA.can(Request(STREAM, number))
     assert "given times" in XLA.can(Request(ROOT, number, times=np.ones(2)))
-    assert "stay on the host" in XLA.can(Request(RECORDED, number, room=3, keeps_records=True))
+    for program in (STREAM, RECORDED):
+        several = Request(program, np.ones(2), room=3, batch=True)
+        assert LANES.can(several) is None
+        assert "of a batch" in XLA.can(several)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("engine", ENGINES)
+def test_one_simulation_reads_what_another_recorded(engine, backwards):
+    """Newton's iterates towards √x in the order that they come in, or from the last one on."""
+
+    def attempt(given, carried, row):
+        digits, read = carried
+        return (digits * 10.0 + row[0], read + 1.0), read + 1.0 >= given
+
+    reader = Program(
+        lambda given: (jnp.zeros(()), jnp.zeros(())),
+        attempt,
+        lambda given, carried: carried[0],
+        stream=1,
+        backwards=backwards,
+    )
+
+    def both(x):
+        first = engine.run(Request(RECORDED, x, room=30, keeps_records=True))
+        count = first.outputs[1] - 2.0
+        stream = first.recording
+        total = engine.run(Request(reader, count, stream=stream)).outputs
+        return total, count, stream.columns(jnp.zeros(1))[0]
+
+    totals, counts, columns = jax.jit(jax.vmap(both))(jnp.array([16.0, 3e4, 0.5]))
+    for total, count, column in zip(totals, counts, np.asarray(columns), strict=True):
+        iterates = column[1 : int(count) + 1]
+        assert column[0] == 0.0
+        assert np.isnan(column[int(count) + 1 :]).all()
+        order = iterates[::-1] if backwards else iterates
+        expected = np.sum(order * 10.0 ** np.arange(len(order))[::-1])
+        assert float(total) == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_stream_may_be_an_array_and_ends_with_its_last_row(engine):
+    def attempt(given, carried, row):
+        total, read = carried
+        return (total + row[0] * row[1], read + 1.0), read + 1.0 >= given
+
+    zero = lambda given: (jnp.zeros(()), jnp.zeros(()))
+    program = Program(zero, attempt, lambda given, carried: carried[0], stream=2)
+    rows = jnp.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
+    run = lambda most: engine.run(Request(program, jnp.asarray(most), stream=rows)).outputs
+    assert float(run(2.0)) == 14.0
+    assert float(run(5.0)) == 44.0 + 2.0 * 30.0
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_jacobians_of_scalars(engine):
+    def function(z):
+        x, y = z
+        return [x * jnp.sin(y), y / x, x + 0.0 * y]
+
+    found = jax.jit(lambda *z: engine.jacobian(function, z))(2.0, 0.3)
+    expected = [[np.sin(0.3), 2.0 * np.cos(0.3)], [-0.3 / 4.0, 0.5], [1.0, 0.0]]
+    np.testing.assert_allclose(found, expected, rtol=1e-15)

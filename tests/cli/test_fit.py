@@ -1,0 +1,62 @@
+"""`jaxbiped fit`."""
+
+import json
+
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.cli import main
+
+
+def _run(*words):
+    with pytest.raises(SystemExit) as ended:
+        main(["fit", *words])
+    return ended.value.code
+
+
+@pytest.fixture
+def file(tmp_path):
+    gait = jb.find_gait(jb.ladder()["rigid"], parameters=(), radius_sensitivities=False)
+    period, length = float(gait.measures.period), float(gait.measures.step_length)
+    path = tmp_path / "measured.json"
+    held = {"gaits": [{"period_s": [period, 1e-5], "step_length_m": [length, 1e-5]}]}
+    path.write_text(json.dumps(held))
+    return path
+
+
+def test_a_table_and_its_numbers(file, tmp_path, capsys):
+    numbers = tmp_path / "fit.json"
+    words = ("--model", "rigid", "--J", "0.011", "--vary", "J,d", "--json", str(numbers))
+    assert _run(str(file), *words) == 0
+    shown = capsys.readouterr().out
+    held = json.loads(numbers.read_text())
+    truth = float(jb.parameter_values(jb.ladder()["rigid"])["J"])
+    assert held["estimates"]["J"] == pytest.approx(truth, rel=1e-5)
+    assert set(held) >= {"estimates", "standard_errors", "undetermined"}
+    assert "kg m^2" in shown
+    assert "converged" in shown
+
+
+def test_only_json(file, capsys):
+    assert _run(str(file), "--model", "rigid", "--vary", "d", "--json", "-") == 0
+    held = json.loads(capsys.readouterr().out)
+    assert held["undetermined"] == []
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--vary", "stiffness"), "vary = 'stiffness' is not known"),
+        (("--vary", ""), "vary = () is not allowed"),
+        (("--vary", "J", "--json", "/nowhere/fit.json"), "cannot be written"),
+        (("--vary", "J", "--accuracy", "loose"), "accuracy = 'loose' is not known"),
+    ],
+)
+def test_bad_options(file, capsys, words, said):
+    assert _run(str(file), "--model", "rigid", *words) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_missing_file(capsys):
+    assert _run("none.json", "--vary", "J") == 2
+    assert "none.json" in capsys.readouterr().err

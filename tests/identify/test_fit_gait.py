@@ -1,0 +1,176 @@
+"""Parameters found again in gaits that were made from them."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.identify import FitEnding, MeasuredAngles, MeasuredGait
+
+SLOPES = (0.01, 0.03)
+
+
+@pytest.fixture(scope="module")
+def rigid():
+    return jb.ladder()["rigid"]
+
+
+@pytest.fixture(scope="module")
+def gaits(rigid):
+    return [
+        jb.find_gait(jb.with_parameters(rigid, {"slope": slope}), parameters=()) for slope in SLOPES
+    ]
+
+
+def _measured(gaits, noise=(0.0, 0.0), deviation=1e-4):
+    found = []
+    for slope, gait, off in zip(SLOPES, gaits, noise, strict=True):
+        seen = {}
+        for name in ("period", "step_length"):
+            value = float(getattr(gait.measures, name))
+            seen[name] = (value * (1.0 + deviation * off), value * deviation)
+        found.append(MeasuredGait(seen, conditions={"slope": slope}))
+    return found
+
+
+def test_the_truth_is_found_from_afar(rigid, gaits):
+    start = jb.with_parameters(rigid, {"J": 0.012, "d": 0.3})
+    fit = jb.fit_gait(start, ("J", "d"), _measured(gaits))
+    truth = jb.parameter_values(rigid)
+    assert fit.ending is FitEnding.CONVERGED
+    assert fit.undetermined == ()
+    for name, value in fit.estimates.items():
+        assert value == pytest.approx(float(truth[name]), rel=1e-6)
+    assert fit.chi_squared < 1e-6
+    assert fit.freedom == 2
+
+
+def test_standard_errors_are_those_of_refitted_data(rigid, gaits):
+    """The linear propagation of errors against a derivative of the estimates themselves."""
+    step = 0.1
+    ends = [
+        jb.fit_gait(rigid, ("J",), _measured(gaits, noise=(sign * step, 0.0))).estimates["J"]
+        for sign in (1.0, -1.0)
+    ]
+    others = [
+        jb.fit_gait(rigid, ("J",), _measured(gaits, noise=(0.0, sign * step))).estimates["J"]
+        for sign in (1.0, -1.0)
+    ]
+    # Both measures of a gait were moved together: their parts of the estimate's error add up.
+    together = [(pair[0] - pair[1]) / (2.0 * step) for pair in (ends, others)]
+    fit = jb.fit_gait(rigid, ("J",), _measured(gaits))
+    slopes = []
+    for slope in SLOPES:
+        gait = jb.find_gait(jb.with_parameters(rigid, {"slope": slope}), parameters=("J",))
+        for name in ("period", "step_length"):
+            slopes.append(float(getattr(gait.elasticities, name)[0]) / 1e-4)
+    slopes = np.array(slopes)
+    weights = slopes / np.sum(slopes**2)
+    size = float(jb.parameter_values(rigid)["J"])
+    expected = size * np.array([np.sum(weights[:2]), np.sum(weights[2:])])
+    np.testing.assert_allclose(together, expected, rtol=1e-3)
+    assert fit.standard_errors["J"] == pytest.approx(size / np.sqrt(np.sum(slopes**2)), rel=1e-4)
+    low, high = fit.intervals["J"]
+    assert low < size < high
+    assert np.log(high / low) == pytest.approx(2 * 1.959964 * fit.standard_errors["J"] / size)
+
+
+def test_what_the_data_cannot_tell_is_named(rigid, gaits):
+    """Mass scales all forces alike: no time or length depends on it, J and m together apart."""
+    fit = jb.fit_gait(rigid, ("J", "m"), _measured(gaits))
+    assert fit.undetermined == ("J", "m")  # only their ratio enters
+    assert np.isnan(fit.standard_errors["J"])
+    few = MeasuredGait({"period": (0.44, 1e-3)})
+    assert jb.fit_gait(rigid, ("d", "l"), few).undetermined == ("d", "l")
+
+
+def test_angles_over_time(rigid, gaits):
+    """The orbit's own angles give the parameter back, and bind it tighter than two measures do."""
+    gait = gaits[0]
+    times, states = gait.orbit
+    known = np.isfinite(np.asarray(times[0]))
+    chosen = np.flatnonzero(known)[2:-1:4]
+    angles = MeasuredAngles(
+        times=np.asarray(times[0])[chosen],
+        deviation=1e-4,
+        theta_1=np.asarray(states.theta_1[0])[chosen],
+        theta_2=np.asarray(states.theta_2[0])[chosen],
+    )
+    seen = MeasuredGait({}, conditions={"slope": SLOPES[0]}, angles=angles)
+    fit = jb.fit_gait(jb.with_parameters(rigid, {"J": 0.0085}), ("J",), seen)
+    truth = float(jb.parameter_values(rigid)["J"])
+    assert fit.ending is FitEnding.CONVERGED
+    assert fit.estimates["J"] == pytest.approx(truth, rel=1e-5)
+    assert fit.standard_errors["J"] < 0.01 * truth
+
+
+def test_a_start_without_a_gait_is_told(gaits):
+    steep = jb.with_parameters(jb.ladder()["rigid"], {"slope": 1.0})
+    fit = jb.fit_gait(steep, ("J",), MeasuredGait({"period": (0.44, 1e-3)}))
+    assert fit.ending is FitEnding.NO_GAIT
+    assert np.isnan(fit.residuals).all()
+    assert fit.undetermined == ("J",)
+
+
+def test_bounds_are_kept(rigid, gaits):
+    value = float(jb.parameter_values(rigid)["J"])
+    start = jb.with_parameters(rigid, {"J": 1.2 * value})
+    fit = jb.fit_gait(start, {"J": (1.1 * value, 1.5 * value)}, _measured(gaits))
+    assert fit.estimates["J"] == pytest.approx(1.1 * value, rel=1e-3)
+    assert fit.estimates["J"] >= 1.1 * value
+
+
+def test_a_parameter_that_is_zero_is_fitted_within_bounds():
+    """Above zero by a twentieth of the bounds' width."""
+    scene = jb.with_parameters(jb.ladder()["rigid"], {"hip_mass": 0.1})
+    gait = jb.find_gait(scene, parameters=())
+    value = float(gait.measures.period)
+    start = jb.with_parameters(scene, {"hip_mass": 0.0})
+    seen = MeasuredGait({"period": (value, 1e-4 * value)})
+    fit = jb.fit_gait(start, {"hip_mass": (0.0, 2.0)}, seen)
+    assert fit.ending is FitEnding.CONVERGED
+    assert fit.estimates["hip_mass"] == pytest.approx(0.1, rel=1e-5)
+
+
+def test_evaluations_are_limited(rigid, gaits):
+    start = jb.with_parameters(rigid, {"J": 0.013})
+    fit = jb.fit_gait(start, ("J",), _measured(gaits), max_evaluations=2)
+    assert fit.ending is FitEnding.OUT_OF_EVALUATIONS
+    assert np.isfinite(fit.estimates["J"])
+
+
+SEEN = MeasuredGait({"period": (0.44, 1e-3)}, conditions={"slope": 0.02})
+
+
+@pytest.mark.parametrize(
+    ("vary", "measured", "said"),
+    [
+        ((), SEEN, r"vary = \(\) is not allowed"),
+        (("stiffness",), SEEN, "vary = 'stiffness' is not known: choose one of"),
+        ({"J": (0.2, 0.1)}, SEEN, r"vary\['J'\] = \(0.2, 0.1\) is not allowed"),
+        ({"J": (0.2, 0.3)}, SEEN, "does not hold the scene's own J = 0.0096"),
+        ({"J": (-1.0, 0.3)}, SEEN, "must have the sign"),
+        (("hip_mass",), SEEN, "own hip_mass is 0, which tells no size"),
+        (("J",), [], r"measured = \[\] is not allowed"),
+        (("slope",), SEEN, "slope is both known"),
+        (("J",), MeasuredGait({"period": (1.0, 1.0)}, conditions={"m": -1.0}), "m = -1"),
+    ],
+)
+def test_bad_arguments(rigid, vary, measured, said):
+    with pytest.raises(jb.ArgumentError, match=said):
+        jb.fit_gait(rigid, vary, measured)
+
+
+def test_compliant_parameters_are_found_and_xi_is_not():
+    scene = jb.seed_scene()
+    gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
+    seen = {
+        name: (float(getattr(gait.measures, name)), share * float(getattr(gait.measures, name)))
+        for name, share in {"period": 1e-5, "step_length": 1e-4, "peak_normal": 1e-3}.items()
+    }
+    start = jb.with_parameters(scene, {"K": jnp.asarray(1.2e6), "c": jnp.asarray(0.9e7)})
+    fit = jb.fit_gait(start, ("K", "c", "xi"), MeasuredGait(seen), engine="lanes")
+    assert fit.ending is FitEnding.CONVERGED
+    assert fit.undetermined == ("xi",)
+    assert fit.estimates["K"] == pytest.approx(1e6, rel=1e-3)
+    assert fit.estimates["c"] == pytest.approx(1e7, rel=1e-3)

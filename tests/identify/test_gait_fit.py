@@ -1,0 +1,41 @@
+"""What residuals tell of parameters."""
+
+import numpy as np
+
+from jaxbiped.identify._gait_fit import information
+
+EXACT = np.zeros((6, 3))
+
+
+def test_covariance_is_that_of_least_squares():
+    slopes = np.random.default_rng(1).standard_normal((6, 3)) * [1e3, 5.0, 1e6]
+    found = information(slopes, EXACT)
+    assert not found.undetermined.any()
+    np.testing.assert_allclose(found.covariance, np.linalg.inv(slopes.T @ slopes), rtol=1e-8)
+
+
+def test_what_others_make_up_for_is_undetermined():
+    slopes = 100.0 * np.random.default_rng(2).standard_normal((6, 3))
+    slopes[:, 2] = 2.0 * slopes[:, 1]
+    found = information(slopes, EXACT)
+    np.testing.assert_array_equal(found.undetermined, [False, True, True])
+    alone = slopes[:, 0]
+    assert np.isclose(found.covariance[0, 0], 1.0 / (alone @ alone))
+
+
+def test_a_derivative_below_its_own_error_tells_nothing():
+    slopes = 100.0 * np.random.default_rng(3).standard_normal((6, 3))
+    errors = EXACT.copy()
+    errors[:, 1] = 60.0
+    np.testing.assert_array_equal(information(slopes, errors).undetermined, [False, True, False])
+
+
+def test_a_wide_error_is_dropped_and_the_rest_stays():
+    slopes = np.diag([100.0, 0.1, 50.0])
+    found = information(slopes, np.zeros((3, 3)))
+    np.testing.assert_array_equal(found.undetermined, [False, True, False])
+    assert np.isclose(found.covariance[2, 2], 1.0 / 2500.0)
+
+
+def test_nothing_measured_tells_nothing():
+    assert information(np.zeros((4, 2)), np.zeros((4, 2))).undetermined.all()
