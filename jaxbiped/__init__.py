@@ -17,6 +17,7 @@ _jax.config.update("jax_enable_x64", True)
 # Namespaces.
 from jaxbiped import basins as basins
 from jaxbiped import constraints as constraints
+from jaxbiped import continuation as continuation
 from jaxbiped import dynamics as dynamics
 from jaxbiped import gait as gait
 from jaxbiped import identify as identify
@@ -83,6 +84,9 @@ from jaxbiped.gait._gradient_modes import Implicit as Implicit
 from jaxbiped.gait._gradient_modes import Reverse as Reverse
 from jaxbiped.gait._return_map import return_map as return_map
 from jaxbiped.gait._rolling_starts import rolling_starts as rolling_starts
+
+# Branches of gaits.
+from jaxbiped.continuation._continue_gait import continue_gait as continue_gait
 
 # Identification.
 from jaxbiped.identify._fit_gait import fit_gait as fit_gait

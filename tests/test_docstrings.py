@@ -21,6 +21,7 @@ NAMESPACES = {
             "constraints",
             "dynamics",
             "gait",
+            "continuation",
             "measure",
             "solvers",
             "basins",
@@ -104,7 +105,14 @@ def _examples():
             yield pytest.param(example, id=each.id, marks=slow)
 
 
-COMPILING = {"jb.simulate", "jb.footsteps", "jb.energy_ledger", "jb.find_gait", "jb.rigid_walk"}
+COMPILING = {
+    "jb.continue_gait",
+    "jb.simulate",
+    "jb.footsteps",
+    "jb.energy_ledger",
+    "jb.find_gait",
+    "jb.rigid_walk",
+}
 """Functions whose examples compile a walk or a gait."""
 EXAMPLES = list(_examples())
 

@@ -114,7 +114,7 @@ def test_flags_of_the_command_line_exist(capsys):
     from jaxbiped.cli import main
 
     helps = ""
-    for command in ("walk", "gait", "fit", "basin", "models", "constraints"):
+    for command in ("walk", "gait", "continue", "fit", "basin", "models", "constraints"):
         with pytest.raises(SystemExit):
             main([command, "--help"])
         helps += "".join(capsys.readouterr())
