@@ -26,6 +26,7 @@ NAMESPACES = {
             "solvers",
             "basins",
             "starts",
+            "optimise",
             "plot",
         )
     },
