@@ -103,7 +103,7 @@ def test_a_passive_gait_costs_the_slopes_sine():
 def test_costs_count_motors_where_they_drive(driven, rolled):
     scene, walk = driven
     found = jb.measure.cost_of_transport(scene, walk)
-    strikes = jb.heel_strikes(scene, walk).time_s
+    strikes = jb.measure.heel_strikes(scene, walk).time_s
     books = jb.energy_ledger(scene, walk, strikes)
     np.testing.assert_allclose(found.gravity_work, books.gravity_work, rtol=1e-12)
     weight = float(scene.walker.total_mass * scene.ground.g)
