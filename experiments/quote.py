@@ -162,6 +162,18 @@ def of_force_models(numbers: dict[str, Any]) -> Iterator[str]:
     yield f"(off by {numbers['normal']['tsuji']['unit_multiplier_error']:.2f})"
 
 
+def of_level_ground(numbers: dict[str, Any]) -> Iterator[str]:
+    """What the simplest walker's push-off saves, and what drives of the seed's walker cost."""
+    pairs = numbers["simplest"]
+    yield f"{pairs[0]['ratio']:.2f} times at a half-angle of {pairs[0]['angle_rad']:.2f} rad"
+    yield f"{pairs[-1]['ratio']:.2f} times at {pairs[-1]['angle_rad']:.2f} rad"
+    for name, curve in numbers["seed"].items():
+        stable = [point for point in curve if point["stable"]]
+        ends = [pick(stable, key=lambda point: point["speed_m_s"]) for pick in (min, max)]
+        speeds = [f"{end['speed_m_s']:.3f}" for end in ends]
+        yield row(name, *speeds, *[small(end["cost_of_transport"], 2) for end in ends])
+
+
 def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
     """How many scenes were searched, in how many walks settle, and how many were missed."""
     rows = [each for family in numbers.values() for each in family]
@@ -210,6 +222,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "gradient_accuracy": of_gradient_accuracy,
     "identify": of_identify,
     "ladder": of_ladder,
+    "level_ground": of_level_ground,
     "period_doubling": of_period_doubling,
     "search_robustness": of_search_robustness,
     "slope_branch": of_slope_branch,

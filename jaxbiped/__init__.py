@@ -22,6 +22,8 @@ from jaxbiped import dynamics as dynamics
 from jaxbiped import gait as gait
 from jaxbiped import identify as identify
 from jaxbiped import measure as measure
+from jaxbiped import optimise as optimise
+from jaxbiped.scene import actuation as actuation
 from jaxbiped.scene import laws as laws
 from jaxbiped.solve import solvers as solvers
 from jaxbiped.sweep import starts as starts
@@ -103,6 +105,9 @@ from jaxbiped.sweep._nearest_failure import nearest_failure as nearest_failure
 from jaxbiped.sweep._prepare import labelling as labelling
 from jaxbiped.sweep._prepare import with_gaits_met as with_gaits_met
 from jaxbiped.sweep._sweep import sweep as sweep
+
+# Optimisation.
+from jaxbiped.optimise._optimise_gait import optimise_gait as optimise_gait
 
 
 def __getattr__(name: str) -> _Any:

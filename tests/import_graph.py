@@ -21,6 +21,7 @@ LAYERS = [
     "identify",
     "basins",
     "sweep",
+    "optimise",
     "plot",
     "cli",
 ]

@@ -16,6 +16,7 @@ NAMESPACES = {
     **{
         f"jb.{name}": getattr(jb, name)
         for name in (
+            "actuation",
             "laws",
             "constraints",
             "dynamics",
@@ -25,6 +26,7 @@ NAMESPACES = {
             "solvers",
             "basins",
             "starts",
+            "optimise",
             "plot",
         )
     },

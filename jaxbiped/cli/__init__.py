@@ -16,6 +16,7 @@ from jaxbiped.cli._continue import ContinueGait
 from jaxbiped.cli._fit import Fit
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
+from jaxbiped.cli._optimise import Optimise
 from jaxbiped.cli._refusal import one_sentence
 from jaxbiped.cli._report import Report as Report
 from jaxbiped.cli._walk import Walk
@@ -26,6 +27,7 @@ _Command = (
     | Annotated[ContinueGait, subcommand("continue")]
     | Annotated[Fit, subcommand("fit")]
     | Annotated[Basin, subcommand("basin")]
+    | Annotated[Optimise, subcommand("optimise")]
     | Annotated[Models, subcommand("models")]
     | Annotated[Constraints, subcommand("constraints")]
     | Annotated[None, subcommand("version")]

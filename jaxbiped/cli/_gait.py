@@ -13,6 +13,7 @@ from tyro.conf import OmitArgPrefixes
 from jaxbiped import _clock
 from jaxbiped._checks import check_choice, check_count
 from jaxbiped._types import JsonObject
+from jaxbiped.cli._driven import cost_sentence, gait_cost
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.dynamics._rigid_checks import rigid_checks
@@ -89,11 +90,15 @@ class FindGait:
         numbers = gait_numbers(gait) | {"search": explain_search(scene, gait), "wall_s": wall}
         if found and isinstance(scene, RigidScene):
             numbers["assumptions"] = _assumptions(scene, gait)
+        cost = gait_cost(scene, gait, self.footsteps) if found else {}
+        numbers |= cost
         report = Report(self.output.json)
         if found:
             _print(report, numbers, gait)
             if "assumptions" in numbers:
                 report.say(_assumption_line(numbers["assumptions"]))
+            if cost:
+                report.say(cost_sentence(cost))
         else:
             report.say(_failure(numbers, gait))
         if found and self.output.out is not None:
@@ -129,7 +134,7 @@ def gait_numbers(gait: Gait) -> JsonObject:
         "peak_normal_N": float(measures.peak_normal),
         "state": {name: float(value) for name, value in measures.state._asdict().items()},
         "residual": float(gait.residual),
-        "multipliers": [_parts(value) for value in values],
+        "multipliers": [parts(value) for value in values],
         "multiplier_errors": np.asarray(gait.multiplier_errors).tolist(),
         "unit_multiplier_error": float(gait.unit_multiplier_error),
         "spectral_radius": float(measures.spectral_radius),
@@ -153,10 +158,10 @@ def gait_numbers(gait: Gait) -> JsonObject:
         "solver_steps": int(gait.solver_steps),
         "engine": gait.engine,
     }
-    return _finite(numbers)
+    return finite(numbers)
 
 
-def _parts(value: complex) -> list[float]:
+def parts(value: complex) -> list[float]:
     """Real and imaginary part, both NaN where the number is not known."""
     return [value.real, value.imag] if np.isfinite(value) else [math.nan, math.nan]
 
@@ -172,12 +177,12 @@ def _by_parameter(parameters: tuple[str, ...], values: Measures) -> dict[str, di
     }
 
 
-def _finite(thing: Any) -> Any:
+def finite(thing: Any) -> Any:
     """The same with None for every number that is not finite."""
     if isinstance(thing, dict):
-        return {key: _finite(value) for key, value in thing.items()}
+        return {key: finite(value) for key, value in thing.items()}
     if isinstance(thing, list):
-        return [_finite(value) for value in thing]
+        return [finite(value) for value in thing]
     return None if isinstance(thing, float) and not math.isfinite(thing) else thing
 
 

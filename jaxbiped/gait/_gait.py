@@ -21,6 +21,7 @@ from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._stability import Bifurcation
+from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameters import parameter_quantities
 
@@ -61,6 +62,8 @@ class Gait(eqx.Module):
         ending: code of a `Search`; `outcome` names it.
         walk_ending: code of the `Ending` of the last trial that did not return; 0 where all did.
         measures: period, step length, speed, peak force, spectral radius and state.
+        measure_errors: their estimated errors: what Newton's last correction and a ten times
+            looser solve change; the spectral radius's is the leading multiplier's.
         residual: largest change of a component of the state over the cycle, SI units.
         multipliers: Floquet multipliers, largest first, without the trivial one; shape (m − 1,).
         multiplier_errors: their estimated errors, shape (m − 1,).
@@ -91,6 +94,7 @@ class Gait(eqx.Module):
     ending: Scalar
     walk_ending: Scalar
     measures: Measures
+    measure_errors: Measures
     residual: Scalar
     multipliers: Scalar
     multiplier_errors: Scalar
@@ -191,6 +195,7 @@ def summarise_gait(
         ending=found.ending,
         walk_ending=found.code,
         measures=measures,
+        measure_errors=known(_measure_errors(measures, orbit)),
         residual=found.residual,
         multipliers=known(stability.multipliers),
         multiplier_errors=known(stability.errors),
@@ -216,6 +221,31 @@ def summarise_gait(
         engine=spec.engine,
         quantities=tuple(map(parameter_quantities(scene).__getitem__, names)),
     )
+
+
+def _measure_errors(measures: Measures, orbit: Orbit) -> Measures:
+    """What Newton's last correction and a looser solve change in the measures."""
+    fine, coarse = (_at_fixed_point(each, orbit) for each in (orbit.found.last, orbit.found.coarse))
+
+    def change(told: Scalar, fine: Scalar, coarse: Scalar) -> Scalar:
+        return jnp.abs(told - fine) + jnp.abs(fine - coarse)
+
+    errors = jtu.tree_map(change, measures, fine, coarse)
+    return errors._replace(spectral_radius=orbit.stability.errors[0])
+
+
+def _at_fixed_point(once: LinearisedReturn, orbit: Orbit) -> Measures:
+    """Measures of a return, linearly extrapolated to its own fixed point."""
+    m = orbit.found.recurring.shape[0]
+    assert once.nodes is not None
+    # A row is time, hip_x and then all that must return.
+    begun = once.nodes.start.reshape(-1, 2 + m)[0, 2:]
+    correction = solve(jnp.eye(m) - once.jacobian[:, :m], once.recurring - begun)
+    period = once.period + once.period_row[:m] @ correction
+    length = once.advance[0] + once.advance_rows[0, :m] @ correction
+    peak = once.peak + once.peak_row[:m] @ correction
+    state = type(orbit.state)(jnp.zeros_like(period), *(begun + correction))
+    return Measures(period, length, length / period, peak, orbit.stability.spectral_radius, state)
 
 
 def _path(last: LinearisedReturn, like: WalkerState) -> tuple[Scalar, PyTree]:

@@ -41,7 +41,8 @@ def second_variation(
         last: the return, with its nodes.
         leading: v directions of the m recurring components, those of the leading eigenpair, which
             move no parameter; (v, m).
-        weights: of the recurring components of each one's second derivatives, (v, m).
+        weights: of the recurring components of each one's second derivatives, (v, m), or of all
+            components, (v, c).
         tangents: p other directions, each of which moves one active parameter, shape (m, p).
         sizes: by how much, shape (p,).
 
@@ -64,8 +65,9 @@ def second_variation(
         if k + 1 < spec.steps:
             before = flow.earlier(nodes.arrival, parameters)[1:]
             along = _after_reset(flow, before, parameters, arrived.leading)
-    second = jnp.zeros((len(weights), c)).at[:, places].set(weights)
-    adjoints = Adjoints(second, jnp.zeros(c), jnp.zeros(p))
+    if weights.shape[1] != c:
+        weights = jnp.zeros((len(weights), c)).at[:, places].set(weights)
+    adjoints = Adjoints(weights, jnp.zeros(c), jnp.zeros(p))
     for k, (nodes, arrived, steps) in reversed(list(enumerate(carried))):
         final = k + 1 == spec.steps
         adjoints = pull_back(engine, flow, nodes, arrived, steps, adjoints, final=final)

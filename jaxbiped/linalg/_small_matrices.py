@@ -28,3 +28,10 @@ def eigenpairs(matrix: Scalar) -> tuple[Scalar, Scalar]:
     """Eigenvalues (n,) and right eigenvectors, its columns."""
     values, vectors = jax.lax.linalg.eig(matrix, compute_left_eigenvectors=False)
     return values, vectors
+
+
+@sequential_vmap
+def singular_pairs(matrix: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """Left vectors (columns), singular values and right vectors (rows) of (n, k), n at least k."""
+    left, values, right = jnp.linalg.svd(matrix, full_matrices=False)
+    return left, values, right

@@ -1,0 +1,257 @@
+"""`jaxbiped optimise`: the parameters within bounds whose gait is best, and what certifies it."""
+
+import dataclasses
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from tyro.conf import OmitArgPrefixes
+
+from jaxbiped._checks import ArgumentError, check_choice, check_not_negative, check_writable_file
+from jaxbiped._types import JsonObject
+from jaxbiped.cli._gait import finite, parts
+from jaxbiped.cli._report import Report, table
+from jaxbiped.cli._walk_options import SceneOptions
+from jaxbiped.optimise._certificate import Certificate, certify
+from jaxbiped.optimise._objectives import OBJECTIVES
+from jaxbiped.optimise._optimise_gait import Optimum, optimise_gait
+from jaxbiped.optimise._optimisers import OPTIMISERS
+from jaxbiped.optimise._runs import Outcome
+from jaxbiped.scene._parameters import parameter_names, parameter_quantities, parameter_values
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+
+_USUAL_RANGE = 2.0
+"""Factor to both sides of a parameter's own value that it varies by unless bounds are given."""
+_MOST_ROWS = 64
+
+
+@dataclasses.dataclass(frozen=True)
+class Optimise:
+    """Find the parameters within bounds whose periodic gait is best, and certify it."""
+
+    vary: str
+    """Parameters that vary, d,r,J (half to double their values) or with bounds d=0.05:0.2,r,J."""
+    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
+        default_factory=SceneOptions
+    )
+    maximise: str | None = None
+    """Measure of the gait to maximise, such as speed."""
+    minimise: str | None = None
+    """Or to minimise, such as spectral_radius."""
+    subject_to: tuple[str, ...] = ()
+    """What must hold, such as "spectral_radius<0.4" "step_length>0.2"."""
+    optimiser: str = "trust-region"
+    """trust-region, slsqp, trust-constr, or without requirements optax."""
+    iterations: int = 200
+    """Most iterations of a run."""
+    restarts: int = 0
+    """Further runs, from the best of scattered designs."""
+    seed: int = 0
+    """Seed of these designs."""
+    accuracy: str = "balanced"
+    """How accurately to solve: balanced or tight."""
+    engine: str = "auto"
+    """What computes: xla, lanes, or auto for the faster one that can."""
+    basin: int = 1024
+    """Starts about the gait that are labelled for the certificate's basin; 0 for none."""
+    footsteps: int = 200
+    """Footsteps of the certificate's walk from a pushed start; 0 for none."""
+    other_engine: bool = False
+    """Whether the certificate also finds the gait by the other engine (compiles for minutes)."""
+    store: Path | None = None
+    """File that keeps every evaluation; the same command goes on from it."""
+    json: Path | None = None
+    """File for the numbers in SI units; - prints only them."""
+
+    def run(self) -> int:
+        """Runs the command; returns the exit code."""
+        scene = self.scene.scene()
+        if isinstance(scene, RedundantScene):
+            raise ArgumentError(
+                "formulation = redundant is not allowed here: how the hip is held makes no "
+                "difference to a gait; choose minimal."
+            )
+        check_choice("optimiser", self.optimiser, OPTIMISERS)
+        check_not_negative("basin", self.basin)
+        check_not_negative("footsteps", self.footsteps)
+        if self.json is not None and str(self.json) != "-":
+            check_writable_file("--json", self.json)
+        found = optimise_gait(
+            scene,
+            vary=_bounds(scene, self.vary),
+            maximise=self.maximise,
+            minimise=self.minimise,
+            subject_to=self.subject_to or None,
+            optimiser=self.optimiser,
+            iterations=self.iterations,
+            restarts=self.restarts,
+            seed=self.seed,
+            accuracy=self.accuracy,
+            engine=self.engine,
+            progress=sys.stderr.isatty(),
+            store=self.store,
+        )
+        certificate = certify(
+            found, starts=self.basin, footsteps=self.footsteps, other_engine=self.other_engine
+        )
+        goal = self.minimise if self.maximise is None else self.maximise
+        sense = "minimise" if self.maximise is None else "maximise"
+        assert goal is not None
+        numbers = optimum_numbers(found, certificate, goal, sense)
+        report = Report(self.json)
+        _print(report, scene, found, certificate, goal)
+        report.finish(numbers)
+        return 0 if found.outcome in (Outcome.CONVERGED, Outcome.CORNER) else 1
+
+
+def _bounds(scene: Scene | RigidScene, text: str) -> dict[str, tuple[float, float]]:
+    """Bounds by name from d=0.05:0.2,r,J."""
+    own, found = parameter_values(scene), {}
+    for part in text.split(","):
+        name, given, bounds = (each.strip() for each in part.partition("="))
+        check_choice("vary", name, parameter_names(scene))
+        if not given:
+            value = float(own[name])
+            if value <= 0.0:
+                raise ArgumentError(
+                    f"vary = {name} needs bounds, as its value is {value:g}: write {name}=low:high."
+                )
+            found[name] = (value / _USUAL_RANGE, value * _USUAL_RANGE)
+            continue
+        low, colon, high = bounds.partition(":")
+        try:
+            if not colon:
+                raise ValueError
+            found[name] = (float(low), float(high))
+        except ValueError:
+            raise ArgumentError(
+                f"vary = {part.strip()!r} is not understood: write {name}=low:high."
+            ) from None
+    return found
+
+
+def optimum_numbers(found: Optimum, certificate: Certificate, goal: str, sense: str) -> JsonObject:
+    """What is known of an optimum in SI units, ready for JSON."""
+    numbers: JsonObject = {
+        "outcome": str(found.outcome),
+        "message": found.message,
+        "variables": found.variables,
+        "objective": {
+            "name": goal,
+            "sense": sense,
+            "value": found.objective,
+            "error": found.error,
+            "unit": OBJECTIVES[goal].quantity.unit,
+        },
+        "measures": {
+            name: {"value": value, "error": found.known.errors[name]}
+            for name, value in found.known.values.items()
+        },
+        "history": [each._asdict() for each in found.history],
+        "evaluations": found.evaluations,
+        "lost": found.lost,
+        "certificate": certificate_numbers(certificate),
+    }
+    checked: JsonObject = finite(numbers)
+    return checked
+
+
+def certificate_numbers(certificate: Certificate) -> JsonObject:
+    """A certificate, ready for JSON."""
+    told = certificate.optimality
+    norm, norm_error = certificate.sensitivity_norm
+    basin, walk, other = certificate.basin, certificate.walk, certificate.other_engine
+    return {
+        "kkt_residual": told.residual,
+        "kkt_residual_error": told.error,
+        "excess": told.excess,
+        "constraints": [each._asdict() for each in told.requirements],
+        "bounds": [each._asdict() for each in told.bounds],
+        "multipliers": [parts(value) for value in certificate.multipliers.tolist()],
+        "multiplier_errors": np.asarray(certificate.multiplier_errors).tolist(),
+        "unit_multiplier_error": certificate.unit_multiplier_error,
+        "stable": certificate.stable,
+        "sensitivity_norm": {"value": norm, "error": norm_error},
+        "basin": None if basin is None else dataclasses.asdict(basin),
+        "walk": None if walk is None else walk._asdict(),
+        "other_engine": None if other is None else other._asdict(),
+        "nearest_bifurcation": certificate.nearest_bifurcation,
+    }
+
+
+def _print(
+    report: Report,
+    scene: Scene | RigidScene,
+    found: Optimum,
+    certificate: Certificate,
+    goal: str,
+) -> None:
+    units, own = parameter_quantities(scene), parameter_values(scene)
+    rows = [
+        (name, f"{float(own[name]):.6g}", f"{value:.6g}", units[name].unit_in_text)
+        for name, value in found.variables.items()
+    ]
+    report.say(table(("variable", "began", "best", "unit"), rows, most=_MOST_ROWS))
+    report.say()
+    first = found.history[0].measures if found.history else {}
+    measures = [
+        (
+            name,
+            f"{first[name]:.6g}" if name in first else "–",
+            f"{value:.6g}",
+            f"{found.known.errors[name]:.1e}",
+            OBJECTIVES[name].quantity.unit_in_text,
+        )
+        for name, value in found.known.values.items()
+        if name in OBJECTIVES
+    ]
+    report.say(table(("measure", "began", "best", "error", "unit"), measures, most=_MOST_ROWS))
+    report.say()
+    report.say(
+        f"{goal} {found.objective:.6g}, {found.outcome} after {len(found.history)} iterations and "
+        f"{found.evaluations} gaits ({found.message})"
+    )
+    for line in _certificate_lines(certificate):
+        report.say(line)
+
+
+def _certificate_lines(certificate: Certificate) -> list[str]:
+    told = certificate.optimality
+    lines = [
+        f"optimality: residual {told.residual:.1e}, requirements missed by {told.excess:.1e}",
+        *(
+            f"held by {each.name} at {each.bound:.6g}: multiplier {each.multiplier:.4g} ± "
+            f"{each.multiplier_error:.1e}"
+            for each in (*told.requirements, *told.bounds)
+            if each.active
+        ),
+        f"multipliers: {_sizes(certificate)}; the one that must be 1 is off by "
+        f"{certificate.unit_multiplier_error:.1e}; {_STABLE[certificate.stable]}",
+        "sensitivity norm {:.4g} ± {:.1e}".format(*certificate.sensitivity_norm),
+    ]
+    basin, walk, other = certificate.basin, certificate.walk, certificate.other_engine
+    if basin is not None:
+        lines.append(
+            f"basin: {basin.estimate:.3f} of the starts about the gait ({basin.low:.3f} to "
+            f"{basin.high:.3f})"
+        )
+    if walk is not None:
+        back = "back to the gait" if walk.returned else "NOT back to the gait"
+        lines.append(f"walk from a push of {walk.push:g}: {walk.footsteps} footsteps, {back}")
+    if other is not None:
+        lines.append(
+            f"engine {other.engine}: period differs by {other.period_difference:.1e}, length by "
+            f"{other.length_difference:.1e}, spectral radius by {other.radius_difference:.1e}"
+        )
+    return lines
+
+
+_STABLE = {True: "stable", False: "NOT STABLE", None: "undecided within the error"}
+
+
+def _sizes(certificate: Certificate) -> str:
+    pairs = zip(np.abs(certificate.multipliers), certificate.multiplier_errors, strict=True)
+    return ", ".join(f"{size:.4f} ± {error:.0e}" for size, error in list(pairs)[:3])

@@ -1,0 +1,14 @@
+"""Optimisation of gaits: objectives, optimisers, certificates of an optimum."""
+
+from jaxbiped.optimise._certificate import Certificate as Certificate
+from jaxbiped.optimise._certificate import certify as certify
+from jaxbiped.optimise._objectives import OBJECTIVES as OBJECTIVES
+from jaxbiped.optimise._objectives import Evaluation as Evaluation
+from jaxbiped.optimise._optimality import Held as Held
+from jaxbiped.optimise._optimality import Optimality as Optimality
+from jaxbiped.optimise._optimise_gait import Optimum as Optimum
+from jaxbiped.optimise._optimisers import OPTIMISERS as OPTIMISERS
+from jaxbiped.optimise._pareto_front import ParetoFront as ParetoFront
+from jaxbiped.optimise._pareto_front import pareto_front as pareto_front
+from jaxbiped.optimise._runs import Iteration as Iteration
+from jaxbiped.optimise._runs import Outcome as Outcome

@@ -1,0 +1,201 @@
+"""Certificate of an optimum: what speaks for it besides the optimiser's word."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from jaxbiped._checks import check_choice, check_not_negative, check_positive, check_type
+from jaxbiped.basins._fractions import Fraction, wilson_interval
+from jaxbiped.basins._label import Label
+from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
+from jaxbiped.dynamics._section import HeelStrike
+from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
+from jaxbiped.optimise._optimality import Optimality
+from jaxbiped.optimise._optimise_gait import Optimum
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.simulate._rigid_walk import rigid_walk
+from jaxbiped.simulate._simulate import simulate
+from jaxbiped.solve._engine import ENGINES
+from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.sweep._prepare import labelling
+from jaxbiped.sweep.starts._starts import sample
+
+_SETTLED = 1e-4
+"""Relative difference between a walk's last footstep and the gait's that counts as none."""
+
+
+class Walked(NamedTuple):
+    """A walk from a pushed start.
+
+    Attributes:
+        push: relative change of all velocities of the gait's state.
+        footsteps: how many were walked; `asked` for how many.
+        period_difference: relative difference of the last footstep's duration from the gait's.
+        returned: whether it walked to the end, and to the gait.
+    """
+
+    push: float
+    footsteps: int
+    asked: int
+    period_difference: float
+    returned: bool
+
+
+class OtherEngine(NamedTuple):
+    """The same gait by the other engine: relative differences, and that of the radii."""
+
+    engine: str
+    found: bool
+    period_difference: float
+    length_difference: float
+    radius_difference: float
+
+
+class Certificate(NamedTuple):
+    """What is known of an optimum; None for what was not asked for.
+
+    Attributes:
+        optimality: conditions of Karush, Kuhn and Tucker: residual, multipliers, their errors.
+        multipliers: Floquet multipliers, largest first, complex; `multiplier_errors` estimated.
+        unit_multiplier_error: distance from 1 of the multiplier that must be 1.
+        stable: whether all lie inside the unit circle; None where an error bar crosses it.
+        sensitivity_norm: see `OBJECTIVES`, with its error; infinite where the gait is not stable.
+        basin: fraction of the starts within `scatter` of the gait that come back to it.
+        walk: a walk from a pushed start.
+        other_engine: the gait by the other engine.
+        nearest_bifurcation: what the function given for it told.
+    """
+
+    optimality: Optimality
+    multipliers: np.ndarray
+    multiplier_errors: np.ndarray
+    unit_multiplier_error: float
+    stable: bool | None
+    sensitivity_norm: tuple[float, float]
+    basin: Fraction | None
+    walk: Walked | None
+    other_engine: OtherEngine | None
+    nearest_bifurcation: Any
+
+
+def certify(
+    optimum: Optimum,
+    *,
+    starts: int = 1024,
+    scatter: float = 0.05,
+    footsteps: int = 200,
+    push: float = 0.01,
+    other_engine: bool = False,
+    nearest_bifurcation: Callable[[Scene | RigidScene, Gait], Any] | None = None,
+    seed: int = 0,
+) -> Certificate:
+    """Tests an optimum by what its search did not use.
+
+    Args:
+        optimum: from `optimise_gait`, of a gait of one footstep.
+        starts: how many starts about the gait are labelled for its basin; 0 for none.
+        scatter: half-width of their angles [rad], and of their rates in units of √(g/l).
+        footsteps: of the walk from a pushed start; 0 for none.
+        push: relative change of all its velocities.
+        other_engine: whether to find the gait by the other engine, too, which compiles for minutes
+            where that is XLA.
+        nearest_bifurcation: a function of scene and gait that tells the nearest one.
+        seed: of the starts.
+
+    Returns:
+        The certificate.
+
+    Raises:
+        ArgumentError: an argument that is not allowed.
+    """
+    check_type("optimum", optimum, Optimum)
+    check_not_negative("starts", starts)
+    check_not_negative("footsteps", footsteps)
+    check_positive("scatter", scatter)
+    scene, gait = optimum.scene, optimum.gait
+    check_choice("footsteps of the gait", gait.orbit[0].shape[0], (1,))
+    sizes, errors = np.abs(np.asarray(gait.multipliers)), np.asarray(gait.multiplier_errors)
+    undecided = bool(np.any(np.abs(sizes - 1.0) <= errors))
+    norm = jacobian_functionals(
+        scene, gait.measures.state, ("sensitivity_norm",), engine=gait.engine
+    )
+    return Certificate(
+        optimality=optimum.optimality,
+        multipliers=np.asarray(gait.multipliers),
+        multiplier_errors=errors,
+        unit_multiplier_error=float(gait.unit_multiplier_error),
+        stable=None if undecided else bool(np.all(sizes < 1.0)),
+        sensitivity_norm=(float(norm.values[0]), float(norm.errors[0])),
+        basin=_basin(scene, gait, int(starts), scatter, seed) if starts else None,
+        walk=_walk(scene, gait, int(footsteps), push) if footsteps else None,
+        other_engine=_by_other(scene, gait) if other_engine else None,
+        nearest_bifurcation=None
+        if nearest_bifurcation is None
+        else nearest_bifurcation(scene, gait),
+    )
+
+
+def _basin(
+    scene: Scene | RigidScene, gait: Gait, count: int, scatter: float, seed: int
+) -> Fraction | None:
+    """The fraction of starts about the gait, stance foot on the ground, that come back to it."""
+    knows = labelling(scene, guess=gait.measures.state)
+    if not knows.family.rows[0]:
+        return None
+    pace = float(np.sqrt(float(scene.ground.g) / float(scene.walker.l)))
+    state = gait.measures.state
+    about = {
+        "theta_stance": (float(state.theta_2), scatter),
+        "theta_swing": (float(state.theta_1), scatter),
+        "omega_stance": (float(state.omega_2), scatter * pace),
+        "omega_swing": (float(state.omega_1), scatter * pace),
+    }
+    bounds = {name: (centre - half, centre + half) for name, (centre, half) in about.items()}
+    batch = sample(scene, bounds, count, seed=seed, place=True).at(knows, np.arange(count))
+    labels = knows(batch.states).label
+    walking = int(np.sum(labels == int(Label.WALKING)))
+    low, high = wilson_interval(walking, count)
+    return Fraction(walking / count, float(low), float(high), walking)
+
+
+def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> Walked:
+    state: WalkerState = gait.measures.state
+    fast = [name for name in state._fields if name.startswith(("hip_v", "omega"))]
+    pushed = state._replace(**{name: getattr(state, name) * (1.0 + push) for name in fast})
+    walk: Trajectory[Any]
+    if isinstance(scene, RigidScene):
+        walk = rigid_walk(scene, cast(RigidState, pushed), footsteps=count, max_arrivals=count)
+    else:
+        walk = simulate(
+            scene,
+            pushed,
+            footsteps=count,
+            save=HeelStrike(),
+            max_arrivals=count,
+            max_solver_steps=max(65536, 1024 * count),
+        )
+    assert walk.arrivals is not None
+    times = np.asarray(walk.arrivals.t)
+    times = times[np.isfinite(times)]
+    last = float(times[-1] - times[-2]) if len(times) > 1 else np.nan
+    difference = abs(last / float(gait.measures.period) - 1.0)
+    done = len(times)
+    return Walked(push, done, count, difference, done >= count - 1 and difference < _SETTLED)
+
+
+def _by_other(scene: Scene | RigidScene, gait: Gait) -> OtherEngine:
+    other = next(name for name in ENGINES if name not in ("auto", gait.engine))
+    again = find_gait(
+        scene, gait.measures.state, parameters=(), radius_sensitivities=False, engine=other
+    )
+    pairs = zip(again.measures[:2], gait.measures[:2], strict=True)
+    period, length = (abs(float(a) / float(b) - 1.0) for a, b in pairs)
+    radii = (float(each.measures.spectral_radius) for each in (again, gait))
+    return OtherEngine(
+        other, again.outcome is Search.FOUND, period, length, abs(next(radii) - next(radii))
+    )

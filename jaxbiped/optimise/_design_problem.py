@@ -1,0 +1,239 @@
+"""Design problem: objective and requirements as functions of the variables, each gait found anew.
+
+A gait is sought from where the last one's derivatives point; where that fails, or leads to another
+branch, it is followed there in smaller steps. Every design is evaluated once and kept.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped.dynamics._formulation import state_type
+from jaxbiped.gait._explain_search import explain_search
+from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, evaluate_ensemble
+from jaxbiped.optimise._evaluations import Evaluations
+from jaxbiped.optimise._objectives import Evaluation, evaluate
+from jaxbiped.optimise._requirements import Requirement
+from jaxbiped.optimise._variables import Variables
+from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+
+_KEPT = 1e-6
+"""Part of its bound by which a requirement may be missed and still counts as kept, at least."""
+_HALVINGS = 5
+"""How often a step to a design is halved before its gait is given up."""
+_FLOOR, _ASIDE, _NEAR = 0.1, 0.5, 0.02
+"""Size below which components of the state count as of one size; how far aside, in units of the
+step, and how far at least, relative to it, a gait may lie from where it was expected."""
+
+
+class Design(NamedTuple):
+    """A design whose gait is known: its u, shape (k,), and what is known of it."""
+
+    u: np.ndarray
+    known: Evaluation
+
+
+class DesignProblem:
+    """Minimise or maximise a weighted sum subject to requirements.
+
+    Attributes:
+        scene, variables: what is designed.
+        sense: 1 where the sum of the measures is minimised, −1 where it is maximised.
+        weights: of the measures in the sum that is minimised, by name.
+        requirements: what must hold.
+        evaluations: of all designs so far.
+        ensemble: over whose members measures are taken; None for the design alone.
+        latest: the last design whose gait was found; `asked` all of them, in order.
+        lost: how often a design had none.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | RigidScene,
+        variables: Variables,
+        told: Mapping[str, float],
+        sense: float,
+        requirements: tuple[Requirement, ...],
+        settings: GaitSettings,
+        evaluations: Evaluations,
+        ensemble: Ensemble | None = None,
+    ) -> None:
+        self.scene, self.variables = scene, variables
+        self.sense, self.requirements = sense, requirements
+        self.weights = {name: sense * weight for name, weight in told.items()}
+        self.settings, self.evaluations, self.ensemble = settings, evaluations, ensemble
+        self.wanted = tuple(dict.fromkeys((*told, *(each.name for each in requirements))))
+        self.latest: Design | None = None
+        self.asked: list[Design] = []
+        self.lost = 0
+
+    def begin(self, u: np.ndarray) -> Design:
+        """The first design; its gait is found from nothing, or followed from the scene's own.
+
+        Raises:
+            ArgumentError: no gait, or a measure that cannot be differentiated.
+        """
+        known = self.evaluations.get(u)
+        if known is None:
+            gait = self._find(self.scene_at(u), None)
+            if gait.outcome is not Search.FOUND or not bool(gait.sound):
+                raise ArgumentError(
+                    "the design to start from has no gait: "
+                    f"{explain_search(self.scene_at(u), gait)}."
+                )
+            known = self._keep(u, self.scene_at(u), gait)
+        if known is None:
+            raise ArgumentError(
+                "the gait of the design to start from has a measure that is not finite: choose "
+                f"others than {', '.join(self.wanted)}."
+            )
+        for name in self.wanted:
+            if not np.all(np.isfinite(known.slopes[name][self.variables.places])):
+                raise ArgumentError(
+                    f"{name} cannot be optimised or bounded at the design to start from: its value "
+                    f"there is {known.values[name]:g}, and it has no derivatives."
+                )
+        return self._note(u, known)
+
+    def at(self, u: np.ndarray) -> Evaluation | None:
+        """What is known of a design; None where no gait was found on the way from the latest."""
+        known = self.evaluations.get(u)
+        if known is None and not self.evaluations.is_lost(u):
+            known = self._follow(np.array(u))
+            if known is None:
+                self.evaluations.lose(u)
+        if known is None:
+            self.lost += 1
+            return None
+        return self._note(u, known).known
+
+    def _note(self, u: np.ndarray, known: Evaluation) -> Design:
+        self.latest = Design(np.array(u), known)
+        self.asked.append(self.latest)
+        return self.latest
+
+    def objective(self, known: Evaluation) -> tuple[float, np.ndarray, float]:
+        """The sum that is minimised, its gradient in parameters (p,), its error."""
+        value = sum(w * known.values[name] for name, w in self.weights.items())
+        slopes = sum(w * known.slopes[name] for name, w in self.weights.items())
+        error = sum(abs(w) * known.errors[name] for name, w in self.weights.items())
+        return float(value), np.asarray(slopes), float(error)
+
+    def gradient(self, u: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        """Derivatives with respect to u from those with respect to all parameters."""
+        return slopes[..., self.variables.places] * self.variables.rates(u)
+
+    def excess(self, known: Evaluation) -> float:
+        """By how much the worst requirement is missed, relative to its bound; at most 0 if none."""
+        worst = 0.0
+        for each in self.requirements:
+            value = known.values[each.name]
+            for bound, sign in ((each.low, 1.0), (each.high, -1.0)):
+                if bound is not None:
+                    worst = max(worst, sign * (bound - value) / scale_of(bound))
+        return worst
+
+    def allowance(self, known: Evaluation) -> float:
+        """What of `excess` is within the error bars of the measures."""
+        sizes = [
+            known.errors[each.name] / scale_of(bound)
+            for each in self.requirements
+            for bound in (each.low, each.high)
+            if bound is not None
+        ]
+        return max([_KEPT, *sizes])
+
+    def from_guess(self, u: np.ndarray, guess: np.ndarray) -> Evaluation | None:
+        """What is known of a design whose gait is near a guess, shape (m,)."""
+        scene = self.scene_at(u)
+        gait = self._find(scene, guess)
+        if gait.outcome is not Search.FOUND or not bool(gait.sound):
+            return None
+        return self._keep(u, scene, gait)
+
+    def gait_of(self, design: Design) -> Gait:
+        """The gait of a design that is known."""
+        return self._find(self.scene_at(design.u), design.known.state)
+
+    def scene_at(self, u: np.ndarray) -> Scene | RigidScene:
+        """The scene of a design; raises `ArgumentError` where parameters do not go together."""
+        return with_parameters(self.scene, self.variables.named(u))
+
+    def _find(self, scene: Scene | RigidScene, guess: np.ndarray | None) -> Gait:
+        state = None
+        if guess is not None:
+            kind = state_type(scene)
+            state = jtu.tree_map(np.float64, kind(0.0, *guess.tolist()))
+        return find_gait(
+            scene,
+            state,
+            footsteps=self.settings.footsteps,
+            accuracy=self.settings.accuracy,
+            engine=self.settings.engine,
+            radius_sensitivities=False,
+        )
+
+    def _keep(self, u: np.ndarray, scene: Scene | RigidScene, gait: Gait) -> Evaluation | None:
+        if self.ensemble is None:
+            known = evaluate(scene, gait, self.wanted, self.settings.accuracy)
+        else:
+            nominal = evaluate(scene, gait, (), self.settings.accuracy)
+            members = evaluate_ensemble(self.ensemble, scene, nominal, self.wanted, self.settings)
+            if members is None:
+                return None
+            known = members
+        if not all(np.isfinite(known.values[name]) for name in self.wanted):
+            return None
+        self.evaluations.add(u, known)
+        return known
+
+    def _follow(self, u: np.ndarray) -> Evaluation | None:
+        """Gaits on the way from the latest design, or from the nearest known, in halved steps."""
+        assert self.latest is not None
+        here, step, halvings = Design(*self.evaluations.nearest(u)), 1.0, 0
+        done = 0.0
+        begin = here.u
+        while True:
+            share = min(1.0, done + step)
+            ahead = u if share == 1.0 else begin + share * (u - begin)
+            known = self._next(here, ahead)
+            if known is not None:
+                if share == 1.0:
+                    return known
+                here, done = Design(ahead, known), share
+                continue
+            step, halvings = 0.5 * step, halvings + 1
+            if halvings > _HALVINGS:
+                return None
+
+    def _next(self, here: Design, u: np.ndarray) -> Evaluation | None:
+        """The gait of a design near one whose gait is known, on the same branch."""
+        before, after = (self.variables.values(each) for each in (here.u, u))
+        move = here.known.state_slopes[:, self.variables.places] @ (after - before)
+        guess = here.known.state + move
+        try:
+            scene = self.scene_at(u)
+        except ArgumentError:  # parameters that do not go together
+            return None
+        gait = self._find(scene, guess)
+        if gait.outcome is not Search.FOUND or not bool(gait.sound):
+            return None
+        found = np.asarray([float(leaf) for leaf in gait.measures.state[1:]])
+        sizes = _FLOOR + np.abs(here.known.state)
+        aside, length = (np.max(np.abs(each) / sizes) for each in (found - guess, move))
+        if aside > _ASIDE * length + _NEAR:
+            return None
+        return self._keep(u, scene, gait)
+
+
+def scale_of(bound: float) -> float:
+    """The size of a bound, one for zero."""
+    return abs(bound) if bound != 0.0 else 1.0

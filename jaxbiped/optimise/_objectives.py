@@ -1,0 +1,204 @@
+"""Objectives: measures of a periodic gait by name, their gradients and their error bars."""
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._quantity import Quantity
+from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
+from jaxbiped.optimise._jacobian_functionals import (
+    JACOBIAN_FUNCTIONALS,
+    LEADING,
+    jacobian_functionals,
+)
+from jaxbiped.scene._parameters import parameter_names, parameter_values
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene.laws.friction._frictionless import Frictionless
+
+
+def _of_any(scene: Scene | RigidScene) -> str | None:
+    return None
+
+
+def _of_slip(scene: Scene | RigidScene) -> str | None:
+    return None if isinstance(scene, Scene) else "a rigid walker's feet roll without slip"
+
+
+def _of_friction(scene: Scene | RigidScene) -> str | None:
+    if isinstance(scene, Scene) and isinstance(scene.friction, Frictionless):
+        return "its friction is Frictionless"
+    return _of_slip(scene)
+
+
+def _of_swing(scene: Scene | RigidScene) -> str | None:
+    if isinstance(scene, Scene) and not isinstance(
+        scene.clearance.admits(1, jnp.ones(())), jax.Array
+    ):
+        return f"its clearance rule is {type(scene.clearance).__name__}, which lets no foot pass"
+    return None
+
+
+class Objective(NamedTuple):
+    """What can be optimised or bounded.
+
+    Attributes:
+        quantity: words, symbol and unit.
+        lacks: why a scene has none of it, None where it has.
+    """
+
+    quantity: Quantity
+    lacks: Callable[[Scene | RigidScene], str | None] = _of_any
+
+
+OBJECTIVES = {
+    "speed": Objective(Quantity("speed", "$v$", "m/s")),
+    "step_length": Objective(Quantity("step length", "$L$", "m")),
+    "period": Objective(Quantity("period", "$T$", "s")),
+    "peak_normal": Objective(Quantity("peak normal force", "$F$", "N")),
+    "spectral_radius": Objective(Quantity("spectral radius", "$\\rho$")),
+    "radius_bound": Objective(Quantity("smooth bound of the spectral radius", "$\\rho_q$")),
+    "sensitivity_norm": Objective(Quantity("gait sensitivity norm", "$\\|G\\|$")),
+    "cost_of_transport": Objective(Quantity("cost of transport", "$C$")),
+    "impact_loss": Objective(Quantity("energy lost in impacts", "$E_i$", "J")),
+    "friction_loss": Objective(Quantity("energy lost to friction", "$E_f$", "J"), _of_friction),
+    "slip_distance": Objective(Quantity("slip distance", "$s$", "m"), _of_slip),
+    "foot_clearance": Objective(Quantity("foot clearance", "$h$", "m"), _of_swing),
+}
+"""By name. Those of a cycle: losses and slip are sums over its footsteps.
+
+- cost of transport: energy lost over weight times step length; a passive gait's is sin(slope).
+- impact loss: work of the normal reactions; a rigid walker's kinetic energy lost in its impacts.
+- slip distance: path of the feet that touch, along the ground.
+- foot clearance: least height of the swinging foot, negative where it passes underground.
+- radius bound: never below the spectral radius, and smooth also where multipliers meet or have
+  equal moduli, where that has corners; see `jacobian_functionals`.
+- sensitivity norm: see `jacobian_functionals`.
+"""
+_OF_THE_GAIT = ("speed", "step_length", "period", "peak_normal")
+CLUSTER = JACOBIAN_FUNCTIONALS[:LEADING]
+"""What is evaluated for the spectral radius: it, and the next moduli."""
+
+
+class Evaluation(NamedTuple):
+    """Objectives of one gait with respect to the p parameters of its scene.
+
+    Attributes:
+        values: by name; `errors` their estimated errors.
+        slopes: derivatives by name, shape (p,); `slope_errors` their estimated errors.
+        state: of the gait, its recurring components, shape (m,).
+        state_slopes: derivatives, shape (m, p).
+    """
+
+    values: dict[str, float]
+    errors: dict[str, float]
+    slopes: dict[str, np.ndarray]
+    slope_errors: dict[str, np.ndarray]
+    state: np.ndarray
+    state_slopes: np.ndarray
+
+
+def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective") -> None:
+    """Raises `ArgumentError` for an unknown objective, or one that the scene lacks."""
+    check_choice(what, name, OBJECTIVES)
+    lacks = OBJECTIVES[name].lacks(scene)
+    if lacks is not None:
+        raise ArgumentError(f"{what} = {name!r} is not allowed for this scene: {lacks}.")
+
+
+def functionals_for(wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
+    """Which functionals of the Jacobian these measures need, and whether those of the cycle."""
+    of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in wanted)
+    if "spectral_radius" in wanted:
+        of_jacobian = (*CLUSTER, *(name for name in of_jacobian if name not in CLUSTER))
+    return of_jacobian, bool(set(wanted) - set(of_jacobian) - set(_OF_THE_GAIT))
+
+
+def evaluate(
+    scene: Scene | RigidScene,
+    gait: Gait,
+    names: Iterable[str],
+    accuracy: str,
+    functionals: tuple[Functionals | None, ...] | None = None,
+) -> Evaluation:
+    """Objectives of a gait that was found with the sensitivities to all parameters.
+
+    `functionals` are those of `functionals_for`, where they are known.
+    """
+    wanted = tuple(names)
+    of_jacobian, of_cycle = functionals_for(wanted)
+    state, steps, engine = gait.measures.state, gait.orbit[0].shape[0], gait.engine
+    first, second = (None, None) if functionals is None else functionals
+    rows = {name: _row(gait, name) for name in _OF_THE_GAIT}
+    if of_jacobian:
+        first = first or jacobian_functionals(
+            scene, state, of_jacobian, footsteps=steps, accuracy=accuracy, engine=engine
+        )
+        # The orbit's own error moves the Jacobian, too, as its multipliers tell.
+        shares = np.asarray(gait.multiplier_errors) / float(gait.measures.spectral_radius)
+        rows |= {
+            name: row._replace(error=max(row.error, abs(row.value) * float(shares[0])))
+            for name, row in zip(of_jacobian, _rows_of(first), strict=True)
+        }
+    if of_cycle:
+        second = second or cycle_functionals(
+            scene, state, footsteps=steps, accuracy=accuracy, engine=engine
+        )
+        rows |= dict(zip(integral_names(scene), _rows_of(second), strict=True))
+        rows["cost_of_transport"] = _cost_of_transport(scene, rows)
+    kept = {name: rows[name] for name in dict.fromkeys((*wanted, *of_jacobian, *_OF_THE_GAIT))}
+    slopes = gait.sensitivities.state
+    return Evaluation(
+        values={name: float(row.value) for name, row in kept.items()},
+        errors={name: float(row.error) for name, row in kept.items()},
+        slopes={name: row.slopes for name, row in kept.items()},
+        slope_errors={name: row.slope_errors for name, row in kept.items()},
+        state=np.asarray([float(leaf) for leaf in gait.measures.state[1:]]),
+        state_slopes=np.stack([np.asarray(leaf) for leaf in slopes[1:]]),
+    )
+
+
+class _Row(NamedTuple):
+    value: float
+    error: float
+    slopes: np.ndarray
+    slope_errors: np.ndarray
+
+
+def _row(gait: Gait, name: str) -> _Row:
+    both = (gait.measures, gait.measure_errors, gait.sensitivities, gait.sensitivity_errors)
+    value, error, slopes, slope_errors = (np.asarray(getattr(each, name)) for each in both)
+    return _Row(float(value), float(error), slopes, slope_errors)
+
+
+def _rows_of(found: object) -> list[_Row]:
+    parts = [np.asarray(getattr(found, name)) for name in _Row._fields[2:]]
+    values, errors = (np.asarray(getattr(found, name)) for name in ("values", "errors"))
+    return [
+        _Row(float(values[k]), float(errors[k]), parts[0][k], parts[1][k])
+        for k in range(len(values))
+    ]
+
+
+def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, _Row]) -> _Row:
+    """Losses over weight times length, by their logarithmic derivatives."""
+    losses = [rows[name] for name in ("impact_loss", "friction_loss") if name in rows]
+    length, names = rows["step_length"], parameter_names(scene)
+    known = {name: float(value) for name, value in parameter_values(scene).items()}
+    mass = float(scene.walker.total_mass)
+    own = np.zeros(len(names))
+    for name, share in (("m", 2.0 / mass), ("hip_mass", 1.0 / mass), ("g", 1.0 / known["g"])):
+        own[names.index(name)] = share
+    lost = sum(row.value for row in losses)
+    cost = lost / (mass * known["g"] * length.value)
+    slopes = sum(row.slopes for row in losses) / lost - length.slopes / length.value - own
+    errors = sum(row.error for row in losses) / lost + length.error / length.value
+    slope_errors = (
+        sum(row.slope_errors for row in losses) / lost + length.slope_errors / length.value
+    )
+    return _Row(cost, cost * errors, cost * slopes, cost * slope_errors)

@@ -1,0 +1,254 @@
+"""Optimisation of a gait: the best design within bounds, from a scene alone."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple, TypeAlias
+
+import optax
+
+from jaxbiped._checks import (
+    ArgumentError,
+    check_choice,
+    check_count,
+    check_finite,
+    check_not_negative,
+    check_type,
+)
+from jaxbiped._types import JsonObject
+from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._design_problem import DesignProblem
+from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, ensemble_of
+from jaxbiped.optimise._evaluations import Evaluations
+from jaxbiped.optimise._objectives import CLUSTER, Evaluation, check_objective
+from jaxbiped.optimise._optimality import Optimality, optimality_of
+from jaxbiped.optimise._optimisers import OPTIMISERS, Ended
+from jaxbiped.optimise._requirements import Requirement, SubjectTo, requirements_of
+from jaxbiped.optimise._restarts import scattered_designs
+from jaxbiped.optimise._runs import Iteration, Outcome, Runs
+from jaxbiped.optimise._variables import start_of, variables_of
+from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import GAIT_ACCURACIES
+
+Goal: TypeAlias = str | Mapping[str, float] | None
+"""A measure by name, or weights of several."""
+
+
+class Optimum(NamedTuple):
+    """The best design that an optimisation came to.
+
+    Attributes:
+        outcome: how it ended; `message` the optimiser's own words.
+        scene: of the best design, and its `gait`, with the sensitivities to all parameters.
+        variables: its parameters by name.
+        objective: the sum that was asked for; `error` its estimated error.
+        known: all measures that play a part, with gradients and errors.
+        optimality: what the conditions of optimality say.
+        history: every iterate, of all runs one behind the other.
+        evaluations: designs whose gait was found; `lost` how often none was.
+    """
+
+    outcome: Outcome
+    message: str
+    scene: Scene | RigidScene
+    gait: Gait
+    variables: dict[str, float]
+    objective: float
+    error: float
+    known: Evaluation
+    optimality: Optimality
+    history: list[Iteration]
+    evaluations: int
+    lost: int
+
+
+def optimise_gait(
+    scene: Scene | RigidScene,
+    *,
+    vary: Mapping[str, tuple[float, float]],
+    maximise: Goal = None,
+    minimise: Goal = None,
+    subject_to: SubjectTo = None,
+    optimiser: str | optax.GradientTransformation = "trust-region",
+    iterations: int = 200,
+    restarts: int = 0,
+    scatter: Mapping[str, float] | None = None,
+    members: int = 8,
+    criterion: str = "mean",
+    seed: int = 0,
+    footsteps: int = 1,
+    accuracy: str = "balanced",
+    engine: str = "auto",
+    progress: bool = False,
+    store: str | Path | None = None,
+) -> Optimum:
+    """Finds the parameters within bounds whose periodic gait is best.
+
+    The gait of every design is found anew, from where the last one's derivatives point; gradients
+    are exact, by the implicit function theorem. A design without a gait, or one whose gait is no
+    walk, turns the search back. No guess of a gait is needed.
+
+    Args:
+        scene: the walker to begin from; a parameter outside its bounds is moved onto them.
+        vary: bounds (low, high) by the name of each parameter (see `parameter_names`), SI units.
+            Positive ones are varied by their logarithm.
+        maximise, minimise: one of the two: a measure of the gait by name (see `OBJECTIVES`), or
+            weights of several.
+        subject_to: bounds (low, high) by measure, None for no bound and equal ones for an equality;
+            or words, "spectral_radius<0.4", one or a sequence of them.
+        optimiser: "trust-region", "slsqp", "trust-constr"; or without requirements "optax" (Adam in
+            logits of u) or any optax transformation.
+        iterations: most of the optimiser, of each run.
+        restarts: further runs, from the best of 8 times as many designs scattered over the bounds,
+            whose gaits are sought as one batch.
+        scatter: relative half-widths by parameter; every design is then an ensemble whose members
+            differ by factors within these, and measures are taken over all members.
+        members: how many.
+        criterion: "mean" for the expectation, "worst" for the worst member of each measure.
+        seed: of scattered designs and of members.
+        footsteps: how many a cycle has.
+        accuracy: "balanced" or "tight".
+        engine: as for `find_gait`.
+        progress: whether to show a bar on stderr.
+        store: file that keeps every evaluation; the same call with it goes on where it was.
+
+    Returns:
+        The best design, its gait, and how good it is: see `certify` for more.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled; or a design to
+            begin from that has no gait.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> best = jb.optimise_gait(
+        ...     jb.ladder()["rigid"], vary={"d": (0.08, 0.12)}, maximise="speed"
+        ... )
+        >>> str(best.outcome), round(best.variables["d"], 4)
+        ('converged', 0.08)
+    """
+    check_type("scene", scene, Scene, RigidScene)
+    variables = variables_of(scene, vary)
+    told, sense = _goal(scene, maximise, minimise)
+    requirements = requirements_of(scene, subject_to)
+    if isinstance(optimiser, str):
+        check_choice("optimiser", optimiser, OPTIMISERS)
+    else:
+        check_type("optimiser", optimiser, optax.GradientTransformation)
+    check_count("iterations", iterations)
+    check_count("footsteps", footsteps)
+    check_not_negative("restarts", restarts)
+    check_choice("accuracy", accuracy, GAIT_ACCURACIES)
+    if requirements and optimiser not in OPTIMISERS[:3]:
+        raise ArgumentError(
+            'subject_to is not allowed with optax: choose optimiser = "trust-region".'
+        )
+    ensemble = None
+    if scatter:
+        worse = _larger_is_worse(told, sense, requirements) if criterion == "worst" else {}
+        ensemble = ensemble_of(scene, scatter, members, criterion, worse, seed)
+    settings = GaitSettings(footsteps, accuracy, engine)
+    path = None if store is None else Path(store)
+    evaluations = Evaluations(path, _problem_settings(scene, vary, told, sense, settings, ensemble))
+    problem = DesignProblem(
+        scene, variables, told, sense, requirements, settings, evaluations, ensemble
+    )
+    begin = problem.begin(start_of(scene, variables))
+    runs = Runs(problem, iterations, optimiser, progress)
+    with runs.bar:
+        try:
+            runs.run(begin)
+            if restarts:
+                for each in scattered_designs(problem, begin, int(restarts), int(seed)):
+                    runs.run(each)
+        except KeyboardInterrupt:
+            runs.ended, runs.interrupted = Ended(False, "Interrupted."), True
+    return _optimum(problem, runs)
+
+
+def _goal(
+    scene: Scene | RigidScene, maximise: Goal, minimise: Goal
+) -> tuple[dict[str, float], float]:
+    if (maximise is None) == (minimise is None):
+        raise ArgumentError(
+            'give either maximise or minimise: a measure of the gait, such as "speed".'
+        )
+    what, goal = ("minimise", minimise) if maximise is None else ("maximise", maximise)
+    weights = {goal: 1.0} if isinstance(goal, str) else goal
+    if not isinstance(weights, Mapping) or not weights:
+        raise ArgumentError(f"{what} = {goal!r} is not allowed: give a name, or weights by name.")
+    for name, weight in weights.items():
+        check_objective(name, scene, what)
+        check_finite(f"{what}[{name!r}]", weight)
+    return {name: float(w) for name, w in weights.items()}, -1.0 if what == "maximise" else 1.0
+
+
+def _larger_is_worse(
+    told: Mapping[str, float], sense: float, requirements: tuple[Requirement, ...]
+) -> dict[str, bool]:
+    """Of each measure, for the worst of several.
+
+    Raises:
+        ArgumentError: a measure of which both more and less would be worse.
+    """
+    sides: dict[str, set[bool]] = {}
+    for name, weight in told.items():
+        sides.setdefault(name, set()).add(sense * weight > 0.0)
+    for each in requirements:
+        sides.setdefault(each.name, set()).update(
+            [
+                larger
+                for larger, bound in ((True, each.high), (False, each.low))
+                if bound is not None
+            ]
+        )
+    for name, both in sides.items():
+        if len(both) > 1:
+            raise ArgumentError(
+                f"{name} is bounded and sought from both sides: its worst member is not defined; "
+                'choose criterion = "mean".'
+            )
+    worse = {name: both.pop() for name, both in sides.items()}
+    return worse | dict.fromkeys(CLUSTER, worse.get("spectral_radius", True))
+
+
+def _problem_settings(
+    scene: Scene | RigidScene,
+    vary: Mapping[str, tuple[float, float]],
+    told: Mapping[str, float],
+    sense: float,
+    settings: GaitSettings,
+    ensemble: Ensemble | None,
+) -> JsonObject:
+    """What evaluations depend on, and in which order they come."""
+    return {
+        "scene": {name: float(value) for name, value in parameter_values(scene).items()},
+        "model": repr(type(scene).__name__),
+        "vary": {name: [float(x) for x in bounds] for name, bounds in vary.items()},
+        "goal": [dict(told), sense],
+        "settings": settings._asdict(),
+        "ensemble": None
+        if ensemble is None
+        else {"of": ensemble.names, "factors": ensemble.factors.tolist(), "by": ensemble.criterion},
+    }
+
+
+def _optimum(problem: DesignProblem, runs: Runs) -> Optimum:
+    best = runs.best
+    assert best is not None
+    value, _, error = problem.objective(best.known)
+    return Optimum(
+        outcome=runs.outcome(),
+        message=runs.ended.message,
+        scene=problem.scene_at(best.u),
+        gait=problem.gait_of(best),
+        variables=problem.variables.named(best.u),
+        objective=problem.sense * value,
+        error=error,
+        known=best.known,
+        optimality=optimality_of(problem, best),
+        history=runs.history,
+        evaluations=problem.evaluations.count,
+        lost=problem.lost,
+    )

@@ -1,0 +1,203 @@
+"""Optimisers: how a design problem is handed to SciPy and to optax, and what comes back.
+
+All of them see variables in [0, 1] and functions of the order of one. Where a design has no gait,
+the objective is raised well above the latest one's, so that line searches and trust regions turn
+back towards it.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from scipy.optimize import Bounds, NonlinearConstraint, minimize
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped.optimise._design_problem import DesignProblem, scale_of
+from jaxbiped.optimise._objectives import CLUSTER, Evaluation
+
+OPTIMISERS = ("trust-region", "slsqp", "trust-constr", "optax")
+_RAISED = 10.0
+"""By how much the scaled objective is raised where there is no gait."""
+_RATE = 0.05
+"""Learning rate of Adam, in logits of u."""
+_EDGE = 1e-3
+"""Distance from a bound, in u, at which optax begins at least: logits are infinite there."""
+
+
+class Ended(NamedTuple):
+    """How an optimiser ended: whether it says that it converged, and its own words."""
+
+    converged: bool
+    message: str
+
+
+class Row(NamedTuple):
+    """A requirement as a function that must be at least zero, or zero where `equality`.
+
+    Attributes:
+        name: of the measure; `bound` that it is held to, `sign` 1 from below and −1 from above.
+    """
+
+    name: str
+    bound: float
+    sign: float
+    equality: bool
+
+    def value(self, known: Evaluation) -> float:
+        """How much there is to spare, in units of the bound."""
+        return self.sign * (known.values[self.name] - self.bound) / scale_of(self.bound)
+
+    def slopes(self, known: Evaluation) -> np.ndarray:
+        """Its derivatives with respect to all parameters."""
+        return self.sign * known.slopes[self.name] / scale_of(self.bound)
+
+
+def rows_of(problem: DesignProblem) -> tuple[Row, ...]:
+    """The requirements one by one; an upper bound of the spectral radius holds the next moduli too.
+
+    So an optimum where several moduli are equal has no corner.
+    """
+    rows = []
+    for each in problem.requirements:
+        if each.low is not None and each.low == each.high:
+            rows.append(Row(each.name, each.low, 1.0, True))
+            continue
+        if each.low is not None:
+            rows.append(Row(each.name, each.low, 1.0, False))
+        if each.high is not None:
+            names = CLUSTER if each.name == "spectral_radius" else (each.name,)
+            rows += [Row(name, each.high, -1.0, False) for name in names]
+    return tuple(rows)
+
+
+class Functions:
+    """The scaled objective and the requirements of a problem, with their gradients."""
+
+    def __init__(self, problem: DesignProblem) -> None:
+        self.problem, self.rows = problem, rows_of(problem)
+        assert problem.latest is not None
+        self.scale = scale_of(problem.objective(problem.latest.known)[0])
+
+    def objective(self, u: np.ndarray) -> tuple[float, np.ndarray]:
+        """The scaled objective and its gradient."""
+        known, raised = self._known(u)
+        value, slopes, _ = self.problem.objective(known)
+        return value / self.scale + raised, self.problem.gradient(u, slopes) / self.scale
+
+    def spare(self, u: np.ndarray, rows: tuple[Row, ...]) -> np.ndarray:
+        """Values of the requirements."""
+        known, _ = self._known(u)
+        return np.asarray([row.value(known) for row in rows])
+
+    def spare_gradients(self, u: np.ndarray, rows: tuple[Row, ...]) -> np.ndarray:
+        """Their gradients, one a row."""
+        known, _ = self._known(u)
+        return np.stack([self.problem.gradient(u, row.slopes(known)) for row in rows])
+
+    def _known(self, u: np.ndarray) -> tuple[Evaluation, float]:
+        u = np.clip(np.asarray(u, dtype=float), 0.0, 1.0)
+        known = self.problem.at(u)
+        if known is not None:
+            return known, 0.0
+        assert self.problem.latest is not None
+        return self.problem.latest.known, _RAISED
+
+
+Callback = Callable[[np.ndarray], None]
+
+
+def run_slsqp(functions: Functions, u: np.ndarray, iterations: int, told: Callback) -> Ended:
+    """Sequential quadratic programming with a line search (Kraft 1988), by SciPy."""
+    kinds = {
+        "eq": tuple(row for row in functions.rows if row.equality),
+        "ineq": tuple(row for row in functions.rows if not row.equality),
+    }
+    constraints: list[dict[str, Any]] = [
+        {"type": kind, "fun": functions.spare, "jac": functions.spare_gradients, "args": (rows,)}
+        for kind, rows in kinds.items()
+        if rows
+    ]
+    found = minimize(
+        functions.objective,
+        u,
+        jac=True,
+        method="SLSQP",
+        bounds=Bounds(0.0, 1.0),
+        constraints=constraints,
+        callback=told,
+        options={"maxiter": iterations, "ftol": 1e-8},
+    )
+    return Ended(bool(found.success), str(found.message))
+
+
+def run_trust_constr(functions: Functions, u: np.ndarray, iterations: int, told: Callback) -> Ended:
+    """Byrd and Omojokun's trust region with an interior point (Conn, Gould, Toint), by SciPy."""
+    constraints = []
+    if functions.rows:
+        rows = functions.rows
+        upper = np.asarray([0.0 if row.equality else np.inf for row in rows])
+        constraints.append(
+            NonlinearConstraint(
+                lambda x: functions.spare(x, rows),
+                0.0,
+                upper,
+                jac=lambda x: functions.spare_gradients(x, rows),
+            )
+        )
+    try:
+        found = minimize(
+            functions.objective,
+            np.clip(u, _EDGE, 1.0 - _EDGE),
+            jac=True,
+            method="trust-constr",
+            bounds=Bounds(0.0, 1.0, keep_feasible=True),
+            constraints=constraints,
+            callback=lambda x, _: told(x),
+            options={"maxiter": iterations, "gtol": 1e-6, "xtol": 1e-7},
+        )
+    except ArgumentError:
+        raise
+    except (ValueError, np.linalg.LinAlgError) as error:
+        # Where derivatives grow without bound, as at corners of the spectral radius.
+        return Ended(False, f"SciPy's trust-constr broke down: {error}.")
+    return Ended(found.status in (1, 2), str(found.message))
+
+
+def run_optax(
+    functions: Functions,
+    u: np.ndarray,
+    iterations: int,
+    told: Callback,
+    transformation: optax.GradientTransformation | None = None,
+) -> Ended:
+    """Descent in logits of u, which keep the bounds; requirements it knows none.
+
+    Raises:
+        ArgumentError: a problem with requirements.
+    """
+    if functions.rows:
+        raise ArgumentError(
+            'optimiser = "optax" is not allowed with subject_to: choose "trust-region".'
+        )
+    method = optax.adam(_RATE) if transformation is None else transformation
+    inside = np.clip(u, _EDGE, 1.0 - _EDGE)
+    logits = jnp.asarray(np.log(inside / (1.0 - inside)))
+    state, best, at_best = method.init(logits), np.inf, logits
+    for _ in range(iterations):
+        now = 1.0 / (1.0 + np.exp(-np.asarray(logits)))
+        value, gradient = functions.objective(now)
+        told(now)
+        if value < best:
+            best, at_best = value, logits
+        if value > best + 0.5 * _RAISED:
+            logits = 0.5 * (logits + at_best)  # no gait there: half way back
+            continue
+        with jax.numpy_dtype_promotion("standard"):  # optax's own
+            step, state = method.update(jnp.asarray(gradient * now * (1.0 - now)), state, logits)
+        if float(jnp.max(jnp.abs(jnp.asarray(step)))) < 1e-6:
+            return Ended(True, "Steps became small.")
+        logits = jnp.asarray(optax.apply_updates(logits, step))
+    return Ended(False, "Iteration limit reached")

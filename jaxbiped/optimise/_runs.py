@@ -1,0 +1,131 @@
+"""Runs of an optimiser over a design problem, and the best design of all of them."""
+
+import enum
+from typing import NamedTuple
+
+import numpy as np
+import optax
+from tqdm import tqdm
+
+from jaxbiped.optimise._design_problem import Design, DesignProblem
+from jaxbiped.optimise._optimality import optimality_of
+from jaxbiped.optimise._optimisers import (
+    Ended,
+    Functions,
+    run_optax,
+    run_slsqp,
+    run_trust_constr,
+)
+from jaxbiped.optimise._trust_region import run_trust_region
+
+_OPTIMAL = 1e-3
+"""Residual of the conditions of optimality from which a design counts as an optimum."""
+
+
+class Outcome(enum.IntEnum):
+    """How an optimisation ended. `str(outcome)` is its name in words.
+
+    - converged: the optimiser's own test is met, and every requirement kept, to
+      its measure's error bar.
+    - corner: no better design was found nearby, but the derivatives do not balance: as at corners
+      of the spectral radius, where multipliers meet.
+    - unfinished: the iterations were used up, or the optimiser could not go on.
+    - interrupted: by Ctrl-C; the best so far is kept.
+    - infeasible: no design was found that keeps the requirements; the nearest to them is told.
+    """
+
+    CONVERGED = 0
+    CORNER = 1
+    UNFINISHED = 2
+    INTERRUPTED = 3
+    INFEASIBLE = 4
+
+    def __str__(self) -> str:
+        return self.name.lower()
+
+
+class Iteration(NamedTuple):
+    """An iterate: its variables by name, objective, excess over requirements and measures."""
+
+    variables: dict[str, float]
+    objective: float
+    excess: float
+    measures: dict[str, float]
+
+
+class Runs:
+    """Runs of an optimiser from one design after the other.
+
+    Attributes:
+        problem, iterations, optimiser: of each run.
+        bar: its progress.
+        history: iterates of all runs.
+        best: the best design of all.
+        ended: how the run ended that came to it; `interrupted` by Ctrl-C.
+    """
+
+    def __init__(
+        self,
+        problem: DesignProblem,
+        iterations: int,
+        optimiser: str | optax.GradientTransformation,
+        progress: bool,
+    ) -> None:
+        self.problem, self.iterations, self.optimiser = problem, iterations, optimiser
+        self.bar = tqdm(unit="iterations", disable=not progress)
+        self.history: list[Iteration] = []
+        self.ended, self.interrupted = Ended(False, ""), False
+
+    @property
+    def best(self) -> Design:
+        """Of all designs that were asked for."""
+        return min(self.problem.asked, key=self._rank)
+
+    def run(self, begin: Design) -> None:
+        """From a design whose gait is known."""
+        self.problem.latest = begin
+        self.told(begin.u)
+        before = self.best
+        functions = Functions(self.problem)
+        if self.optimiser == "trust-region":
+            ended = run_trust_region(self.problem, begin.u, self.iterations, self.told)
+        elif self.optimiser == "slsqp":
+            ended = run_slsqp(functions, begin.u, self.iterations, self.told)
+        elif self.optimiser == "trust-constr":
+            ended = run_trust_constr(functions, begin.u, self.iterations, self.told)
+        else:
+            own = None if isinstance(self.optimiser, str) else self.optimiser
+            ended = run_optax(functions, begin.u, self.iterations, self.told, own)
+        if not self.ended.message or self._rank(self.best) < self._rank(before):
+            self.ended = ended
+
+    def outcome(self) -> Outcome:
+        """How it ended: converged only where the conditions of optimality say so, too."""
+        if self.interrupted:
+            return Outcome.INTERRUPTED
+        told = optimality_of(self.problem, self.best)
+        if told.excess > self.problem.allowance(self.best.known):
+            return Outcome.INFEASIBLE
+        optimal = told.residual <= _OPTIMAL
+        if not self.ended.converged:
+            return Outcome.UNFINISHED
+        return Outcome.CONVERGED if optimal else Outcome.CORNER
+
+    def told(self, u: np.ndarray) -> None:
+        """Notes an iterate."""
+        u = np.clip(np.array(u, dtype=float), 0.0, 1.0)
+        self.bar.update()
+        known = self.problem.evaluations.get(u)
+        if known is None:
+            return
+        value = self.problem.sense * self.problem.objective(known)[0]
+        excess = self.problem.excess(known)
+        measures = {name: known.values[name] for name in self.problem.wanted}
+        self.history.append(Iteration(self.problem.variables.named(u), value, excess, measures))
+        self.bar.set_postfix(objective=f"{value:.6g}", excess=f"{excess:.1e}")
+
+    def _rank(self, design: Design) -> tuple[float, float]:
+        """Designs nearer to the requirements come first, and of those that keep them the better."""
+        excess = self.problem.excess(design.known)
+        kept = excess <= self.problem.allowance(design.known)
+        return 0.0 if kept else excess, self.problem.objective(design.known)[0]

@@ -1,0 +1,70 @@
+"""`jaxbiped optimise`: its JSON, its tables and its refusals."""
+
+import json
+
+import pytest
+
+from jaxbiped.cli import main
+
+pytestmark = pytest.mark.slow
+RIGID = [
+    "optimise",
+    "--model",
+    "rigid",
+    "--maximise",
+    "speed",
+    "--basin",
+    "64",
+    "--footsteps",
+    "20",
+]
+
+
+def run(arguments, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    return ended.value.code, capsys.readouterr()
+
+
+def test_numbers_and_tables(capsys, tmp_path):
+    held = ["--vary", "d=0.08:0.12,r=0.06:0.1", "--subject-to", "step_length<0.19"]
+    code, said = run([*RIGID, *held, "--json", "-"], capsys)
+    assert code == 0
+    numbers = json.loads(said.out)
+    assert set(numbers["variables"]) == {"d", "r"}
+    assert numbers["objective"]["name"] == "speed"
+    assert numbers["objective"]["value"] > numbers["history"][0]["objective"]
+    certificate = numbers["certificate"]
+    assert certificate["kkt_residual"] < 1e-3
+    assert certificate["stable"] is True
+    assert certificate["constraints"][0]["active"] is True
+    assert len(certificate["multipliers"][0]) == 2
+    assert certificate["unit_multiplier_error"] < 1e-5
+    assert certificate["walk"]["returned"] is True
+    assert certificate["basin"]["count"] > 0
+    code, said = run([*RIGID, *held, "--json", str(tmp_path / "best.json")], capsys)
+    assert code == 0
+    assert "held by step_length" in said.out
+    assert json.loads((tmp_path / "best.json").read_text()) == numbers
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--vary", "q"], "vary = 'q' is not known"),
+        (["--vary", "d=0.2:0.1"], "bounds of d = (0.2, 0.1) are empty"),
+        (["--vary", "d=0.2"], "write d=low:high"),
+        (["--vary", "hip_mass"], "hip_mass needs bounds"),
+        (["--vary", "d", "--minimise", "period"], "either maximise or minimise"),
+        (["--vary", "d", "--subject-to", "speed<0.1", "speed>0.2"], "contradict"),
+        (["--vary", "d", "--subject-to", "slip_distance<1"], "roll without slip"),
+        (["--vary", "d", "--optimiser", "magic"], "optimiser = 'magic'"),
+        (["--vary", "d", "--slope", "-0.1"], "the design to start from has no gait"),
+    ],
+)
+def test_refusals_are_one_sentence_and_exit_with_2(arguments, sentence, capsys):
+    code, said = run([*RIGID, *arguments], capsys)
+    assert code == 2
+    assert sentence in said.err
+    assert len(said.err.strip().splitlines()[-1:]) == 1
+    assert not said.out

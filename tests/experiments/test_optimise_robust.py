@@ -1,0 +1,20 @@
+"""Robust designs and the front of speed and radius, at the experiment's quick size."""
+
+import pytest
+
+from tests.drawn import assert_is_drawn
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
+
+
+def test_the_worst_member_costs_speed_and_the_front_is_a_trade(tmp_path):
+    numbers, figures = quick_run("optimise_robust", tmp_path)
+    (figure,) = figures.values()
+    unitless = {"bound of the spectral radius", "spectral radius under scatter"}
+    assert_is_drawn(figure, unitless=unitless)
+    found = numbers["designs"]
+    assert found["worst"]["objective"] < found["mean"]["objective"]
+    assert found["worst"]["share_beyond_bound"] <= found["nominal"]["share_beyond_bound"]
+    loose, strict = numbers["front"]["speed_m_s"]
+    assert loose > strict

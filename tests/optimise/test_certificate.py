@@ -1,0 +1,68 @@
+"""Certificate of an optimum: each of its parts against what it stands for."""
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+
+pytestmark = pytest.mark.slow
+RIGID = jb.ladder()["rigid"]
+
+
+@pytest.fixture(scope="module")
+def best():
+    return jb.optimise_gait(
+        RIGID, vary={"d": (0.08, 0.12), "r": (0.06, 0.1)}, minimise="spectral_radius"
+    )
+
+
+def test_a_stable_gait_is_certified(best):
+    found = jb.optimise.certify(best, starts=256, footsteps=50)
+    own = jb.find_gait(RIGID, parameters=(), radius_sensitivities=False)
+    assert found.stable is True
+    assert np.abs(found.multipliers[0]) == pytest.approx(best.objective, rel=1e-4)
+    assert np.abs(found.multipliers[0]) < float(own.measures.spectral_radius)
+    assert found.walk.returned
+    assert found.walk.footsteps == 50
+    assert 0.0 < found.basin.low < found.basin.estimate < found.basin.high <= 1.0
+    assert found.unit_multiplier_error < 1e-5
+    assert found.sensitivity_norm[1] < 1e-4 * found.sensitivity_norm[0]
+    assert found.other_engine is None
+    assert found.nearest_bifurcation is None
+
+
+def test_an_unstable_gait_does_not_return():
+    long = jb.with_parameters(RIGID, {"slope": 0.12})
+    still = jb.optimise_gait(long, vary={"d": (0.0999, 0.1001)}, minimise="period", iterations=1)
+    assert float(still.gait.measures.spectral_radius) > 1.0
+    found = jb.optimise.certify(still, starts=0, footsteps=60)
+    assert found.stable is False
+    assert found.basin is None
+    assert not found.walk.returned
+    assert found.sensitivity_norm[0] == np.inf
+
+
+def test_the_place_of_the_nearest_bifurcation(best):
+    found = jb.optimise.certify(
+        best,
+        starts=0,
+        footsteps=0,
+        nearest_bifurcation=lambda scene, gait: float(gait.measures.period),
+    )
+    assert found.nearest_bifurcation == float(best.gait.measures.period)
+    assert found.walk is None
+
+
+def test_the_other_engine_finds_the_same_gait(best):
+    found = jb.optimise.certify(best, starts=0, footsteps=0, other_engine=True)
+    assert found.other_engine.engine == "xla"
+    assert found.other_engine.found
+    assert found.other_engine.period_difference < 1e-7
+    assert found.other_engine.radius_difference < 1e-5
+
+
+def test_certify_refuses_what_is_no_optimum(best):
+    with pytest.raises(jb.ArgumentError, match="optimum"):
+        jb.optimise.certify(best.gait)
+    with pytest.raises(jb.ArgumentError, match="starts = -1"):
+        jb.optimise.certify(best, starts=-1)

@@ -1,0 +1,175 @@
+"""Objectives of a gait: gradients against central differences, error bars, energy balance."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
+from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
+from jaxbiped.optimise._objectives import check_objective, evaluate
+
+pytestmark = pytest.mark.slow
+SCENES = jb.ladder() | {"heavy hip": jb.seed_scene(hip_mass=0.5, slope=0.025, r=0.1)}
+VARIED = ("d", "J", "slope")
+USUAL = (1e-3, 1e-5)
+"""Relative step of the differences, and allowed error of elasticities by the balanced accuracy."""
+NOISY = {
+    "spectral_radius": (3e-3, 3e-5),
+    "radius_bound": (1e-3, 1e-4),
+    "slip_distance": (1e-2, 1e-5),
+    "friction_loss": (1e-3, 1e-5),
+}
+"""The same for what the balanced accuracy tells to its error bars alone, by the tight one."""
+
+
+def objectives_of(scene):
+    for name in jb.optimise.OBJECTIVES:
+        if jb.optimise.OBJECTIVES[name].lacks(scene) is None:
+            yield name
+
+
+def evaluation(scene, names, guess=None, accuracy="balanced"):
+    gait = jb.find_gait(scene, guess, radius_sensitivities=False, accuracy=accuracy, engine="lanes")
+    assert gait.outcome is jb.gait.Search.FOUND
+    return evaluate(scene, gait, names, accuracy), gait.measures.state
+
+
+@pytest.mark.parametrize("which", ["rigid", "stribeck", "heavy hip"])
+def test_gradients_are_those_of_central_differences(which):
+    """Against fourth-order differences of tightly solved gaits."""
+    scene = SCENES[which]
+    names = tuple(objectives_of(scene))
+    told, guess = evaluation(scene, names)
+    tight, _ = evaluation(scene, names, guess, "tight")
+    for varied in VARIED:
+        own = float(jb.parameter_values(scene)[varied])
+        place = jb.parameter_names(scene).index(varied)
+        for step in sorted({USUAL[0], *(each[0] for each in NOISY.values())}):
+            kind = tuple(name for name in names if NOISY.get(name, USUAL)[0] == step)
+            if not kind:
+                continue
+            scenes = {
+                k: jb.with_parameters(scene, {varied: own * (1.0 + k * step)})
+                for k in (-2, -1, 1, 2)
+            }
+            at = {k: evaluation(each, kind, guess, "tight")[0] for k, each in scenes.items()}
+            for name in kind:
+                f = {k: each.values[name] for k, each in at.items()}
+                size = abs(tight.values[name])
+                slope = (8.0 * (f[1] - f[-1]) - (f[2] - f[-2])) / (12.0 * step) / size
+                off = {
+                    each: abs(known.slopes[name][place] * own / size - slope)
+                    for each, known in (("balanced", told), ("tight", tight))
+                }
+                if name not in NOISY:
+                    # Of steep ones the error is relative.
+                    assert off["balanced"] <= USUAL[1] * max(1.0, abs(slope)), (name, varied)
+                    continue
+                bar = told.slope_errors[name][place] * own / size
+                assert off["tight"] <= NOISY[name][1], (name, varied)
+                assert off["balanced"] <= NOISY[name][1] + 5.0 * bar, (name, varied)
+
+
+def test_energy_that_gravity_gives_is_lost():
+    """Weight times the descent equals the losses, to their error bars."""
+    for which in ("rigid", "stribeck"):
+        scene = SCENES[which]
+        known, _ = evaluation(scene, tuple(objectives_of(scene)))
+        weight = float(scene.walker.total_mass * scene.ground.g)
+        work = weight * known.values["step_length"] * np.sin(float(scene.ground.slope))
+        losses = known.values["impact_loss"] + known.values.get("friction_loss", 0.0)
+        assert losses == pytest.approx(work, rel=1e-6)
+        sine = np.sin(float(scene.ground.slope))
+        assert known.values["cost_of_transport"] == pytest.approx(sine, rel=1e-6)
+        # So the gradient of a passive cost of transport is the slope's alone.
+        names = jb.parameter_names(scene)
+        expected = np.zeros(len(names))
+        expected[names.index("slope")] = np.cos(float(scene.ground.slope))
+        values = np.asarray([float(v) for v in jb.parameter_values(scene).values()])
+        off = (known.slopes["cost_of_transport"] - expected) * values / sine
+        assert np.max(np.abs(off)) < 1e-4
+
+
+def test_losses_are_those_of_the_energy_ledger():
+    scene = SCENES["stribeck"]
+    known, state = evaluation(scene, ("friction_loss", "impact_loss"))
+    walk = jb.simulate(scene, state, duration=known.values["period"], engine="lanes")
+    books = jb.energy_ledger(scene, walk)
+    assert float(books.friction_loss[0]) == pytest.approx(known.values["friction_loss"], rel=1e-4)
+    assert float(books.damper_loss[0]) == pytest.approx(known.values["impact_loss"], rel=1e-4)
+
+
+def test_the_rigid_clearance_is_that_of_the_rigid_checks():
+    scene = SCENES["rigid"]
+    gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
+    found = cycle_functionals(scene, gait.measures.state)
+    clearance = float(found.values[integral_names(scene).index("foot_clearance")])
+    lowest = float(jb.dynamics.rigid_checks(scene, gait.orbit[1]).clearance.min())
+    assert clearance <= lowest
+    assert clearance == pytest.approx(lowest, rel=0.2)
+
+
+def test_the_bound_is_above_the_radius_and_the_moduli_are_the_multipliers():
+    for which in ("rigid", "stribeck"):
+        scene = SCENES[which]
+        gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
+        names = JACOBIAN_FUNCTIONALS[:4]
+        found = jacobian_functionals(scene, gait.measures.state, names)
+        values = dict(zip(names, np.asarray(found.values), strict=True))
+        upper = np.asarray(gait.multipliers)
+        upper = np.sort(np.abs(upper[upper.imag >= 0.0]))[::-1]
+        assert values["spectral_radius"] == pytest.approx(upper[0], rel=1e-4)
+        assert values["modulus_2"] == pytest.approx(upper[1], rel=1e-3)
+        assert upper[0] < values["radius_bound"] < 1.1 * upper[0]
+
+
+def test_the_sensitivity_norm_is_the_response_of_footsteps():
+    """Footsteps after a lean of the ground for the first one, followed by the return map itself."""
+    scene = SCENES["rigid"]
+    gait = jb.find_gait(scene, accuracy="tight", parameters=(), radius_sensitivities=False)
+    push = 1e-4
+    told = []
+    for sign in (1.0, -1.0):
+        slope = float(scene.ground.slope) + sign * push
+        state, rows = gait.measures.state, []
+        leaning = jb.with_parameters(scene, {"slope": slope})
+        for k in range(60):
+            start = state._replace(hip_x=np.zeros(()))
+            came = jb.return_map(leaning if k == 0 else scene, start, accuracy="tight")
+            rows.append([float(came.state.hip_x), float(came.time)])
+            state = came.state
+        told.append(np.asarray(rows))
+    size = np.asarray([float(gait.measures.step_length), float(gait.measures.period)])
+    response = (told[0] - told[1]) / (2.0 * push) / size
+    norm = float(
+        jacobian_functionals(
+            scene, gait.measures.state, ("sensitivity_norm",), accuracy="tight"
+        ).values[0]
+    )
+    assert norm == pytest.approx(np.sqrt(np.sum(response**2)), rel=1e-5)
+
+
+def test_error_bars_of_values_hold_against_a_tight_solve():
+    scene = SCENES["stribeck"]
+    names = tuple(objectives_of(scene))
+    known, guess = evaluation(scene, names)
+    tight, _ = evaluation(scene, names, guess, "tight")
+    for name in names:
+        off = abs(known.values[name] - tight.values[name])
+        assert off <= 10.0 * known.errors[name] + 1e-9 * abs(tight.values[name]), name
+
+
+def test_an_objective_that_a_scene_lacks_is_refused_in_a_sentence():
+    rigid, scene = SCENES["rigid"], SCENES["stribeck"]
+    with pytest.raises(jb.ArgumentError, match=r"slip_distance.*roll without slip"):
+        check_objective("slip_distance", rigid)
+    bare = dataclasses.replace(scene, friction=jb.laws.Frictionless())
+    with pytest.raises(jb.ArgumentError, match=r"friction_loss.*Frictionless"):
+        check_objective("friction_loss", bare)
+    scuffs = dataclasses.replace(scene, clearance=jb.laws.AlwaysTouching())
+    with pytest.raises(jb.ArgumentError, match=r"foot_clearance.*AlwaysTouching"):
+        check_objective("foot_clearance", scuffs)
+    with pytest.raises(jb.ArgumentError, match="objective = 'beauty'"):
+        check_objective("beauty", scene)

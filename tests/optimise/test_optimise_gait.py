@@ -1,0 +1,185 @@
+"""Optimisation of a gait: against a grid, through lost gaits, resumed, interrupted; bad inputs."""
+
+import json
+
+import numpy as np
+import optax
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.optimise._design_problem import DesignProblem
+from jaxbiped.optimise._evaluations import Evaluations
+from jaxbiped.optimise._variables import variables_of
+
+pytestmark = pytest.mark.slow
+RIGID = jb.ladder()["rigid"]
+LEG = {"d": (0.08, 0.12), "r": (0.06, 0.1)}
+
+
+def best_of(**options):
+    return jb.optimise_gait(RIGID, **{"vary": LEG, "maximise": "speed"} | options)
+
+
+def test_an_optimum_of_two_variables_is_that_of_a_grid():
+    """Peak force against speed: inside the bounds of one variable; constrained by the radius."""
+    weights = {"peak_normal": 1.0, "impact_loss": 40.0, "speed": -20.0}
+    vary = {"d": (0.05, 0.15), "J": (0.004, 0.03)}
+    count = 17
+    d, J = (np.linspace(*bounds, count) for bounds in vary.values())
+    grid = jb.gait_sweep(RIGID, {"d": d, "J": J}, parameters=(), radius_sensitivities=False)
+    weight = float(RIGID.walker.total_mass * RIGID.ground.g)
+    losses = weight * np.sin(float(RIGID.ground.slope)) * grid.step_length
+    total = (grid.peak_normal + 40.0 * losses - 20.0 * grid.speed).values
+    allowed = np.isfinite(total)
+    free = best_of(vary=vary, maximise=None, minimise=weights)
+    held = best_of(
+        vary=vary, maximise=None, minimise=weights, subject_to={"spectral_radius": (None, 0.45)}
+    )
+    for best, inside in ((free, allowed), (held, allowed & (grid.spectral_radius.values <= 0.45))):
+        assert best.outcome in (jb.optimise.Outcome.CONVERGED, jb.optimise.Outcome.CORNER)
+        least = np.min(total[inside])
+        # No point of the grid is better, and one of its neighbours is nearly as good.
+        assert best.objective <= least + 1e-9
+        k, j = np.unravel_index(np.argmin(np.where(inside, total, np.inf)), total.shape)
+        spans = [(b[1] - b[0]) / (count - 1) for b in vary.values()]
+        assert abs(best.variables["d"] - d[k]) <= 2.0 * spans[0]
+        assert abs(best.variables["J"] - J[j]) <= 2.0 * spans[1]
+    assert held.known.values["spectral_radius"] <= 0.45 * (1.0 + 1e-6)
+
+
+def test_optimisers_agree_and_the_conditions_of_optimality_hold():
+    found = {
+        name: best_of(subject_to="step_length<0.19", optimiser=name)
+        for name in ("trust-region", "slsqp", "trust-constr")
+    }
+    for name, best in found.items():
+        # The interior point ends a little inside.
+        inside = 1e-3 if name == "trust-constr" else 1e-5
+        assert best.objective == pytest.approx(found["trust-region"].objective, rel=inside), name
+        assert best.optimality.excess <= 1e-6, name
+        assert best.optimality.residual < 1e-3 or name == "trust-constr", name
+    best = found["trust-region"]
+    assert best.outcome is jb.optimise.Outcome.CONVERGED
+    (row,) = best.optimality.requirements
+    assert row.active
+    # The multiplier is what a longer step would bring.
+    more = best_of(subject_to="step_length<0.1905").objective - best.objective
+    assert row.multiplier == pytest.approx(more / 0.0005, rel=0.02)
+
+
+def test_optax_descends_within_the_bounds():
+    best = best_of(optimiser="optax", iterations=120)
+    sure = best_of()
+    assert best.objective == pytest.approx(sure.objective, rel=1e-2)
+    own = best_of(optimiser=optax.sgd(2.0), iterations=20)
+    assert own.objective > float(best.history[0].objective)
+
+
+def test_an_equality_is_kept():
+    best = best_of(subject_to="step_length=0.19")
+    assert best.known.values["step_length"] == pytest.approx(0.19, rel=1e-6)
+
+
+def test_a_lost_gait_turns_the_search_back(monkeypatch):
+    """As if no gait existed beyond d = 0.09: the best one with a gait is found."""
+    plain = DesignProblem.at
+
+    def at(problem, u):
+        if problem.variables.named(np.clip(u, 0.0, 1.0))["d"] < 0.09:
+            problem.lost += 1
+            return None
+        return plain(problem, u)
+
+    monkeypatch.setattr(DesignProblem, "at", at)
+    for name in ("trust-region", "slsqp"):
+        best = best_of(vary={"d": (0.08, 0.12)}, optimiser=name)
+        assert best.lost > 0, name
+        assert best.variables["d"] >= 0.09
+        assert best.objective >= best.history[0].objective
+
+
+def test_restarts_are_searched_as_one_batch():
+    best = best_of(restarts=1, seed=3, iterations=8)
+    assert best.objective >= best_of().objective - 1e-6
+    assert best.evaluations > 8
+
+
+def test_a_store_is_resumed_where_it_was(tmp_path):
+    path = tmp_path / "runs.jsonl"
+    whole = best_of(subject_to="step_length<0.19")
+    some = best_of(subject_to="step_length<0.19", iterations=3, store=path)
+    lines = len(path.read_text().splitlines())
+    assert lines == 1 + some.evaluations
+    # A line that a killed run left half-written is left out.
+    with path.open("a") as file:
+        file.write('{"u": [0.1')
+    again = best_of(subject_to="step_length<0.19", store=path)
+    assert again.variables == whole.variables
+    assert again.evaluations == whole.evaluations
+    assert len(path.read_text().splitlines()) == 1 + again.evaluations
+    with pytest.raises(jb.ArgumentError, match="another problem"):
+        best_of(vary={"d": (0.08, 0.13)}, store=path)
+    assert json.loads(path.read_text().splitlines()[0])["goal"][1] == -1.0
+
+
+def test_ctrl_c_keeps_the_best(monkeypatch):
+    plain, calls = Evaluations.add, []
+
+    def add(self, u, known):
+        plain(self, u, known)
+        calls.append(u)
+        if len(calls) == 4:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Evaluations, "add", add)
+    best = best_of()
+    assert best.outcome is jb.optimise.Outcome.INTERRUPTED
+    assert best.objective >= best.history[0].objective
+
+
+def test_a_start_outside_the_bounds_is_moved_onto_them():
+    best = best_of(vary={"d": (0.11, 0.12)}, iterations=1)
+    assert best.history[0].variables["d"] == pytest.approx(0.11)
+
+
+def test_variables_keep_their_bounds_exactly():
+    variables = variables_of(RIGID, {"d": (0.05, 0.2), "hip_mass": (0.0, 1.0)})
+    for u in (np.zeros(2), np.ones(2)):
+        values = variables.values(u)
+        assert values.tolist() == [[0.05, 0.2][int(u[0])], [0.0, 1.0][int(u[1])]]
+        assert np.allclose(variables.positions(values), u)
+    u, step = np.array([0.3, 0.7]), 1e-6
+    slopes = [
+        (variables.values(u + step * e) - variables.values(u - step * e)) / (2 * step)
+        for e in np.eye(2)
+    ]
+    assert np.allclose(np.diag(slopes), variables.rates(u), rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"vary": {"q": (0.0, 1.0)}}, r"vary = 'q'"),
+        ({"vary": {}}, r"at least one parameter"),
+        ({"vary": {"d": (0.2, 0.1)}}, r"bounds of d = \(0.2, 0.1\) are empty"),
+        ({"vary": {"m": (-1.0, 1.0)}}, r"m = -1"),
+        ({"maximise": "beauty"}, r"maximise = 'beauty'"),
+        ({"maximise": "slip_distance"}, r"roll without slip"),
+        ({"minimise": "speed"}, r"either maximise or minimise"),
+        ({"subject_to": ["speed<0.4", "speed>0.5"]}, r"contradict each other"),
+        ({"subject_to": "speed"}, r"is not understood"),
+        ({"subject_to": {"speed": (None, None)}}, r"None for none"),
+        ({"subject_to": "speed<0.5", "optimiser": "optax"}, r"not allowed with optax"),
+        ({"optimiser": "magic"}, r"optimiser = 'magic'"),
+        ({"iterations": 0}, r"iterations = 0"),
+    ],
+)
+def test_bad_inputs_are_refused_by_one_sentence(options, sentence):
+    with pytest.raises(jb.ArgumentError, match=sentence):
+        best_of(**options)
+
+
+def test_a_start_without_a_gait_is_refused():
+    uphill = jb.with_parameters(RIGID, {"slope": -0.1})
+    with pytest.raises(jb.ArgumentError, match="the design to start from has no gait"):
+        jb.optimise_gait(uphill, vary={"d": (0.09, 0.11)}, maximise="speed")
