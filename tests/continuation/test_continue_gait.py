@@ -278,3 +278,13 @@ def test_where_there_is_no_gait_the_branch_says_why():
     assert len(branch) == 0
     assert branch.stops[0].cause.startswith("no gait")
     assert "no beginning" in repr(branch)
+
+
+def test_slip_and_lost_touch_are_told_as_limits():
+    slips = jb.continue_gait(
+        jb.seed_scene(mu_kinetic=0.2), "mu_kinetic", bounds=(0.1, 0.2), largest_step=0.1
+    )
+    assert slips.stops[0].cause.startswith("slip")
+    assert slips.bifurcations[0].kind is BranchEvent.LIMIT
+    bounces = jb.continue_gait(jb.seed_scene(c=4e4), "c", bounds=(1e4, 4e4), largest_step=0.1)
+    assert bounces.stops[0].cause.startswith("no touch")
