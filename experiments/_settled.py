@@ -38,7 +38,7 @@ class Settled(NamedTuple):
 
 def settled(scene: Any, near: list[Any], *, seed: int) -> Settled:
     """Where walks from rolling starts, and from states `near` by, settle."""
-    starts = jb.rolling_starts(scene, STARTS, spread=0.5, seed=seed)
+    starts = jb.gait.rolling_starts(scene, STARTS, spread=0.5, seed=seed)
     for i, state in enumerate(near[-4:]):
         starts = jax.tree.map(lambda leaf, own, i=i: leaf.at[1 + i].set(own), starts, state)
     times, states, counts = _walked(scene, starts, FOOTSTEPS, 1e-5)

@@ -18,7 +18,8 @@ RESULTS = Path(__file__).parent / "results"
 PICTURES = {"picture", "pictures"}
 TIMINGS = {
     "batch_ratio", "batch_us", "compile_s", "first_compile_s", "first_result_s", "gaits_s",
-    "seconds", "single_us", "wall_ms", "wall_s", "wall_s_run",
+    "cold_cpu_s", "cold_wall_s", "seconds", "single_us", "wall_ms", "wall_s", "wall_s_run",
+    "warm_cpu_s", "warm_wall_s",
 }  # fmt: skip
 """Keys of what an idle machine must measure."""
 UNKNOWN = "…"
@@ -161,6 +162,18 @@ def of_force_models(numbers: dict[str, Any]) -> Iterator[str]:
     yield f"(off by {numbers['normal']['tsuji']['unit_multiplier_error']:.2f})"
 
 
+def of_level_ground(numbers: dict[str, Any]) -> Iterator[str]:
+    """What the simplest walker's push-off saves, and what drives of the seed's walker cost."""
+    pairs = numbers["simplest"]
+    yield f"{pairs[0]['ratio']:.2f} times at a half-angle of {pairs[0]['angle_rad']:.2f} rad"
+    yield f"{pairs[-1]['ratio']:.2f} times at {pairs[-1]['angle_rad']:.2f} rad"
+    for name, curve in numbers["seed"].items():
+        stable = [point for point in curve if point["stable"]]
+        ends = [pick(stable, key=lambda point: point["speed_m_s"]) for pick in (min, max)]
+        speeds = [f"{end['speed_m_s']:.3f}" for end in ends]
+        yield row(name, *speeds, *[small(end["cost_of_transport"], 2) for end in ends])
+
+
 def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
     """How many scenes were searched, in how many walks settle, and how many were missed."""
     rows = [each for family in numbers.values() for each in family]
@@ -171,6 +184,37 @@ def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
     yield f"settle on a gait or a longer cycle in {len(settles)}, and the search finds {found}"
 
 
+def of_slope_branch(numbers: dict[str, Any]) -> Iterator[str]:
+    """Where each model of the seed's walker loses its stability, by the branch and by bisection."""
+    for name, found in numbers["scenes"].items():
+        for loss in found["losses"]:
+            kind, multiplier = loss["kind"].replace("-", " "), loss["multiplier"][0]
+            yield row(
+                name, kind, f"{loss['slope']:.9f}", f"{loss['bisection'][1]:.9f}",
+                small(abs(abs(multiplier) - 1.0)), small(loss["error"]),
+            )  # fmt: skip
+
+
+def of_period_doubling(numbers: dict[str, Any]) -> Iterator[str]:
+    """Doublings of the rigid seed and of the simplest walker, and its gaits of three footsteps."""
+    yield f"at {numbers['rigid_seed']['slope']:.6f} rad"
+    long, short = numbers["pair"]["long"], numbers["pair"]["short"]
+    yield f"θ = {long['theta']:.12f} and {short['theta']:.12f}"
+    first, second = (value for value, _ in short["multipliers"][:2])
+    yield f"multipliers {first:.4f} and {second:.4f}"
+    cascade = numbers["cascade"]
+    for footsteps, slope in zip(cascade["footsteps"], cascade["slopes"], strict=True):
+        yield row(str(footsteps), f"{slope:.9f}")
+    yield ", ".join(f"{ratio:.3f}" for ratio in cascade["ratios"])
+    chaos = numbers["chaos"]
+    yield f"accumulate at {cascade['accumulation']:.5f} rad"
+    yield f"up to {chaos['last_cycle']:.5f} rad, and none from {chaos['first_without']:.5f} on"
+    (family,) = numbers["period_three"]["branches"]
+    places = {kind: value for kind, value in family["bifurcations"]}
+    yield f"fold at {places['fold']:.6f} rad"
+    yield f"doubling at {places['period-doubling']:.6f}"
+
+
 QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "basin_seed": of_basin_seed,
     "basin_simplest": of_basin_simplest,
@@ -178,7 +222,10 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "gradient_accuracy": of_gradient_accuracy,
     "identify": of_identify,
     "ladder": of_ladder,
+    "level_ground": of_level_ground,
+    "period_doubling": of_period_doubling,
     "search_robustness": of_search_robustness,
+    "slope_branch": of_slope_branch,
 }
 """Of each experiment: the phrases and rows that the pages quote."""
 

@@ -171,7 +171,7 @@ def result(family: Family, value: float, gait: jb.Gait, seconds: float, walk: Se
         cycle=walk.cycle,
         walked=walk.period,
         seconds=seconds,
-        said=jb.explain_search(scene, gait),
+        said=jb.gait.explain_search(scene, gait),
     )
 
 

@@ -17,11 +17,13 @@ _jax.config.update("jax_enable_x64", True)
 # Namespaces.
 from jaxbiped import basins as basins
 from jaxbiped import constraints as constraints
+from jaxbiped import continuation as continuation
 from jaxbiped import dynamics as dynamics
 from jaxbiped import gait as gait
 from jaxbiped import identify as identify
 from jaxbiped import measure as measure
 from jaxbiped import optimise as optimise
+from jaxbiped.scene import actuation as actuation
 from jaxbiped.scene import laws as laws
 from jaxbiped.solve import solvers as solvers
 from jaxbiped.sweep import starts as starts
@@ -70,10 +72,8 @@ from jaxbiped.solve._trajectory import Trajectory as Trajectory
 from jaxbiped.measure._dataset import trajectory_dataset as trajectory_dataset
 from jaxbiped.measure._energy_ledger import energy_ledger as energy_ledger
 from jaxbiped.measure._footsteps import footsteps as footsteps
-from jaxbiped.measure._footsteps import heel_strikes as heel_strikes
 
 # Periodic gaits and gradients.
-from jaxbiped.gait._explain_search import explain_search as explain_search
 from jaxbiped.gait._find_gait import find_gait as find_gait
 from jaxbiped.gait._find_gaits import find_gaits as find_gaits
 from jaxbiped.gait._gait import Gait as Gait
@@ -82,7 +82,9 @@ from jaxbiped.gait._gradient_modes import Forward as Forward
 from jaxbiped.gait._gradient_modes import Implicit as Implicit
 from jaxbiped.gait._gradient_modes import Reverse as Reverse
 from jaxbiped.gait._return_map import return_map as return_map
-from jaxbiped.gait._rolling_starts import rolling_starts as rolling_starts
+
+# Branches of gaits.
+from jaxbiped.continuation._continue_gait import continue_gait as continue_gait
 
 # Identification.
 from jaxbiped.identify._fit_gait import fit_gait as fit_gait

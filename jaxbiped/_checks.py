@@ -105,7 +105,11 @@ def check_count(name: str, value: ArrayLike) -> None:
 
 def check_unbatched(name: str, value: object, one: str = "one number") -> None:
     """Raises `ArgumentError` where any leaf of `value` is an array instead of one number."""
-    leaves = jax.tree_util.tree_flatten_with_path(value, is_leaf=lambda x: type(x) in (list, tuple))
+
+    def is_array(x: object) -> bool:
+        return type(x) is list or (x is value and type(x) is tuple)
+
+    leaves = jax.tree_util.tree_flatten_with_path(value, is_leaf=is_array)
     for path, leaf in leaves[0]:
         if np.ndim(leaf):
             full = name + jax.tree_util.keystr(path)

@@ -61,7 +61,7 @@ def parameter(
     positive: bool = False,
     minimum: float | None = None,
     size_below: float | None = None,
-    pair: bool = False,
+    several: bool = False,
     default: Parameter | None = dataclasses.MISSING,
 ) -> Any:
     """A field for a parameter of a law of contact or of any other part of a scene.
@@ -77,7 +77,7 @@ def parameter(
         positive: whether it must be above 0.
         minimum: the smallest value allowed, any unless given.
         size_below: what its absolute value must be below.
-        pair: whether it is a pair of numbers, as a point.
+        several: whether it is a tuple of numbers, as a point or the coefficients of a spline.
         default: the value unless given; with None, None stays and the law does without it.
 
     Example:
@@ -91,7 +91,7 @@ def parameter(
     one = _optional_float if default is None else as_float
     info = ParameterInfo(Quantity(words, symbol, unit), positive, minimum, size_below)
     given: dict[str, Any] = {} if default is dataclasses.MISSING else {"default": default}
-    return eqx.field(converter=_pair if pair else one, metadata={_KEY: info}, **given)
+    return eqx.field(converter=_tuple if several else one, metadata={_KEY: info}, **given)
 
 
 def parameter_infos(part: Any) -> dict[str, ParameterInfo]:
@@ -113,5 +113,6 @@ def _optional_float(value: Parameter | None) -> Scalar | None:
     return None if value is None else as_float(value)
 
 
-def _pair(values: Iterable[Parameter]) -> tuple[Scalar, ...]:
-    return tuple(map(as_float, values))
+def _tuple(values: Parameter | Iterable[Parameter]) -> tuple[Scalar, ...]:
+    one = not isinstance(values, Iterable) or getattr(values, "ndim", 1) == 0
+    return tuple(map(as_float, [values] if one else values))

@@ -17,6 +17,7 @@ LAYERS = [
     "simulate",
     "measure",
     "gait",
+    "continuation",
     "identify",
     "basins",
     "sweep",

@@ -16,10 +16,12 @@ NAMESPACES = {
     **{
         f"jb.{name}": getattr(jb, name)
         for name in (
+            "actuation",
             "laws",
             "constraints",
             "dynamics",
             "gait",
+            "continuation",
             "measure",
             "solvers",
             "basins",
@@ -104,7 +106,14 @@ def _examples():
             yield pytest.param(example, id=each.id, marks=slow)
 
 
-COMPILING = {"jb.simulate", "jb.footsteps", "jb.energy_ledger", "jb.find_gait", "jb.rigid_walk"}
+COMPILING = {
+    "jb.continue_gait",
+    "jb.simulate",
+    "jb.footsteps",
+    "jb.energy_ledger",
+    "jb.find_gait",
+    "jb.rigid_walk",
+}
 """Functions whose examples compile a walk or a gait."""
 EXAMPLES = list(_examples())
 

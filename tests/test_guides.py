@@ -114,7 +114,8 @@ def test_flags_of_the_command_line_exist(capsys):
     from jaxbiped.cli import main
 
     helps = ""
-    for command in ("walk", "gait", "fit", "optimise", "basin", "models", "constraints"):
+    commands = ("walk", "gait", "continue", "fit", "optimise", "basin", "models", "constraints")
+    for command in commands:
         with pytest.raises(SystemExit):
             main([command, "--help"])
         helps += "".join(capsys.readouterr())

@@ -126,7 +126,7 @@ class Ranged(jb.laws.AbstractFrictionLaw):
     from_two: float = jb.laws.parameter("c", "$c$", minimum=2.0, default=2.0)
     small: float = jb.laws.parameter("d", "$d$", "rad", size_below=1.0, default=0.0)
     any_number: float = jb.laws.parameter("e", default=0.0)
-    point: tuple = jb.laws.parameter("f", "$f$", "m", pair=True, default=(0.0, 0.0))
+    point: tuple = jb.laws.parameter("f", "$f$", "m", several=True, default=(0.0, 0.0))
     optional: float | None = jb.laws.parameter("h", "$h$", "m", positive=True, default=None)
 
     def force(self, normal_force, slip_speed):

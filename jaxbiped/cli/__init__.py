@@ -12,6 +12,7 @@ from jaxbiped._checks import ArgumentError, ResourceError
 from jaxbiped._progress import tell_stages
 from jaxbiped.cli._basin import Basin
 from jaxbiped.cli._constraints import Constraints
+from jaxbiped.cli._continue import ContinueGait
 from jaxbiped.cli._fit import Fit
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
@@ -23,6 +24,7 @@ from jaxbiped.cli._walk import Walk
 _Command = (
     Annotated[Walk, subcommand("walk")]
     | Annotated[FindGait, subcommand("gait")]
+    | Annotated[ContinueGait, subcommand("continue")]
     | Annotated[Fit, subcommand("fit")]
     | Annotated[Basin, subcommand("basin")]
     | Annotated[Optimise, subcommand("optimise")]

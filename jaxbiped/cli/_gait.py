@@ -13,6 +13,7 @@ from tyro.conf import OmitArgPrefixes
 from jaxbiped import _clock
 from jaxbiped._checks import check_choice, check_count
 from jaxbiped._types import JsonObject
+from jaxbiped.cli._driven import cost_sentence, gait_cost
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.dynamics._rigid_checks import rigid_checks
@@ -89,11 +90,15 @@ class FindGait:
         numbers = gait_numbers(gait) | {"search": explain_search(scene, gait), "wall_s": wall}
         if found and isinstance(scene, RigidScene):
             numbers["assumptions"] = _assumptions(scene, gait)
+        cost = gait_cost(scene, gait, self.footsteps) if found else {}
+        numbers |= cost
         report = Report(self.output.json)
         if found:
             _print(report, numbers, gait)
             if "assumptions" in numbers:
                 report.say(_assumption_line(numbers["assumptions"]))
+            if cost:
+                report.say(cost_sentence(cost))
         else:
             report.say(_failure(numbers, gait))
         if found and self.output.out is not None:

@@ -14,6 +14,8 @@ from jaxbiped.scene._ladder import ladder
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator
+from jaxbiped.scene.actuation._catalogue import ACTUATORS
 from jaxbiped.scene.laws import AbstractBristleLaw, AbstractFrictionLaw, AbstractNormalLaw
 from jaxbiped.scene.laws._catalogue import (
     FRICTION_LAWS,
@@ -50,6 +52,7 @@ class Models:
                     for name in FRICTION_LAWS
                     for law in [friction_law_like(name, **_SEED_FRICTION)]
                 ],
+                "actuation": [_actuator(name, kind) for name, kind in ACTUATORS.items()],
                 "rungs": [_rung(name, scene) for name, scene in ladder(seed).items()],
             }
         report = Report(self.json)
@@ -74,6 +77,13 @@ def _law(
     }
 
 
+def _actuator(name: str, kind: type[AbstractActuator]) -> JsonObject:
+    """An actuator with the units of its parameters."""
+    infos = parameter_infos(kind)
+    units = {name: info.quantity.unit_in_text for name, info in infos.items()}
+    return {"name": name, "class": kind.__name__, "units": units}
+
+
 def _rung(name: str, scene: Scene | RigidScene) -> JsonObject:
     return {
         "name": name,
@@ -93,6 +103,12 @@ def _print(report: Report, numbers: JsonObject) -> None:
         for name, operations, parameters in rows:
             report.say(f"{name:<{width}}  {operations:>10}  {parameters}")
         report.say()
+    width = max(len(part["name"]) for part in numbers["actuation"]) + 2
+    report.say(f"{'actuator':<{width}}  parameters")
+    for part in numbers["actuation"]:
+        units = ", ".join(f"{name} [{unit}]" for name, unit in part["units"].items())
+        report.say(f"--{part['name']:<{width - 2}}  {units}")
+    report.say()
     rungs = [(r["name"], str(r["states"]), str(r["operations"])) for r in numbers["rungs"]]
     report.say(table(("rung", "states", "operations"), rows=rungs, most=len(rungs)))
     report.say("operations: of one evaluation of the vector field, equal ones shared")

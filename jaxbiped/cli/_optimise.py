@@ -59,6 +59,8 @@ class Optimise:
     """Starts about the gait that are labelled for the certificate's basin; 0 for none."""
     footsteps: int = 200
     """Footsteps of the certificate's walk from a pushed start; 0 for none."""
+    bifurcations: str = "slope"
+    """Parameters in which the certificate seeks the nearest bifurcation: slope,d; or none."""
     other_engine: bool = False
     """Whether the certificate also finds the gait by the other engine (compiles for minutes)."""
     store: Path | None = None
@@ -79,6 +81,9 @@ class Optimise:
         check_not_negative("footsteps", self.footsteps)
         if self.json is not None and str(self.json) != "-":
             check_writable_file("--json", self.json)
+        along = [n.strip() for n in self.bifurcations.split(",") if n.strip() not in ("", "none")]
+        for name in along:
+            check_choice("bifurcations", name, parameter_names(scene))
         found = optimise_gait(
             scene,
             vary=_bounds(scene, self.vary),
@@ -95,7 +100,11 @@ class Optimise:
             store=self.store,
         )
         certificate = certify(
-            found, starts=self.basin, footsteps=self.footsteps, other_engine=self.other_engine
+            found,
+            starts=self.basin,
+            footsteps=self.footsteps,
+            bifurcations_along=along,
+            other_engine=self.other_engine,
         )
         goal = self.minimise if self.maximise is None else self.maximise
         sense = "minimise" if self.maximise is None else "maximise"
@@ -178,7 +187,17 @@ def certificate_numbers(certificate: Certificate) -> JsonObject:
         "basin": None if basin is None else dataclasses.asdict(basin),
         "walk": None if walk is None else walk._asdict(),
         "other_engine": None if other is None else other._asdict(),
-        "nearest_bifurcation": certificate.nearest_bifurcation,
+        "nearest_bifurcations": [
+            {
+                "along": each.along,
+                "kind": None if each.kind is None else str(each.kind),
+                "value": each.value,
+                "ratio": each.ratio,
+                "multiplier": parts(each.multiplier),
+                "error": each.error,
+            }
+            for each in certificate.nearest_bifurcations
+        ],
     }
 
 
@@ -241,6 +260,13 @@ def _certificate_lines(certificate: Certificate) -> list[str]:
     if walk is not None:
         back = "back to the gait" if walk.returned else "NOT back to the gait"
         lines.append(f"walk from a push of {walk.push:g}: {walk.footsteps} footsteps, {back}")
+    lines += [
+        f"no bifurcation along {each.along} from an eighth to eight times its value"
+        if each.kind is None
+        else f"along {each.along} the nearest is {each.kind} at {each.value:.6g} ({each.ratio:.3g} "
+        "times its value)"
+        for each in certificate.nearest_bifurcations
+    ]
     if other is not None:
         lines.append(
             f"engine {other.engine}: period differs by {other.period_difference:.1e}, length by "

@@ -10,6 +10,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
+from jaxbiped.cli._driven import cost_sentence, walk_cost
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SolveOptions
 from jaxbiped.cli._warnings import cut_short
@@ -78,10 +79,14 @@ def run_rigid_walk(
         "wall_s": wall,
         "warnings": cut_short(str(walk.outcome), int(walk.attempted)),
     }
+    cost = walk_cost(scene, walk) if scene.actuation is not None and numbers["steps"] else {}
+    numbers |= cost
     if numbers["footsteps"] > len(numbers["steps"]):
         numbers["warnings"].append(f"only the first {len(numbers['steps'])} footsteps are listed")
     report = Report(output.json)
     _print(report, numbers)
+    if cost:
+        report.say(cost_sentence(cost))
     for sentence in numbers["warnings"]:
         report.say(f"WARNING: {sentence}")
     if output.out is not None:

@@ -14,6 +14,7 @@ from jaxbiped import _clock
 from jaxbiped._ending import Ending
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
+from jaxbiped.cli._driven import cost_sentence, walk_cost
 from jaxbiped.cli._held import constraint_numbers, constraint_sentence
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._rigid_walk import run_rigid_walk
@@ -114,11 +115,17 @@ class Walk:
             },
             "wall_s": wall,
         }
+        cost: JsonObject = {}
+        if scene.actuation is not None:
+            cost = walk_cost(scene, trajectory)
+            numbers |= {"actuation_work_J": float(ledger.actuation_work[0])} | cost
         numbers["warnings"] = walk_warnings(scene, numbers, rtol=rtol)
         report = Report(self.output.json)
         if scene.redundant:
             numbers["constraints"] = constraint_numbers(scene, trajectory)
         _print(report, numbers)
+        if cost:
+            report.say(cost_sentence(cost))
         for sentence in numbers["warnings"]:
             report.say(f"WARNING: {sentence}")
         if scene.redundant:

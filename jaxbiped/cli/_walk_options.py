@@ -4,6 +4,9 @@ import dataclasses
 from collections.abc import Iterable
 from inspect import signature
 from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import OmitArgPrefixes
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -15,6 +18,7 @@ from jaxbiped._checks import (
     check_writable_file,
 )
 from jaxbiped._types import as_float
+from jaxbiped.cli._actuation_options import ActuationOptions
 from jaxbiped.cli._default_start import default_start
 from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.dynamics._rigid_state import WalkerState
@@ -95,11 +99,16 @@ class SceneOptions:
     xi: float = _SEED["xi"]
     """Stribeck rate [s/m]."""
 
+    driven: Annotated[ActuationOptions, OmitArgPrefixes] = dataclasses.field(
+        default_factory=ActuationOptions
+    )
+
     def scene(self) -> Scene | RigidScene | RedundantScene:
         """The scene that these options describe; raises `ArgumentError`."""
         check_choice("model", self.model, MODELS)
         check_choice("formulation", self.formulation, FORMULATIONS)
         scene = self._rigid() if self.model == "rigid" else self._compliant()
+        scene = dataclasses.replace(scene, actuation=self.driven.actuation())
         scene = with_parameters(scene, dict(_named_value(text) for text in self.set))
         if self.formulation == "redundant":
             return self._redundant(scene)

@@ -36,7 +36,8 @@ def relative_residual(ledger: EnergyLedger) -> float | None:
     None where that is no number: nothing happened, or the solve failed.
     """
     lost = ledger.damper_loss[0] + ledger.friction_loss[0]
-    turned_over = sum(map(abs, (ledger.gravity_work[0], lost, ledger.stored_change[0])))
+    works = (ledger.gravity_work[0], ledger.actuation_work[0])
+    turned_over = sum(map(abs, (*works, lost, ledger.stored_change[0])))
     share = float(abs(ledger.residual[0]) / turned_over) if turned_over > 0.0 else float("nan")
     return share if np.isfinite(share) else None
 

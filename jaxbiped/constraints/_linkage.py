@@ -51,8 +51,8 @@ class Joint(eqx.Module):
         ArgumentError: a coordinate that is not finite, or a body joined to itself.
     """
 
-    point_1: tuple[Parameter, Parameter] = parameter("pin in body 1", "$s_1$", "m", pair=True)
-    point_2: tuple[Parameter, Parameter] = parameter("pin in body 2", "$s_2$", "m", pair=True)
+    point_1: tuple[Parameter, Parameter] = parameter("pin in body 1", "$s_1$", "m", several=True)
+    point_2: tuple[Parameter, Parameter] = parameter("pin in body 2", "$s_2$", "m", several=True)
     # mypy takes a call of `parameter` for a default.
     body_1: int = eqx.field(static=True)  # type: ignore[misc]
     body_2: int | None = eqx.field(static=True, default=None)

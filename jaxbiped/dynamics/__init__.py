@@ -25,6 +25,7 @@ from jaxbiped.dynamics._linkage_motion import linkage_motion as linkage_motion
 from jaxbiped.dynamics._minimal_motion import Accelerations as Accelerations
 from jaxbiped.dynamics._minimal_motion import accelerations as accelerations
 from jaxbiped.dynamics._minimal_motion import vector_field as vector_field
+from jaxbiped.dynamics._push_off import push_off_work as push_off_work
 from jaxbiped.dynamics._redundant_motion import HipForce as HipForce
 from jaxbiped.dynamics._redundant_motion import RedundantMotion as RedundantMotion
 from jaxbiped.dynamics._redundant_motion import Violation as Violation

@@ -5,10 +5,13 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._forces import foot_force
+from jaxbiped.dynamics._hip_motion import hip_motion, normal_forces
 from jaxbiped.dynamics._redundant_state import legs_of, minimal_state
 from jaxbiped.dynamics._state import State
+from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._scene import Scene
 
 
@@ -39,12 +42,17 @@ class Powers(NamedTuple):
         indentation: of the walker on the ground's normal reaction, F_N δ̇, both feet together.
         damper: what of it is lost while a foot touches, (F_N − elastic force) δ̇.
         friction: lost to friction, never negative.
+        actuation: of the actuators, springs and dampers between the legs among them; None for a
+            passive walker.
+        motors: of each motor by itself, as `ActuatorPowers` has them; None for a passive walker.
     """
 
     gravity: Scalar
     indentation: Scalar
     damper: Scalar
     friction: Scalar
+    actuation: Scalar | None = None
+    motors: tuple[Scalar, ...] | None = None
 
 
 def energies(scene: Scene, state: State) -> Energies:
@@ -57,6 +65,13 @@ def energies(scene: Scene, state: State) -> Energies:
     Returns:
         The three energies [J], leaves shaped as the state's.
     """
+    kinetic, moment = kinetic_and_moment(scene, state)
+    elastic = sum(_elastic_energy(scene, foot) for foot in feet(scene, state))
+    return Energies(kinetic, scene.ground.g * moment, jnp.asarray(elastic))
+
+
+def kinetic_and_moment(scene: AbstractScene, state: State) -> tuple[Scalar, Scalar]:
+    """Kinetic energy [J] and mass times height [kg·m] of a walker of any kind."""
     walker, ground = scene.walker, scene.ground
     hip = minimal_state(scene, state)
     kinetic = 0.5 * walker.hip_mass * (hip.hip_vx**2 + hip.hip_vz**2)
@@ -70,8 +85,7 @@ def energies(scene: Scene, state: State) -> Energies:
         moment_x = moment_x + walker.m * (leg.hip_x + walker.d * sine)
         moment_z = moment_z + walker.m * (leg.hip_z - walker.d * cosine)
     height = moment_z * jnp.cos(ground.slope) - moment_x * jnp.sin(ground.slope)
-    elastic = sum(_elastic_energy(scene, foot) for foot in feet(scene, state))
-    return Energies(kinetic, ground.g * height, jnp.asarray(elastic))
+    return kinetic, height
 
 
 def powers(scene: Scene, state: State) -> Powers:
@@ -82,7 +96,7 @@ def powers(scene: Scene, state: State) -> Powers:
         state: leaves of any common shape, SI units.
 
     Returns:
-        The four powers [W], leaves shaped as the state's.
+        The powers [W], leaves shaped as the state's.
     """
     walker, ground = scene.walker, scene.ground
     hip = minimal_state(scene, state)
@@ -100,7 +114,17 @@ def powers(scene: Scene, state: State) -> Powers:
         damper = damper + (force.normal - held) * foot.penetration_rate
         if force.tangential is not None:
             friction = friction - force.tangential * foot.slip_speed
-    return Powers(gravity, indentation, damper, friction)
+    if scene.actuation is None:
+        return Powers(gravity, indentation, damper, friction)
+    actuators = _actuator_powers(scene, state)
+    return Powers(gravity, indentation, damper, friction, actuators.total, actuators.motors)
+
+
+def _actuator_powers(scene: Scene, state: State) -> ActuatorPowers:
+    first, second = legs_of(scene, state)
+    angles, rates, both = (first.angle, second.angle), (first.rate, second.rate), feet(scene, state)
+    hip = hip_motion(scene, both, angles, rates)
+    return actuator_powers(scene, hip, normal_forces(scene, both))
 
 
 def _elastic_energy(scene: Scene, foot: Foot) -> Scalar:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._actuation import preload
 from jaxbiped.dynamics._redundant_state import CompliantState, Leg, legs_of
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._redundant_scene import CompliantScene
@@ -16,8 +17,9 @@ class Foot(NamedTuple):
     Attributes:
         x, z: centre of the foot in the slope's frame [m].
         vx, vz: velocity of that centre [m/s].
-        penetration: δ = r − z, positive when indented [m].
-        penetration_rate: δ̇ = −vz [m/s].
+        penetration: δ = r − z, positive when indented, and the foot's extension where it has a
+            preload [m].
+        penetration_rate: δ̇ = −vz, and the rate of the extension [m/s].
         slip_speed: V_T = vx + r θ̇, tangential velocity of the material point in contact [m/s].
         admitted: whether the clearance rule lets the foot touch (boolean), None for "always",
             Python's False for "never".
@@ -74,13 +76,17 @@ def _foot(scene: CompliantScene, number: int, leg: Leg) -> Foot:
     z = leg.hip_z - length * cosine
     vx = leg.hip_vx + length * cosine * leg.rate
     vz = leg.hip_vz + length * sine * leg.rate
+    depth, depth_rate = radius - z, -vz
+    moved = preload(scene, leg.angle, leg.rate)
+    if moved is not None:
+        depth, depth_rate = depth + moved[0], depth_rate + moved[1]
     return Foot(
         x=x,
         z=z,
         vx=vx,
         vz=vz,
-        penetration=radius - z,
-        penetration_rate=-vz,
+        penetration=depth,
+        penetration_rate=depth_rate,
         slip_speed=vx + radius * leg.rate,
         admitted=scene.clearance.admits(number, leg.rate),
         bristle=leg.bristle,

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._push_off import push_off_impulse
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import Support, inertia_of, support_of
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -30,7 +31,8 @@ def impact(scene: RigidScene, state: RigidState) -> Impact:
 
     The impulse acts where the new foot touches, so motions that roll about that point do not feel
     it: the momenta of the new support's two rates are kept. They are the angular momenta of the
-    whole walker about the new point of contact and of the leg that leaves about the hip.
+    whole walker about the new point of contact and of the leg that leaves about the hip. A push-off
+    comes at once before: its impulse along the leg that leaves adds to the first of them.
 
     Args:
         scene: the rigid walker.
@@ -60,12 +62,17 @@ def impact(scene: RigidScene, state: RigidState) -> Impact:
         + walker.J * state.omega_1
     )
     swing_momentum = m * d * along(leaving, old.cosine, old.sine) + walker.J * state.omega_2
+    push_off = push_off_impulse(scene, state)
+    if push_off is not None:
+        stance_momentum = stance_momentum + along(push_off, new.hip_x, new.hip_z)
     inertia = inertia_of(walker, new, old.sine, old.cosine)
     stance_rate, swing_rate = inertia.solved(stance_momentum, swing_momentum)
     after = RigidState(state.hip_x, state.theta_2, state.theta_1, swing_rate, stance_rate)
     before_x, before_z = (
         walker.hip_mass * hip[i] + m * (leaving[i] + landing[i]) for i in range(2)
     )
+    if push_off is not None:
+        before_x, before_z = before_x + push_off.x, before_z + push_off.z
     after_x, after_z = _momentum(scene, after, new)
     lifting = (new.hip_z * stance_rate) + walker.hip_to_foot * old.sine * swing_rate
     return Impact(after, after_x - before_x, after_z - before_z, lifting)

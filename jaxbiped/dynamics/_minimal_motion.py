@@ -6,9 +6,11 @@ import jax.numpy as jnp
 
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar, Time, VectorField
-from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.dynamics._actuation import hip_torques
+from jaxbiped.dynamics._feet import Feet, Foot, feet
 from jaxbiped.dynamics._forces import foot_force
 from jaxbiped.dynamics._formulation import field_of
+from jaxbiped.dynamics._hip_motion import hip_motion
 from jaxbiped.dynamics._redundant_state import CompliantState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import CompliantScene
@@ -35,7 +37,7 @@ class LegLoad(NamedTuple):
 
     Attributes:
         force_x, force_z: ground reaction and centrifugal force that reach the hip [N].
-        torque: of ground reaction and gravity about the hip [N·m].
+        torque: of ground reaction, gravity and actuators about the hip [N·m].
         coupling_x, coupling_z: m d cos θ and m d sin θ, inertial coupling to the hip [kg·m].
         inertia: about the hip, J + m d² [kg·m²].
     """
@@ -92,6 +94,8 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
         leg_load(scene, state.theta_1, state.omega_1, both.foot_1),
         leg_load(scene, state.theta_2, state.omega_2, both.foot_2),
     )
+    if scene.actuation is not None:
+        legs = _driven(scene, state, both, legs)
     mass, ground = scene.walker.total_mass, scene.ground
     m_xx, m_xz, m_zz = mass, jnp.zeros_like(mass), mass
     f_x = mass * ground.g * jnp.sin(ground.slope)
@@ -111,6 +115,21 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
         leg_acceleration(legs[0], hip_ax, hip_az),
         leg_acceleration(legs[1], hip_ax, hip_az),
     )
+
+
+def _driven(
+    scene: Scene, state: State, both: Feet, legs: tuple[LegLoad, LegLoad]
+) -> tuple[LegLoad, LegLoad]:
+    """The legs' loads with the torques of the actuators."""
+    rates = (state.omega_1, state.omega_2)
+    hip = hip_motion(scene, both, (state.theta_1, state.theta_2), rates)
+    torques = hip_torques(scene, hip)
+    if torques is None:
+        return legs
+    first, second = (
+        leg._replace(torque=leg.torque + torque) for leg, torque in zip(legs, torques, strict=True)
+    )
+    return first, second
 
 
 def bristle_rates(

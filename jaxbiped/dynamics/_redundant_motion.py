@@ -13,9 +13,11 @@ from jaxbiped.constraints._linkage_constraints import (
     point_of,
     torque_on,
 )
+from jaxbiped.dynamics._actuation import hip_torques
 from jaxbiped.dynamics._feet import feet, feet_of
 from jaxbiped.dynamics._forces import foot_force
 from jaxbiped.dynamics._formulation import field_of
+from jaxbiped.dynamics._hip_motion import hip_motion
 from jaxbiped.dynamics._linkage_motion import LinkageMotion, motion_under
 from jaxbiped.dynamics._minimal_motion import Accelerations, accelerations, bristle_rates
 from jaxbiped.dynamics._redundant_state import Leg, LegsState, legs_of
@@ -183,14 +185,18 @@ def _linkage_motion(scene: RedundantScene, state: LegsState) -> LinkageMotion:
 
 
 def _applied_forces(scene: RedundantScene, state: LegsState, legs: tuple[Leg, Leg]) -> list[Scalar]:
-    """Gravity and the ground's forces on each leg, from that leg's own coordinates."""
+    """Forces of gravity, ground and actuators on each leg, from that leg's own coordinates."""
     walker, linkage = scene.walker, scene.linkage
     body, distance = leg_of(walker)
     downhill, weight = _gravity(scene)
     reach, size = walker.hip_to_foot - distance, linkage.coordinates
     applied: list[Scalar] = []
-    both = zip(legs, feet_of(scene, legs), strict=True)
-    for k, (leg, foot) in enumerate(both):
+    both = feet_of(scene, legs)
+    driving = None
+    if scene.actuation is not None:
+        angles, rates = (legs[0].angle, legs[1].angle), (legs[0].rate, legs[1].rate)
+        driving = hip_torques(scene, hip_motion(scene, both, angles, rates))
+    for k, (leg, foot) in enumerate(zip(legs, both, strict=True)):
         force_x, force_z = body.mass * downhill, body.mass * weight
         torque = jnp.zeros_like(leg.rate)
         if foot.admitted is not False:
@@ -200,6 +206,8 @@ def _applied_forces(scene: RedundantScene, state: LegsState, legs: tuple[Leg, Le
             if reaction.tangential is not None:
                 force_x = force_x + reaction.tangential
                 torque = torque + reaction.tangential * (reach * leg.cosine + walker.r)
+        if driving is not None:
+            torque = torque + driving[k]
         own = cast(tuple[Scalar, ...], state)[size * k : size * (k + 1)]
         applied += [force_x, force_z, *torque_on(linkage, own, torque)]
     return applied

@@ -6,11 +6,13 @@ import jax.numpy as jnp
 
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar, Time, VectorField
+from jaxbiped.dynamics._actuation import hip_torques
 from jaxbiped.dynamics._forces import FootForce
 from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._walker import Walker
+from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 
 
 class Support(NamedTuple):
@@ -74,6 +76,12 @@ def inertia_of(walker: Walker, stance: Support, sine: Scalar, cosine: Scalar) ->
     )
 
 
+def rolling_hip_motion(state: RigidState) -> HipMotion:
+    """What actuators at the hip know of the rigid walker: leg 2 carries it alone."""
+    one = jnp.ones_like(state.theta_2)
+    return HipMotion((state.theta_1, state.theta_2), (state.omega_1, state.omega_2), (None, one))
+
+
 class Rates(NamedTuple):
     """Angular accelerations in single support [rad/s²]: of swing leg and stance leg."""
 
@@ -111,6 +119,10 @@ def rolling_rates(scene: RigidScene, state: RigidState) -> Rates:
         walker.total_mass * r * g_x + moment * g_x * cosine_2 + moment * g_z * sine_2
     )
     stance_torque = stance_torque - swing_square * (m * d * r * sine_1 + m * d * reach * sine)
+    if scene.actuation is not None:
+        torques = hip_torques(scene, rolling_hip_motion(state))
+        if torques is not None:
+            swing_torque, stance_torque = swing_torque + torques[0], stance_torque + torques[1]
     alpha_2, alpha_1 = inertia.solved(stance_torque, swing_torque)
     return Rates(alpha_1, alpha_2)
 

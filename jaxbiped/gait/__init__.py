@@ -1,6 +1,7 @@
 """Periodic gaits: search, return map, stability, sensitivities, continuation."""
 
 from jaxbiped.gait._continuation import BranchEnd as BranchEnd
+from jaxbiped.gait._explain_search import explain_search as explain_search
 from jaxbiped.gait._find_gaits import Gaits as Gaits
 from jaxbiped.gait._fixed_point_search import Search as Search
 from jaxbiped.gait._gait import Measures as Measures
@@ -13,6 +14,7 @@ from jaxbiped.gait._origin import Origin as Origin
 from jaxbiped.gait._origin import OtherGait as OtherGait
 from jaxbiped.gait._poincare_map import LinearisedReturn as LinearisedReturn
 from jaxbiped.gait._return_map import Return as Return
+from jaxbiped.gait._rolling_starts import rolling_starts as rolling_starts
 from jaxbiped.gait._stability import Bifurcation as Bifurcation
 from jaxbiped.gait._stability import Stability as Stability
 from jaxbiped.gait._stability import stability_of as stability_of

@@ -30,7 +30,7 @@ from jaxbiped.gait._fixed_point_search import Found, Search, SearchArguments, se
 from jaxbiped.gait._gait import Described, Gait, summarise_gait
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._origin import FoundBy, Origin, single_stage_origin
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, walking_spec
 from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
@@ -40,13 +40,10 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of
-from jaxbiped.solve._projected_solver import with_projection
-from jaxbiped.variational._hybrid_system import RedundantWalking, section_of, system_of
+from jaxbiped.variational._hybrid_system import section_of
 
 _RESIDUAL_SHARE = 0.3
 """Residual that counts as none, in units of the state's tolerance."""
-_PATIENCE = 50.0
-"""Time allowed to the next arrival, in units of √(l/g)."""
 
 
 def find_gait(
@@ -135,7 +132,7 @@ def find_gait(
         leaves=(scene, start),
         redundant=scene.redundant,
     )
-    spec = _return_map_spec(
+    spec = walking_spec(
         scene,
         section,
         method_of_steps,
@@ -167,30 +164,6 @@ def find_gait(
     return summarise_gait(spec, scene, start, found, *describing, origin)
 
 
-def _return_map_spec(
-    scene: AbstractScene,
-    section: AbstractSection,
-    solver: diffrax.AbstractAdaptiveSolver[PyTree],
-    engine: str,
-    *,
-    steps: int,
-    most: int,
-) -> ReturnMapSpec:
-    within = None
-    if scene.redundant:
-        solver, within = with_projection(cast(RedundantScene, scene), solver), RedundantWalking()
-    return ReturnMapSpec(
-        system=system_of(scene),
-        section=section,
-        solver=solver,
-        max_time=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
-        steps=steps,
-        max_solver_steps=most,
-        engine=engine,
-        within=within,
-    )
-
-
 def _is_stable(found: Found) -> bool:
     usable = int(found.ending) == int(Search.FOUND) and bool(found.sound)
     return usable and spectral_radius(found) < 1.0
@@ -206,7 +179,7 @@ def _search_on(
     if scene.redundant:
         engine = "auto"
     scout_engine = orbit_engine(engine, solver=solver, section=section, leaves=(modelled, start))
-    scout = _return_map_spec(
+    scout = walking_spec(
         modelled,
         section,
         solver,

@@ -16,6 +16,7 @@ from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene.actuation._abstract_actuator import Actuation
 from jaxbiped.scene.laws._catalogue import (
     FRICTION_LAWS,
     NORMAL_LAWS,
@@ -59,7 +60,7 @@ def _interpolate(a: Scalar, b: Scalar, s: Scalar | float) -> tuple[Scalar, Scala
 def homotopy_to(scene: AbstractScene) -> Homotopy:
     """The line to `scene` from the seed's scene, its laws made to resemble the seed's.
 
-    Numbers of laws that are not in the catalogue stay those of `scene`.
+    Numbers of laws that are not in the catalogue stay those of `scene`. Its actuators are idle.
     """
     return Homotopy(scene.with_minimal(_seed_like(scene.minimal)), scene)
 
@@ -68,9 +69,10 @@ def _seed_like(scene: Scene | RigidScene) -> Scene | RigidScene:
     with jax.ensure_compile_time_eval():
         own = jtu.tree_map(float, seed_scene())
         if isinstance(scene, RigidScene):
-            return jtu.tree_map(
-                as_float, dataclasses.replace(scene, walker=own.walker, ground=own.ground)
+            rigid = dataclasses.replace(
+                scene, walker=own.walker, ground=own.ground, actuation=_idle(scene)
             )
+            return jtu.tree_map(as_float, rigid)
         normal, friction = own.normal, own.friction
         normals = {
             law: normal_law_like(
@@ -96,8 +98,14 @@ def _seed_like(scene: Scene | RigidScene) -> Scene | RigidScene:
             ground=own.ground,
             normal=_numbers_of(normals.get(type(scene.normal)), scene.normal),
             friction=_numbers_of(frictions.get(type(scene.friction)), scene.friction),
+            actuation=_idle(scene),
         )
         return jtu.tree_map(as_float, begin)
+
+
+def _idle(scene: Scene | RigidScene) -> Actuation:
+    """The scene's actuators at strength zero: the seed's walker is passive."""
+    return None if scene.actuation is None else tuple(part.idle() for part in scene.actuation)
 
 
 def _numbers_of(alike: eqx.Module | None, law: _Law) -> _Law:

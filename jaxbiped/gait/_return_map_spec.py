@@ -1,14 +1,23 @@
 """Specification of a return map: whose it is, and how it is solved."""
 
+from typing import cast
+
 import diffrax
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.variational._hybrid_system import AbstractSystem
+from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.solve._projected_solver import with_projection
+from jaxbiped.variational._hybrid_system import AbstractSystem, RedundantWalking, system_of
 from jaxbiped.variational._switch_locator import Watch
+
+_PATIENCE = 50.0
+"""Time allowed to the next arrival, in units of √(l/g)."""
 
 
 class ReturnMapSpec(eqx.Module):
@@ -52,6 +61,31 @@ class ReturnMapSpec(eqx.Module):
             ending=system.ending,
             peak=system.load if peak and loaded else None,
         )
+
+
+def walking_spec(
+    scene: AbstractScene,
+    section: AbstractSection,
+    solver: diffrax.AbstractAdaptiveSolver[PyTree],
+    engine: str,
+    *,
+    steps: int,
+    most: int,
+) -> ReturnMapSpec:
+    """The return map of a walker, of cycles of so many footsteps."""
+    within = None
+    if scene.redundant:
+        solver, within = with_projection(cast(RedundantScene, scene), solver), RedundantWalking()
+    return ReturnMapSpec(
+        system=system_of(scene),
+        section=section,
+        solver=solver,
+        max_time=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
+        steps=steps,
+        max_solver_steps=most,
+        engine=engine,
+        within=within,
+    )
 
 
 class _Arrival(eqx.Module):

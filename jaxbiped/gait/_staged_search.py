@@ -12,7 +12,7 @@ from jaxbiped._caches import cached_jit
 from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._rigid_state import WalkerState
-from jaxbiped.gait._continuation import Branch, BranchEnd, Change, follow_branch
+from jaxbiped.gait._continuation import BranchEnd, FollowedBranch, follow_branch
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._fixed_point_search import ROUGH, Found, Search
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
@@ -29,6 +29,7 @@ from jaxbiped.gait._poincare_map import (
     seed_directions,
     state_with,
 )
+from jaxbiped.gait._pseudo_arclength import Change
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._rolling_starts import rolling_starts
 from jaxbiped.gait._settled_walks import component_sizes, settle_walks
@@ -80,7 +81,7 @@ class Staged(NamedTuple):
 
     best: Seen | None
     others: tuple[Seen, ...]
-    branch: Branch | None
+    branch: FollowedBranch | None
     line: Homotopy | None
 
 
@@ -226,12 +227,12 @@ def _push_off_unstable(found: Found, sizes: np.ndarray) -> list[np.ndarray]:
 
 def _follow_from_seed(
     search: Searching, scout: ReturnMapSpec, line: Homotopy, like: WalkerState
-) -> Branch:
+) -> FollowedBranch:
     """The branch of gaits from the seed's scene."""
     first = search(scout, line.first, default_guess(line.first), _TURNS)
     point = np.asarray(first.recurring)
     if int(first.ending) != int(Search.FOUND):
-        return Branch(point[None], np.zeros(1), BranchEnd.NO_BEGINNING, int(first.code))
+        return FollowedBranch(point[None], np.zeros(1), BranchEnd.NO_BEGINNING, int(first.code))
 
     def change(point: np.ndarray, s: float) -> Change:
         given: PyTree = point, np.float64(s)

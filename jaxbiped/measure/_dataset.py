@@ -14,7 +14,6 @@ from jaxbiped.dynamics._forces import foot_forces
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
-from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
@@ -81,7 +80,7 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
     return dataset.assign_attrs(ending=str(trajectory.outcome), **_parameters(scene))
 
 
-def _parameters(scene: AbstractScene) -> dict[str, float | str]:
+def _parameters(scene: Scene | RedundantScene) -> dict[str, float | str]:
     """Every parameter of a scene, and the names of its laws, by dotted path."""
     found: dict[str, float | str] = {}
     units: dict[str, str] = {}
@@ -89,11 +88,17 @@ def _parameters(scene: AbstractScene) -> dict[str, float | str]:
     if isinstance(scene, RedundantScene):
         parts = vars(scene.scene) | {"method": scene.method}
         found["orientation"] = scene.orientation
+    actuators = {f"actuation_{k}": part for k, part in enumerate(scene.actuation or (), 1)}
+    parts = {name: part for name, part in parts.items() if name != "actuation"} | actuators
     for part_name, part in parts.items():
         found[part_name] = type(part).__name__
+        infos = parameter_infos(part)
         for name, value in vars(part).items():
-            if value is not None:  # a parameter that the law does without
-                found[f"{part_name}.{name}"] = float(value)
-        for name, info in parameter_infos(part).items():
-            units[f"{part_name}.{name}"] = info.quantity.unit
+            several = enumerate(value, 1) if isinstance(value, tuple) else [("", value)]
+            for number, each in several:
+                full = f"{part_name}.{name}" + (f"_{number}" if number else "")
+                if each is not None:  # a parameter that the law does without
+                    found[full] = each if isinstance(each, str) else float(each)
+                if name in infos:
+                    units[full] = infos[name].quantity.unit
     return found | {"parameter_units": json.dumps(units)}

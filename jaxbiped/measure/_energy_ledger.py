@@ -13,8 +13,8 @@ from jaxbiped.solve._trajectory import Trajectory
 class EnergyLedger(NamedTuple):
     """Gravity's work and where it went, between consecutive times [J]; leaves of shape (n,).
 
-    gravity_work = damper_loss + friction_loss + stored_change + residual. The residual is no
-    physics: it measures the error of the solve.
+    gravity_work + actuation_work = damper_loss + friction_loss + stored_change + residual. The
+    residual is no physics: it measures the error of the solve.
 
     Attributes:
         gravity_work: work of gravity on the walker.
@@ -22,7 +22,9 @@ class EnergyLedger(NamedTuple):
             foot leaves in the ground when it lets go.
         friction_loss: lost to friction.
         stored_change: change of kinetic and elastic energy.
-        residual: what the other four leave open.
+        residual: what the others leave open.
+        actuation_work: work of the actuators on the walker; what a spring between the legs stores
+            and a damper there loses is in it. Zero for a passive walker.
     """
 
     gravity_work: np.ndarray
@@ -30,6 +32,7 @@ class EnergyLedger(NamedTuple):
     friction_loss: np.ndarray
     stored_change: np.ndarray
     residual: np.ndarray
+    actuation_work: np.ndarray
 
 
 def energy_ledger(
@@ -75,4 +78,7 @@ def energy_ledger(
     damper = between(flows.values.indentation) - np.diff(held.elastic)
     friction = between(flows.values.friction)
     stored = np.diff(held.kinetic) + np.diff(held.elastic)
-    return EnergyLedger(gravity, damper, friction, stored, gravity - damper - friction - stored)
+    power = flows.values.actuation
+    driven = np.zeros(len(ends) - 1) if power is None else between(power)
+    residual = gravity + driven - damper - friction - stored
+    return EnergyLedger(gravity, damper, friction, stored, residual, driven)

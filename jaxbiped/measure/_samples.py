@@ -15,7 +15,7 @@ from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._dense_output import AT_ONCE, join_parts, split_evenly
 from jaxbiped.solve._trajectory import Trajectory
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _RESOLUTION = 2.0**48
 """By how much an interval is narrowed down that holds a change."""
 
@@ -35,6 +35,23 @@ class Samples(NamedTuple):
         """Integral of a leaf of `values` over each interval, shape (n,)."""
         return np.asarray(np.diff(self.edges) * (leaf @ (0.5 * _WEIGHTS)))
 
+    def positive_integral(self, leaf: np.ndarray) -> np.ndarray:
+        """Integral of what of a leaf is above zero over each interval, shape (n,).
+
+        Where its sign changes within an interval, between the roots of the polynomial through it.
+        """
+        whole, found = self.integral(leaf), np.zeros(len(leaf))
+        found[(leaf > 0.0).all(axis=1)] = whole[(leaf > 0.0).all(axis=1)]
+        halves = 0.5 * np.diff(self.edges)
+        for row in np.flatnonzero((leaf > 0.0).any(axis=1) & (leaf <= 0.0).any(axis=1)):
+            curve = np.polynomial.Polynomial.fit(NODES, leaf[row], len(NODES) - 1, [-1.0, 1.0])
+            roots = curve.roots()
+            turns = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
+            ends = np.concatenate([[-1.0], turns[np.abs(turns) < 1.0], [1.0]])
+            parts = np.diff(curve.integ()(ends))
+            found[row] = halves[row] * parts[parts > 0.0].sum()
+        return found
+
 
 def sample(
     scene: Scene,
@@ -45,7 +62,7 @@ def sample(
     """Samples `function(scene, state)` between the solver's steps and the `extra` times [s]."""
     edges = np.unique(np.concatenate([np.asarray(trajectory.t), extra]))
     middles, halves = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-    times = middles[:, None] + halves[:, None] * _NODES
+    times = middles[:, None] + halves[:, None] * NODES
     return Samples(edges, evaluate_at(scene, trajectory, function, times))
 
 

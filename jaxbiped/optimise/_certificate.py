@@ -1,6 +1,6 @@
 """Certificate of an optimum: what speaks for it besides the optimiser's word."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from jaxbiped._checks import check_choice, check_not_negative, check_positive, check_type
 from jaxbiped.basins._fractions import Fraction, wilson_interval
 from jaxbiped.basins._label import Label
+from jaxbiped.continuation._nearest_bifurcation import NearestBifurcation, nearest_bifurcation
 from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._section import HeelStrike
 from jaxbiped.gait._find_gait import find_gait
@@ -16,6 +17,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._optimality import Optimality
 from jaxbiped.optimise._optimise_gait import Optimum
+from jaxbiped.scene._parameters import parameter_names
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._rigid_walk import rigid_walk
@@ -69,7 +71,7 @@ class Certificate(NamedTuple):
         basin: fraction of the starts within `scatter` of the gait that come back to it.
         walk: a walk from a pushed start.
         other_engine: the gait by the other engine.
-        nearest_bifurcation: what the function given for it told.
+        nearest_bifurcations: in each parameter asked for, what the gait comes to first.
     """
 
     optimality: Optimality
@@ -81,7 +83,7 @@ class Certificate(NamedTuple):
     basin: Fraction | None
     walk: Walked | None
     other_engine: OtherEngine | None
-    nearest_bifurcation: Any
+    nearest_bifurcations: tuple[NearestBifurcation, ...]
 
 
 def certify(
@@ -92,7 +94,7 @@ def certify(
     footsteps: int = 200,
     push: float = 0.01,
     other_engine: bool = False,
-    nearest_bifurcation: Callable[[Scene | RigidScene, Gait], Any] | None = None,
+    bifurcations_along: Sequence[str] = ("slope",),
     seed: int = 0,
 ) -> Certificate:
     """Tests an optimum by what its search did not use.
@@ -105,7 +107,8 @@ def certify(
         push: relative change of all its velocities.
         other_engine: whether to find the gait by the other engine, too, which compiles for minutes
             where that is XLA.
-        nearest_bifurcation: a function of scene and gait that tells the nearest one.
+        bifurcations_along: parameters in each of which the gait is followed to its nearest
+            bifurcation, from an eighth to eight times the value; each compiles a program.
         seed: of the starts.
 
     Returns:
@@ -120,6 +123,8 @@ def certify(
     check_positive("scatter", scatter)
     scene, gait = optimum.scene, optimum.gait
     check_choice("footsteps of the gait", gait.orbit[0].shape[0], (1,))
+    for name in bifurcations_along:
+        check_choice("bifurcations_along", name, parameter_names(scene))
     sizes, errors = np.abs(np.asarray(gait.multipliers)), np.asarray(gait.multiplier_errors)
     undecided = bool(np.any(np.abs(sizes - 1.0) <= errors))
     norm = jacobian_functionals(
@@ -135,9 +140,9 @@ def certify(
         basin=_basin(scene, gait, int(starts), scatter, seed) if starts else None,
         walk=_walk(scene, gait, int(footsteps), push) if footsteps else None,
         other_engine=_by_other(scene, gait) if other_engine else None,
-        nearest_bifurcation=None
-        if nearest_bifurcation is None
-        else nearest_bifurcation(scene, gait),
+        nearest_bifurcations=tuple(
+            nearest_bifurcation(scene, gait, name) for name in bifurcations_along
+        ),
     )
 
 

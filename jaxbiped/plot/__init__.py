@@ -2,7 +2,8 @@
 
 The figures of a motion take the scene and a trajectory that was saved step by step; those of a
 periodic gait take the gait; those of a law of contact take the law; those of basins take labels,
-refined boundaries or fractions; that of constraint methods takes runs. Each draws into the axes or
+refined boundaries or fractions; that of constraint methods takes runs; those of
+branches take branches and curves of bifurcations. Each draws into the axes or
 the figure it is given (or a new one) and returns the figure. None touches pyplot, so all work
 without a display.
 """
@@ -11,6 +12,8 @@ from jaxbiped.plot._animation import animate as animate
 from jaxbiped.plot._animation import animation_html as animation_html
 from jaxbiped.plot._animation import save_animation as save_animation
 from jaxbiped.plot._basin import basin as basin
+from jaxbiped.plot._branch import bifurcation_curves as bifurcation_curves
+from jaxbiped.plot._branch import branch as branch
 from jaxbiped.plot._bristle_law import bristle_law as bristle_law
 from jaxbiped.plot._constraint_runs import constraint_runs as constraint_runs
 from jaxbiped.plot._contact_forces import contact_forces as contact_forces

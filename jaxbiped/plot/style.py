@@ -44,7 +44,7 @@ def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
     ax.spines[["top", "right"]].set_visible(False)
 
 
-def legend_below(ax: Axes, *, columns: int) -> None:
+def legend_below(ax: Axes, *, columns: int, **options: Any) -> None:
     """A legend under the axes, for more than fits beside the title."""
     ax.legend(
         loc="upper center",
@@ -53,6 +53,7 @@ def legend_below(ax: Axes, *, columns: int) -> None:
         frameon=False,
         fontsize="small",
         borderaxespad=0.2,
+        **options,
     )
 
 

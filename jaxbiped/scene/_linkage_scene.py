@@ -24,7 +24,7 @@ class LinkageScene(eqx.Module):
     linkage: Linkage
     method: AbstractConstraintMethod
     gravity: tuple[Parameter, Parameter] = parameter(
-        "gravity", "$g$", "m/s^2", pair=True, default=(0.0, -9.8)
+        "gravity", "$g$", "m/s^2", several=True, default=(0.0, -9.8)
     )
 
     def __check_init__(self) -> None:

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, TypeAlias, TypeVar
 
-import equinox as eqx
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
@@ -15,7 +14,6 @@ from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene._abstract_scene import AbstractScene
 
 SomeScene = TypeVar("SomeScene", bound=AbstractScene)
-_Part = TypeVar("_Part", bound=eqx.Module)
 _Path: TypeAlias = tuple[Any, ...]
 """Keys of a leaf, as JAX gives them."""
 
@@ -26,8 +24,8 @@ _FIRST = ("K", "c", "xi")
 def parameter_names(scene: AbstractScene) -> tuple[str, ...]:
     """Names of a scene's parameters: K, c and xi first, the others in the scene's order.
 
-    A name is the parameter's own, `K`; where two parts have one of that name, `normal.K`. Those of
-    a redundant scene are those of what it models.
+    A name is the parameter's own, `K`; where two parts have one of that name, `normal.K`; one of
+    several has its number, `torque_1`. Those of a redundant scene are those of what it models.
 
     Args:
         scene: of any kind.
@@ -80,14 +78,26 @@ def parameter_quantities(scene: AbstractScene) -> dict[str, Quantity]:
 
 
 def _quantity(part: object, name: str, path: _Path) -> Quantity:
-    for key in path:
+    for position, key in enumerate(path):
+        if isinstance(key, jtu.SequenceKey):
+            part = part[key.idx]  # type: ignore[index]
+            continue
         if not dataclasses.is_dataclass(part):
-            break  # an entry of a user's own list, or of a dictionary
+            break  # an entry of a user's own dictionary
         infos = parameter_infos(part)
         if key.name in infos:
-            return infos[key.name].quantity
+            return _entry(infos[key.name].quantity, path[position + 1 :])
         part = getattr(part, key.name)
     return Quantity(name)
+
+
+def _entry(quantity: Quantity, rest: _Path) -> Quantity:
+    """A quantity, or one of several by its number."""
+    if not rest:
+        return quantity
+    number = rest[0].idx + 1
+    symbol = quantity.symbol[:-1] + f"_{{{number}}}$" if quantity.symbol else ""
+    return Quantity(f"{quantity.words} {number}", symbol, quantity.unit)
 
 
 def select_parameters(
@@ -135,21 +145,30 @@ def with_parameters(scene: SomeScene, values: Mapping[str, Parameter]) -> SomeSc
     return scene.with_minimal(changed)
 
 
-def _replace(part: _Part, path: _Path, value: Parameter) -> _Part:
-    name, rest = path[0].name, path[1:]
-    new = _replace(getattr(part, name), rest, value) if rest else value
-    return dataclasses.replace(part, **{name: new})
+def _replace(part: Any, path: _Path, value: Parameter) -> Any:
+    if not path:
+        return value
+    key, rest = path[0], path[1:]
+    if isinstance(key, jtu.SequenceKey):
+        return tuple(
+            _replace(each, rest, value) if i == key.idx else each for i, each in enumerate(part)
+        )
+    return dataclasses.replace(part, **{key.name: _replace(getattr(part, key.name), rest, value)})
 
 
 def _names_by_leaf(scene: PyTree) -> list[str]:
     modelled = scene.minimal if isinstance(scene, AbstractScene) else scene
-    paths = [path for path, _ in jtu.tree_flatten_with_path(modelled)[0]]
-    own = [_format(path[-1:]) for path in paths]
-    return [
-        name if own.count(name) == 1 else _format(path)
-        for name, path in zip(own, paths, strict=True)
-    ]
+    whole = [_texts(path) for path, _ in jtu.tree_flatten_with_path(modelled)[0]]
+    own = [texts[-1] for texts in whole]
+    return [texts[-1] if own.count(texts[-1]) == 1 else ".".join(texts) for texts in whole]
 
 
-def _format(path: _Path) -> str:
-    return ".".join(str(getattr(key, "name", key)) for key in path)
+def _texts(path: _Path) -> list[str]:
+    """Names along a path; an entry of several is told by its number, from 1 on."""
+    texts: list[str] = []
+    for key in path:
+        if isinstance(key, jtu.SequenceKey) and texts:
+            texts[-1] += f"_{key.idx + 1}"
+        else:
+            texts.append(str(getattr(key, "name", key)))
+    return texts

@@ -16,6 +16,7 @@ from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene._walker_linkage import walker_linkage
+from jaxbiped.scene.actuation._abstract_actuator import Actuation
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, AbstractNormalLaw
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
@@ -82,6 +83,11 @@ class RedundantScene(AbstractScene):
     def clearance(self) -> AbstractClearance:
         """The scene's rule of clearance."""
         return self.scene.clearance
+
+    @property
+    def actuation(self) -> Actuation:
+        """The scene's actuators."""
+        return self.scene.actuation
 
     @property
     def linkage(self) -> Linkage:

@@ -2,10 +2,17 @@
 
 from typing import ClassVar
 
+import equinox as eqx
+
 from jaxbiped._checks import check_type
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._walker import Walker
+from jaxbiped.scene.actuation._abstract_actuator import (
+    Actuation,
+    actuation_of,
+    check_actuation,
+)
 
 
 class RigidScene(AbstractScene):
@@ -19,19 +26,23 @@ class RigidScene(AbstractScene):
     Attributes:
         walker: masses and lengths.
         ground: slope and gravity.
+        actuation: what drives it beside gravity, a part of `jaxbiped.actuation` or several; None
+            for a passive walker, whose equations have nothing of it.
 
     Raises:
-        ArgumentError: a part of the wrong type.
+        ArgumentError: a part of the wrong type, or an actuator of compliant feet.
     """
 
     compliant: ClassVar[bool] = False
     redundant: ClassVar[bool] = False
     walker: Walker
     ground: Ground
+    actuation: Actuation = eqx.field(converter=actuation_of, default=None)
 
     def __check_init__(self) -> None:
         check_type("walker", self.walker, Walker)
         check_type("ground", self.ground, Ground)
+        check_actuation(self.actuation, "rigid")
 
     @property
     def minimal(self) -> "RigidScene":

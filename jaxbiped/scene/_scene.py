@@ -2,11 +2,18 @@
 
 from typing import ClassVar
 
+import equinox as eqx
+
 from jaxbiped._checks import check_type
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._clearance import AbstractClearance, StanceRotation
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._walker import Walker
+from jaxbiped.scene.actuation._abstract_actuator import (
+    Actuation,
+    actuation_of,
+    check_actuation,
+)
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, AbstractNormalLaw
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
@@ -24,9 +31,11 @@ class Scene(AbstractScene):
         normal: law of the normal force.
         friction: law of the tangential force; with bristles, states are `BristleState`s.
         clearance: which foot may touch.
+        actuation: what drives it beside gravity, a part of `jaxbiped.actuation` or several; None
+            for a passive walker, whose equations have nothing of it.
 
     Raises:
-        ArgumentError: a part of the wrong type.
+        ArgumentError: a part of the wrong type, or an actuator of rigid feet.
     """
 
     compliant: ClassVar[bool] = True
@@ -36,6 +45,7 @@ class Scene(AbstractScene):
     normal: AbstractNormalLaw
     friction: AbstractFrictionLaw | AbstractBristleLaw
     clearance: AbstractClearance = StanceRotation()
+    actuation: Actuation = eqx.field(converter=actuation_of, default=None)
 
     def __check_init__(self) -> None:
         check_type("walker", self.walker, Walker)
@@ -43,6 +53,7 @@ class Scene(AbstractScene):
         check_type("normal", self.normal, AbstractNormalLaw)
         check_type("friction", self.friction, AbstractFrictionLaw, AbstractBristleLaw)
         check_type("clearance", self.clearance, AbstractClearance)
+        check_actuation(self.actuation, "compliant")
 
     @property
     def minimal(self) -> "Scene":

@@ -17,6 +17,7 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._walker import Walker
+from jaxbiped.scene.actuation._catalogue import ACTUATORS
 from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS
 
 
@@ -67,6 +68,9 @@ def check_single_scene(scene: Scene | RigidScene | RedundantScene) -> None:
     for name, part in vars(scene.minimal).items():
         if type(part) in own:
             check_unbatched(f"scene.{name}", part, "one scene")
+    for part in scene.actuation or ():
+        if type(part) in ACTUATORS.values():
+            check_unbatched("scene.actuation", part, "one scene")
 
 
 def check_steps(

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from jaxbiped.gait._continuation import BranchEnd, Change, follow_branch
+from jaxbiped.gait._continuation import BranchEnd, follow_branch
+from jaxbiped.gait._pseudo_arclength import Change
 
 
 def branch_of(value, by_point, by_s, *, start, ends=lambda x, s: 0, scale=1.0):

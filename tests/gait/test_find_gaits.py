@@ -12,7 +12,7 @@ pytestmark = pytest.mark.slow
 
 def test_many_starts_find_a_stable_and_an_unstable_gait():
     scene = jb.seed_scene()
-    starts = jax.tree.map(lambda leaf: leaf[:4], jb.rolling_starts(scene, 12))
+    starts = jax.tree.map(lambda leaf: leaf[:4], jb.gait.rolling_starts(scene, 12))
     found = jb.find_gaits(scene, starts)
     period = np.asarray(found.gaits.measures.period)
     stable = np.asarray(found.gaits.stable)
@@ -36,4 +36,4 @@ def test_starts_of_another_shape_are_refused(shape):
 
 def test_bad_arguments():
     with pytest.raises(jb.ArgumentError, match="accuracy"):
-        jb.find_gaits(jb.seed_scene(), jb.rolling_starts(jb.seed_scene(), 2), accuracy="fast")
+        jb.find_gaits(jb.seed_scene(), jb.gait.rolling_starts(jb.seed_scene(), 2), accuracy="fast")

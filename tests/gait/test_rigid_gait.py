@@ -65,7 +65,7 @@ def test_first_period_doubling_of_the_simplest_walker():
 
 def test_compass_gait_converges_and_is_stable():
     """One of the gaits that starts lead to is stable; an independent solve returns to it."""
-    gaits = jb.find_gaits(compass_gait(), jb.rolling_starts(compass_gait(), 32, spread=0.5))
+    gaits = jb.find_gaits(compass_gait(), jb.gait.rolling_starts(compass_gait(), 32, spread=0.5))
     stable = np.asarray(gaits.gaits.stable)
     assert stable.sum() == 1
     k = int(np.argmax(stable))

@@ -8,7 +8,7 @@ import jaxbiped as jb
 
 def test_rolling_starts_do_not_slip_and_begin_with_the_seeds():
     scene = jb.seed_scene(l=0.5)
-    starts = jb.rolling_starts(scene, 5)
+    starts = jb.gait.rolling_starts(scene, 5)
     both = jb.dynamics.feet(scene, starts)
     np.testing.assert_allclose(both.foot_2.slip_speed, 0.0, atol=1e-14)
     np.testing.assert_allclose(both.foot_2.penetration_rate, 0.0, atol=1e-14)
@@ -16,11 +16,11 @@ def test_rolling_starts_do_not_slip_and_begin_with_the_seeds():
     seed = jb.seed_state()
     assert float(starts.theta_1[0]) == float(seed.theta_1)
     assert np.ptp(np.asarray(starts.theta_1)) > 0.0
-    assert not np.allclose(starts.omega_2, jb.rolling_starts(scene, 5, seed=1).omega_2)
+    assert not np.allclose(starts.omega_2, jb.gait.rolling_starts(scene, 5, seed=1).omega_2)
 
 
 def test_bad_arguments():
     with pytest.raises(jb.ArgumentError, match="count"):
-        jb.rolling_starts(jb.seed_scene(), 0)
+        jb.gait.rolling_starts(jb.seed_scene(), 0)
     with pytest.raises(jb.ArgumentError, match="spread"):
-        jb.rolling_starts(jb.seed_scene(), 3, spread=0.0)
+        jb.gait.rolling_starts(jb.seed_scene(), 3, spread=0.0)

@@ -36,7 +36,7 @@ def test_the_unstable_gait_that_was_seen_is_told():
     assert float(jb.find_gait(scene, state, **PLAIN).measures.period) == pytest.approx(
         0.38827, abs=1e-5
     )
-    assert "0.388268 s (spectral radius 2.39)" in jb.explain_search(scene, gait)
+    assert "0.388268 s (spectral radius 2.39)" in jb.gait.explain_search(scene, gait)
 
 
 def test_with_a_guess_the_gait_near_it_is_returned():
@@ -63,7 +63,7 @@ def test_with_a_guess_the_gait_near_it_is_returned():
 def test_where_there_is_no_gait_the_end_of_the_branch_is_told(scene, words):
     gait = jb.find_gait(scene, **PLAIN)
     assert gait.outcome is not jb.gait.Search.FOUND
-    said = jb.explain_search(scene, gait)
+    said = jb.gait.explain_search(scene, gait)
     assert said.startswith("no gait found: ")
     for word in words:
         assert word in said

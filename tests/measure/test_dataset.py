@@ -76,3 +76,18 @@ def test_every_law_goes_into_a_file(name, short_walk, tmp_path):
 def test_a_rigid_walker_is_refused(seed_walk):
     with pytest.raises(jb.ArgumentError, match="scene = RigidScene"):
         jb.trajectory_dataset(jb.ladder()["rigid"], seed_walk[1])
+
+
+def test_actuators_are_told_by_their_places(short_walk):
+    spline = jb.actuation.HipSpline([0.1, 0.2], reaction="trunk")
+    scene = dataclasses.replace(jb.seed_scene(), actuation=(jb.actuation.HipSpring(k=0.3), spline))
+    told = jb.trajectory_dataset(scene, short_walk).attrs
+    assert told["actuation_1"] == "HipSpring"
+    assert told["actuation_1.k"] == 0.3
+    assert "actuation_1.theta_0" not in told
+    assert told["actuation_2.torque_2"] == 0.2
+    assert told["actuation_2.reaction"] == "trunk"
+    units = json.loads(told["parameter_units"])
+    assert units["actuation_1.k"] == "N m/rad"
+    assert units["actuation_2.torque_1"] == "N m"
+    assert "actuation" not in jb.trajectory_dataset(jb.seed_scene(), short_walk).attrs

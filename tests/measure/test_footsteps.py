@@ -33,7 +33,7 @@ def test_cost_of_transport_of_the_gait_is_the_slope(settled):
 
 def test_legs_alternate_and_times_increase(settled):
     scene, walk, steps = settled
-    strikes = jb.heel_strikes(scene, walk)
+    strikes = jb.measure.heel_strikes(scene, walk)
     assert len(strikes.time_s) == 30
     assert set(strikes.foot[::2]) == {1}
     assert set(strikes.foot[1::2]) == {2}
@@ -51,7 +51,7 @@ def test_strike_times_equal_the_independent_integrators(seed_walk, reference):
     """At a strike the swing foot's sole is at the ground; between reference times by parabola."""
     scene, walk = seed_walk
     times, states = reference
-    strikes = jb.heel_strikes(scene, walk)
+    strikes = jb.measure.heel_strikes(scene, walk)
     assert len(strikes.time_s) == 4
     for time, foot in zip(*strikes, strict=True):
         before = int(np.searchsorted(times, time)) - 1

@@ -17,7 +17,7 @@ def best():
 
 
 def test_a_stable_gait_is_certified(best):
-    found = jb.optimise.certify(best, starts=256, footsteps=50)
+    found = jb.optimise.certify(best, starts=256, footsteps=50, bifurcations_along=())
     own = jb.find_gait(RIGID, parameters=(), radius_sensitivities=False)
     assert found.stable is True
     assert np.abs(found.multipliers[0]) == pytest.approx(best.objective, rel=1e-4)
@@ -28,33 +28,42 @@ def test_a_stable_gait_is_certified(best):
     assert found.unit_multiplier_error < 1e-5
     assert found.sensitivity_norm[1] < 1e-4 * found.sensitivity_norm[0]
     assert found.other_engine is None
-    assert found.nearest_bifurcation is None
+    assert found.nearest_bifurcations == ()
 
 
 def test_an_unstable_gait_does_not_return():
     long = jb.with_parameters(RIGID, {"slope": 0.12})
     still = jb.optimise_gait(long, vary={"d": (0.0999, 0.1001)}, minimise="period", iterations=1)
     assert float(still.gait.measures.spectral_radius) > 1.0
-    found = jb.optimise.certify(still, starts=0, footsteps=60)
+    found = jb.optimise.certify(still, starts=0, footsteps=60, bifurcations_along=())
     assert found.stable is False
     assert found.basin is None
     assert not found.walk.returned
     assert found.sensitivity_norm[0] == np.inf
 
 
-def test_the_place_of_the_nearest_bifurcation(best):
-    found = jb.optimise.certify(
-        best,
-        starts=0,
-        footsteps=0,
-        nearest_bifurcation=lambda scene, gait: float(gait.measures.period),
-    )
-    assert found.nearest_bifurcation == float(best.gait.measures.period)
+def test_the_nearest_bifurcation_is_where_searches_lose_stability(best):
+    found = jb.optimise.certify(best, starts=0, footsteps=0)
+    (nearest,) = found.nearest_bifurcations
+    assert nearest.kind is jb.continuation.BranchEvent.PERIOD_DOUBLING
+    assert abs(nearest.multiplier + 1.0) < 1e-6
+    radii = [
+        jb.find_gait(
+            jb.with_parameters(best.scene, {"slope": nearest.value * share}),
+            best.gait.measures.state,
+            parameters=(),
+            radius_sensitivities=False,
+        ).measures.spectral_radius
+        for share in (0.995, 1.005)
+    ]
+    assert float(radii[0]) < 1.0 < float(radii[1])
     assert found.walk is None
 
 
 def test_the_other_engine_finds_the_same_gait(best):
-    found = jb.optimise.certify(best, starts=0, footsteps=0, other_engine=True)
+    found = jb.optimise.certify(
+        best, starts=0, footsteps=0, bifurcations_along=(), other_engine=True
+    )
     assert found.other_engine.engine == "xla"
     assert found.other_engine.found
     assert found.other_engine.period_difference < 1e-7
@@ -66,3 +75,5 @@ def test_certify_refuses_what_is_no_optimum(best):
         jb.optimise.certify(best.gait)
     with pytest.raises(jb.ArgumentError, match="starts = -1"):
         jb.optimise.certify(best, starts=-1)
+    with pytest.raises(jb.ArgumentError, match="bifurcations_along = 'steepness'"):
+        jb.optimise.certify(best, bifurcations_along=("steepness",))

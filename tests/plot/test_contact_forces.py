@@ -41,7 +41,7 @@ def test_legs_differ_without_colour_too(seed_walk):
 
 def test_a_heel_strike_is_enlarged(seed_walk):
     scene, walk = seed_walk
-    times, feet = jb.heel_strikes(scene, walk)
+    times, feet = jb.measure.heel_strikes(scene, walk)
     figure = contact_forces(scene, walk, strike=1)
     _, normal_axes, _, tangential_axes = figure.axes
     assert "(ms)" in tangential_axes.get_xlabel()
@@ -59,7 +59,7 @@ def test_a_heel_strike_is_enlarged(seed_walk):
 
 def test_strikes_are_counted(seed_walk):
     scene, walk = seed_walk
-    count = len(jb.heel_strikes(scene, walk).time_s)
+    count = len(jb.measure.heel_strikes(scene, walk).time_s)
     with pytest.raises(jb.ArgumentError, match=f"{count} heel strikes"):
         contact_forces(scene, walk, strike=count)
 

@@ -21,7 +21,7 @@ def walk():
 
 def _peaks(scene, walk, t, found):
     """Largest normal and tangential force of each heel strike, of the foot that lands."""
-    for time, foot in zip(*jb.heel_strikes(scene, walk), strict=True):
+    for time, foot in zip(*jb.measure.heel_strikes(scene, walk), strict=True):
         near = (t > time - 1e-4) & (t < time + 5e-3)
         force = found.forces[foot - 1]
         yield foot, t[near], force.normal[near], -force.tangential[near]

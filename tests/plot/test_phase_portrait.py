@@ -36,7 +36,7 @@ def test_the_last_stride_is_strong_over_the_whole_walk(seed_walk):
     scene, walk = seed_walk
     (ax,) = phase_portrait(scene, walk).axes
     whole, last = ax.lines[:2]
-    strikes = jb.heel_strikes(scene, walk)
+    strikes = jb.measure.heel_strikes(scene, walk)
     since = strikes.time_s[strikes.foot == 1][-2]
     assert last.get_label() == f"last stride of leg 1, from {since:.2f} s"
     assert whole.get_alpha() < 0.5 < (last.get_alpha() or 1.0)

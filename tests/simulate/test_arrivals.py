@@ -23,7 +23,7 @@ def _heights(scene, state):
 
 def test_heel_strikes_are_the_walks_footsteps(seed_walk):
     scene, whole = seed_walk
-    expected = jb.heel_strikes(scene, whole).time_s
+    expected = jb.measure.heel_strikes(scene, whole).time_s
     walk = _walk(save=jb.HeelStrike(), max_arrivals=6)
     strikes = walk.arrivals
     count = int(strikes.total)

@@ -1,0 +1,124 @@
+"""Bifurcations on a branch: where multipliers cross the unit circle, located between its points.
+
+Test functions that change sign there: Kuznetsov, Elements of Applied Bifurcation Theory (2004),
+section 10.2.2.
+"""
+
+import enum
+from functools import partial
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxbiped.continuation._axis import Axis
+from jaxbiped.continuation._branch_point import BranchPoint, branch_point, multipliers_of
+from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, locate
+
+_REAL = 1e-9
+"""Imaginary part up to which a multiplier counts as real."""
+_AT = 1e-3
+"""Distance from the unit circle that a located multiplier may have."""
+
+
+class BranchEvent(enum.StrEnum):
+    """What happens at a special point of a branch.
+
+    - fold: a multiplier at +1; two branches meet, and the parameter turns back.
+    - period-doubling: one at −1; gaits of twice the footsteps branch off.
+    - neimark-sacker: a complex pair on the unit circle.
+    - branch-point: one at +1 where the parameter does not turn back: branches cross.
+    - limit: the branch ends by a limit of the model (see `LimitCause`).
+    """
+
+    FOLD = "fold"
+    PERIOD_DOUBLING = "period-doubling"
+    NEIMARK_SACKER = "neimark-sacker"
+    BRANCH_POINT = "branch-point"
+    LIMIT = "limit"
+
+
+EVENTS = tuple(BranchEvent)
+"""In the order of their codes in datasets."""
+_CRITICAL = {
+    BranchEvent.FOLD: 1.0,
+    BranchEvent.PERIOD_DOUBLING: -1.0,
+    BranchEvent.BRANCH_POINT: 1.0,
+    BranchEvent.NEIMARK_SACKER: float("nan"),
+}
+"""Where the critical multiplier lies."""
+
+
+class BifurcationPoint(NamedTuple):
+    """A special point of a branch.
+
+    Attributes:
+        kind: what happens there.
+        point: the gait there; at a limit the last before it.
+        multiplier: the critical multiplier; at a limit the largest.
+        error: its estimated error.
+    """
+
+    kind: BranchEvent
+    point: BranchPoint
+    multiplier: complex
+    error: float
+
+    @property
+    def value(self) -> float:
+        """Of the parameter, SI units."""
+        return self.point.value
+
+
+def multiplier_test(kind: BranchEvent, values: np.ndarray) -> float:
+    """A function of the multipliers that is smooth in the Jacobian and vanishes at this kind.
+
+    Product of λ − 1, of λ + 1, or of λᵢ λⱼ − 1 over all pairs.
+    """
+    if kind is BranchEvent.NEIMARK_SACKER:
+        return float(np.prod([a * b - 1.0 for a, b in combinations(values, 2)]).real)
+    return float(np.prod(values - _CRITICAL[kind]).real)
+
+
+def critical_multiplier(kind: BranchEvent, point: BranchPoint) -> tuple[complex, float, float]:
+    """The multiplier by which a gait is at this kind, its error, and its distance from there."""
+    values = point.multipliers
+    if kind is BranchEvent.NEIMARK_SACKER:
+        pairs = np.abs(values.imag) > _REAL
+        distances = np.where(pairs, np.abs(np.abs(values) - 1.0), np.inf)
+    else:
+        distances = np.abs(values - _CRITICAL[kind])
+    nearest = int(np.argmin(distances))
+    error = float(point.multiplier_errors[nearest])
+    return complex(values[nearest]), error, float(distances[nearest])
+
+
+def bifurcations_between(
+    curve: Curve, axis: Axis, here: CurvePoint, there: CurvePoint
+) -> list[tuple[CurvePoint, BifurcationPoint]]:
+    """The bifurcations between two neighbouring points, in their order along the branch."""
+    turns = here.tangent[-1] * there.tangent[-1] < 0.0
+    found = []
+    for kind in _CRITICAL:
+        # Where the parameter turns back it is a fold, and told by that more exactly.
+        if turns and kind is BranchEvent.BRANCH_POINT:
+            continue
+        test = _advance if kind is BranchEvent.FOLD else partial(_test_at, kind)
+        place = locate(curve, here, there, test) if test(here) * test(there) < 0.0 else None
+        if place is None:
+            continue
+        point = branch_point(curve, axis, place)
+        value, error, distance = critical_multiplier(kind, point)
+        # Two real multipliers whose product is 1 cross nothing.
+        if distance < _AT:
+            found.append((place, BifurcationPoint(kind, point, value, error)))
+    return sorted(found, key=lambda each: float((each[0].place - here.place) @ here.tangent))
+
+
+def _advance(found: CurvePoint) -> float:
+    """How the parameter advances along the curve."""
+    return float(found.tangent[-1])
+
+
+def _test_at(kind: BranchEvent, found: CurvePoint) -> float:
+    return multiplier_test(kind, multipliers_of(found.change))

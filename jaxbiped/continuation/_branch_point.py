@@ -1,0 +1,148 @@
+"""Point of a branch: a gait at a value of the parameter, with what decides on its stability."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxbiped.continuation._axis import Axis
+from jaxbiped.continuation._cycle import Cycle, CycleProblem
+from jaxbiped.gait._orbit import CLOSENESS
+from jaxbiped.gait._pseudo_arclength import Change, Curve, CurvePoint
+from jaxbiped.gait._settled_walks import component_sizes
+from jaxbiped.gait._stability import Bifurcation
+
+NO_WALK = -1
+"""Code of an orbit that returns but is none of a walk: a foot deep underground, a step uphill."""
+_CONVERGED = 3.0
+"""Size of the last correction of a point, in units of the state's tolerance."""
+
+_LOCATED = 1e-9
+"""Error of a multiplier at least: so near to the unit circle bifurcations are located."""
+
+
+class BranchPoint(NamedTuple):
+    """A gait on a branch. The state has m components besides hip_x.
+
+    Attributes:
+        value: of the parameter, SI units.
+        recurring: the m components, shape (m,).
+        period: duration of the cycle [s].
+        step_length: advance along the slope in it [m].
+        peak_normal: largest normal force on a foot [N].
+        multipliers: Floquet multipliers, largest first, without the trivial one, shape (m − 1,).
+        multiplier_errors: their estimated errors, shape (m − 1,).
+        unit_multiplier_error: distance from 1 of the multiplier that must be 1.
+        bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
+        residual: largest change of a component over the cycle, SI units.
+        place, tangent: of the curve of gaits, in the sizes of components and range, (m + 1,).
+    """
+
+    value: float
+    recurring: np.ndarray
+    period: float
+    step_length: float
+    peak_normal: float
+    multipliers: np.ndarray
+    multiplier_errors: np.ndarray
+    unit_multiplier_error: float
+    bifurcation: int
+    residual: float
+    place: np.ndarray
+    tangent: np.ndarray
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether all multipliers lie inside the unit circle; None where their errors leave it
+        open."""
+        return is_stable(self.multipliers, self.multiplier_errors)
+
+
+def is_stable(multipliers: np.ndarray, errors: np.ndarray) -> bool | None:
+    """Whether multipliers lie inside the unit circle; None where an error bar straddles it."""
+    sizes, errors = np.abs(multipliers), np.maximum(errors, _LOCATED)
+    if np.any(sizes - errors > 1.0):
+        return False
+    return True if np.all(sizes + errors < 1.0) else None
+
+
+def gait_curve(problem: CycleProblem, axis: Axis, footsteps: int) -> Curve:
+    """The gaits of so many footsteps along an axis, as a curve of zeros.
+
+    Each change carries the `Cycle` that was evaluated.
+    """
+
+    def change(point: np.ndarray, s: float) -> Change:
+        seen = problem.cycle(point, (axis.leaf,), [axis.value(s)], footsteps)
+        return change_of(seen, point, axis.slope(s))
+
+    sizes = np.append(component_sizes(problem.scene, problem.like), 1.0)
+    return Curve(change, sizes, _CONVERGED * float(problem.precision.rtol))
+
+
+def change_of(seen: Cycle, point: np.ndarray, slope: float) -> Change:
+    """What a cycle changes in the point that it began at."""
+    m, jacobian = len(point), np.asarray(seen.jacobian[0])
+    code = int(seen.code[0]) or (0 if bool(seen.sound[0]) else NO_WALK)
+    return Change(
+        value=np.asarray(seen.recurring[0]) - point,
+        by_point=jacobian[:, :m] - np.eye(m),
+        by_s=jacobian[:, m] * slope,
+        code=code,
+        seen=seen,
+    )
+
+
+def branch_point(curve: Curve, axis: Axis, found: CurvePoint) -> BranchPoint:
+    """What is told of a point of the curve of gaits."""
+    cycle: Cycle = found.change.seen
+    values = multipliers_of(found.change)
+    looser = _leading_eigenvalues(np.asarray(cycle.jacobian[1]))
+    errors = np.min(np.abs(values[:, None] - looser[None, :]), axis=1)
+    return BranchPoint(
+        value=axis.value(float(found.place[-1])),
+        recurring=found.place[:-1] * curve.sizes[:-1],
+        period=float(cycle.period[0]),
+        step_length=float(cycle.advance[0]),
+        peak_normal=float(cycle.peak[0]),
+        multipliers=values,
+        multiplier_errors=errors,
+        unit_multiplier_error=_unit_error(cycle),
+        bifurcation=int(_bifurcation(values, errors)),
+        residual=float(np.max(np.abs(found.change.value))),
+        place=found.place,
+        tangent=found.tangent,
+    )
+
+
+def multipliers_of(change: Change) -> np.ndarray:
+    """Floquet multipliers from the derivative on the section, shape (m − 1,).
+
+    Not from that at a fixed time: there the trivial one is 1 instead of 0, and at a fold, where
+    another comes to 1, both have the square root of the derivative's error.
+    """
+    return _leading_eigenvalues(np.asarray(change.seen.jacobian[0]))
+
+
+def _leading_eigenvalues(jacobian: np.ndarray) -> np.ndarray:
+    """All but the smallest, largest first."""
+    values = np.linalg.eigvals(jacobian[:, : len(jacobian)]).astype(complex)
+    return values[np.argsort(-np.abs(values), kind="stable")][:-1]
+
+
+def _unit_error(cycle: Cycle) -> float:
+    """Distance from 1 of the multiplier whose eigenvector is the velocity."""
+    values, vectors = np.linalg.eig(np.asarray(cycle.monodromy[0]))
+    parts = np.linalg.lstsq(vectors, np.asarray(cycle.velocity[0], complex))[0]
+    return float(abs(values[np.argmax(np.abs(parts))] - 1.0))
+
+
+def _bifurcation(values: np.ndarray, errors: np.ndarray) -> Bifurcation:
+    """What a multiplier on the unit circle announces."""
+    near = np.abs(np.abs(values) - 1.0) <= np.maximum(errors, CLOSENESS)
+    kinds = [
+        Bifurcation.NEIMARK_SACKER
+        if value.imag != 0.0
+        else (Bifurcation.FOLD if value.real > 0.0 else Bifurcation.PERIOD_DOUBLING)
+        for value in values[near]
+    ]
+    return max(kinds, default=Bifurcation.NONE)

@@ -1,0 +1,142 @@
+"""Setup of a continuation: whose gaits are followed along which axis, and how exactly."""
+
+from typing import NamedTuple, cast
+
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_type, check_unbatched
+from jaxbiped._types import as_float
+from jaxbiped.continuation._axis import Axis
+from jaxbiped.continuation._branch import Branch
+from jaxbiped.continuation._branch_point import BranchPoint, branch_point, gait_curve
+from jaxbiped.continuation._cycle import CycleProblem
+from jaxbiped.continuation._limit_cause import limit_cause
+from jaxbiped.continuation._trace import Trace
+from jaxbiped.dynamics._bristle_state import state_for
+from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
+from jaxbiped.dynamics._state import check_state
+from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._default_guess import default_guess
+from jaxbiped.gait._engine import orbit_engine
+from jaxbiped.gait._poincare_map import recurring_components
+from jaxbiped.gait._pseudo_arclength import Attempt, Curve, CurvePoint, correct
+from jaxbiped.gait._return_map_spec import walking_spec
+from jaxbiped.gait._solver import orbit_solver
+from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import ACCURACIES, precision_of
+from jaxbiped.variational._hybrid_system import section_of
+
+_TOLD_BY_CONTACT = (BranchEnd.BREAKS_OFF, BranchEnd.WALK_ENDS)
+_BEYOND = 5e-3
+"""How far in s behind its end the walk beyond a branch is looked at."""
+
+
+class ContinuationSetup(NamedTuple):
+    """Gaits of a scene along an axis.
+
+    Attributes:
+        scene: the walker.
+        axis: the parameter.
+        footsteps: of a cycle.
+        accuracy: by name.
+        problem: how cycles are followed.
+    """
+
+    scene: Scene | RigidScene
+    axis: Axis
+    footsteps: int
+    accuracy: str
+    problem: CycleProblem
+
+    @property
+    def curve(self) -> Curve:
+        """The gaits as a curve of zeros."""
+        return gait_curve(self.problem, self.axis, self.footsteps)
+
+    def place(self, recurring: np.ndarray, value: float) -> np.ndarray:
+        """Components and value in the sizes of the curve, shape (m + 1,)."""
+        return np.append(recurring, self.axis.place(value)) / self.curve.sizes
+
+    def at_value(self, recurring: np.ndarray, value: float) -> Attempt:
+        """The gait near these components at a value of the parameter."""
+        place = self.place(recurring, value)
+        return correct(self.curve, place, np.eye(len(place))[-1])
+
+    def recurring(self, state: WalkerState) -> np.ndarray:
+        """The components of a state that must return."""
+        return np.asarray(recurring_components(self.problem.spec.system, state))
+
+    def state_of(self, recurring: np.ndarray) -> WalkerState:
+        """The state of these components."""
+        state = type(self.problem.like)(0.0, *recurring.tolist())
+        return cast(WalkerState, jtu.tree_map(as_float, state))
+
+    def point(self, found: CurvePoint) -> BranchPoint:
+        """What is told of a point of the curve."""
+        return branch_point(self.curve, self.axis, found)
+
+    def with_cause(self, part: Trace) -> Trace:
+        """A part of a branch whose end is told by touch and slip, where these tell it."""
+        last, scene = part.points[-1], self.scene
+        if not isinstance(scene, Scene) or part.stop.end not in _TOLD_BY_CONTACT:
+            return part
+        beyond = last.place[-1] + _BEYOND * np.sign(last.tangent[-1])
+        here, there = (
+            with_parameters(scene, {self.axis.name: value})
+            for value in (last.value, self.axis.value(float(beyond)))
+        )
+        state = self.state_of(last.recurring)
+        cause = limit_cause(here, there, state, last.period)
+        return part if cause is None else part._replace(stop=part.stop._replace(cause=cause))
+
+    def branch(self, before: Trace, after: Trace) -> Branch:
+        """The branch of two parts, of which the later begins where the earlier ends."""
+        return Branch(
+            scene=self.scene,
+            points=(*before.points, *after.points[1:]),
+            bifurcations=(*before.bifurcations, *after.bifurcations),
+            stops=(before.stop, after.stop),
+            axis=self.axis,
+            state_type=type(self.problem.like),
+            footsteps=self.footsteps,
+            accuracy=self.accuracy,
+            engine=self.problem.spec.engine,
+        )
+
+
+def continuation_setup(
+    scene: Scene | RigidScene, axis: Axis, *, footsteps: int, accuracy: str, engine: str
+) -> ContinuationSetup:
+    """The setup for a scene; raises `ArgumentError` for an engine that cannot."""
+    scene = jtu.tree_map(as_float, scene)
+    like = default_guess(scene)
+    solver = orbit_solver(None, rigid=not scene.compliant)
+    section = section_of(scene, None)
+    runs_on = orbit_engine(engine, solver=solver, section=section, leaves=(scene, like))
+    # A branch may come to gaits that are costlier than those of a search.
+    most = max(each.max_solver_steps for each in ACCURACIES.values())
+    spec = walking_spec(scene, section, solver, runs_on, steps=1, most=most)
+    problem = CycleProblem(spec, scene, like, precision_of(accuracy, scene))
+    return ContinuationSetup(scene, axis, footsteps, accuracy, problem)
+
+
+def checked_start(scene: Scene | RigidScene, start: object) -> WalkerState:
+    """A start of the kind that the scene needs; raises `ArgumentError`."""
+    if isinstance(scene, RigidScene):
+        return check_state(start, RigidState, "guess")
+    return state_for(scene, start, "guess")
+
+
+def check_followed(scene: object) -> None:
+    """Raises `ArgumentError` for what is no scene, or one in redundant coordinates."""
+    if isinstance(scene, RedundantScene):
+        raise ArgumentError(
+            "scene is not allowed in redundant coordinates: its gaits are those of scene.minimal, "
+            "which can be followed."
+        )
+    check_type("scene", scene, Scene, RigidScene)
+    check_unbatched("scene", scene)

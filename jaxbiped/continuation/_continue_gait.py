@@ -1,0 +1,159 @@
+"""Continuation of a gait in a parameter of its scene."""
+
+import jax.tree_util as jtu
+import numpy as np
+from tqdm import tqdm
+
+from jaxbiped._checks import (
+    check_choice,
+    check_count,
+    check_positive,
+)
+from jaxbiped._progress import stage
+from jaxbiped._types import as_float
+from jaxbiped.continuation._axis import axis_of, start_of
+from jaxbiped.continuation._branch import Branch
+from jaxbiped.continuation._branch_point import BranchPoint
+from jaxbiped.continuation._continuation_setup import (
+    ContinuationSetup,
+    check_followed,
+    checked_start,
+    continuation_setup,
+)
+from jaxbiped.continuation._trace import BranchStop, Trace, trace
+from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._default_guess import default_guess
+from jaxbiped.gait._explain_search import explain_search
+from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._pseudo_arclength import CurvePoint
+from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import GAIT_ACCURACIES
+
+
+def continue_gait(
+    scene: Scene | RigidScene,
+    along: str = "slope",
+    *,
+    bounds: tuple[float, float],
+    guess: Gait | WalkerState | None = None,
+    footsteps: int = 1,
+    log: bool | None = None,
+    largest_step: float = 0.02,
+    max_points: int = 200,
+    accuracy: str = "balanced",
+    engine: str = "auto",
+    progress: bool = False,
+) -> Branch:
+    """Follows a periodic gait along a parameter, in both directions and around folds.
+
+    Pseudo-arclength continuation from the gait at the scene's own value of the parameter (or the
+    nearest within the bounds). Where a multiplier crosses the unit circle between two points, the
+    bifurcation is located by root finding and becomes a point of the branch itself.
+
+    Args:
+        scene: the walker, compliant (with bristles or without) or rigid.
+        along: the parameter's name (see `parameter_names`).
+        bounds: the range (from, to), SI units, at whose ends the branch stops.
+        guess: a gait or a start near the one to follow; the gait that `find_gait` finds unless
+            given.
+        footsteps: how many a cycle has.
+        log: whether equal steps are equal factors; unless given, where a positive range spans two
+            decades.
+        largest_step: largest arclength of a step, in which the range counts 1, an angle 1 rad,
+            and lengths, velocities and rates l, √(g l) and √(g/l).
+        max_points: points followed in each direction at most.
+        accuracy: "balanced" or "tight".
+        engine: "xla", "lanes" or "auto" (see `ENGINES`).
+        progress: whether to show a bar on stderr.
+
+    Returns:
+        The branch; without points where no gait was found, its `stops` then tell why.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> branch = jb.continue_gait(jb.ladder()["rigid"], "slope", bounds=(0.01, 0.11))
+        >>> [f"{each.kind} at {each.value:.4f}" for each in branch.bifurcations]
+        ['period-doubling at 0.1004']
+    """
+    check_followed(scene)
+    axis = axis_of(scene, along, bounds, log)
+    check_count("footsteps", footsteps)
+    check_positive("largest_step", largest_step)
+    check_count("max_points", max_points)
+    check_choice("accuracy", accuracy, GAIT_ACCURACIES)
+    start = start_of(scene, axis)
+    if isinstance(guess, Gait):
+        guess = guess.measures.state
+    if guess is not None:
+        guess = checked_start(scene, guess)
+    setup = continuation_setup(
+        scene, axis, footsteps=int(footsteps), accuracy=accuracy, engine=engine
+    )
+    begin = first_gait(setup, start, guess, engine)
+    if isinstance(begin, str):
+        none = BranchStop(BranchEnd.NO_BEGINNING, begin, float("nan"))
+        return setup.branch(Trace([], [], none), Trace([], [], none))
+    with tqdm(unit=" gaits", disable=not progress) as bar:
+
+        def tell(point: BranchPoint) -> None:
+            bar.update()
+            bar.set_postfix_str(f"{along} = {point.value:.6g}", refresh=False)
+
+        before, after = (
+            trace(
+                setup.curve,
+                axis,
+                begin._replace(tangent=way * begin.tangent),
+                largest_step=float(largest_step),
+                max_points=int(max_points),
+                tell=tell,
+            )
+            for way in (-1.0, 1.0)
+        )
+    before, after = map(setup.with_cause, (before, after))
+    return setup.branch(before.reversed(), after)
+
+
+def first_gait(
+    setup: ContinuationSetup, value: float, guess: WalkerState | None, engine: str
+) -> CurvePoint | str:
+    """The gait at a value of the parameter near a guess, or the one that a search finds.
+
+    A sentence where there is none. Newton's method from the guess is tried first, with the
+    continuation's own evaluation: a search compiles programs of its own.
+    """
+    scene = with_parameters(setup.scene, {setup.axis.name: value})
+    start = default_guess(scene) if guess is None else guess
+    with stage("compiling the continuation (first time for this kind of scene)"):
+        seen = setup.problem.cycle(setup.recurring(start), (setup.axis.leaf,), [value], 1)
+    if int(seen.code[0]) == 0:
+        near = setup.recurring(start) if guess is not None else np.asarray(seen.recurring[0])
+        found = setup.at_value(near, value).found
+        if found is not None and (guess is not None or setup.point(found).stable):
+            return found
+    gait = find_gait(
+        jtu.tree_map(as_float, scene),
+        guess,
+        footsteps=setup.footsteps,
+        parameters=(),
+        radius_sensitivities=False,
+        accuracy=setup.accuracy,
+        engine=engine,
+    )
+    if gait.outcome is Search.FOUND:
+        found = setup.at_value(setup.recurring(gait.measures.state), value).found
+        if found is not None:
+            return found
+        return (
+            f"no gait to begin from: what the search finds at {setup.axis.name} = {value:.6g} is "
+            "lost when it is corrected"
+        )
+    return explain_search(scene, gait)

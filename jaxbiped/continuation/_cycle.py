@@ -1,0 +1,149 @@
+"""Cycle of footsteps with its derivatives: the one evaluation that all continuation reads.
+
+It is chained of single returns, so that one compiled program serves every point of a branch, every
+step of a corrector and every number of footsteps.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._caches import cached_jit
+from jaxbiped._types import Numbers, Scalar
+from jaxbiped.gait._fixed_point_search import LOOSER
+from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._soundness import is_sound
+from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.solve._accuracy import Precision
+
+
+class Cycle(NamedTuple):
+    """A cycle of footsteps; beside it a looser one, the witness of its error, on a first axis of 2.
+
+    With m recurring components and p parameters:
+
+    Attributes:
+        recurring: the components that came back, shape (m,).
+        jacobian: their derivatives on the section with respect to components and parameters,
+            shape (m, m + p), SI units.
+        monodromy: with respect to the components at a fixed time, shape (m, m).
+        velocity: their rates where the cycle ends, shape (m,).
+        period: duration [s].
+        advance: along the slope [m].
+        peak: largest force on a foot [N].
+        code: 0 or that of the `Ending` that came instead.
+        sound: whether every footstep goes downhill and on the ground (see `is_sound`).
+    """
+
+    recurring: Numbers
+    jacobian: Numbers
+    monodromy: Numbers
+    velocity: Numbers
+    period: Numbers
+    advance: Numbers
+    peak: Numbers
+    code: Numbers
+    sound: Numbers
+
+
+class CycleProblem(NamedTuple):
+    """Whose cycles are followed, and how exactly.
+
+    Attributes:
+        spec: of a return of one footstep.
+        scene: the walker.
+        like: any state of it.
+        precision: of the solves.
+    """
+
+    spec: ReturnMapSpec
+    scene: AbstractScene
+    like: PyTree
+    precision: Precision
+
+    def cycle(
+        self, point: np.ndarray, active: tuple[int, ...], values: list[float], footsteps: int
+    ) -> Cycle:
+        """The cycle from a point of m components, parameters at positions `active` so changed."""
+        pairs: PyTree = [np.array([rtol, LOOSER * rtol]) for rtol in self.precision]
+        numbers: PyTree = [np.asarray(point), np.asarray(values, dtype=float)]
+        start, given = numbers
+        count: PyTree = np.asarray(footsteps)
+        result = _evaluate(
+            self.spec, self.scene, active, self.like, start, given, Precision(*pairs), count
+        )
+        found: Cycle = jax.device_get(result)
+        return found
+
+
+@cached_jit
+def _evaluate(
+    spec: ReturnMapSpec,
+    scene: AbstractScene,
+    active: tuple[int, ...],
+    like: PyTree,
+    point: Scalar,
+    values: Scalar,
+    precisions: Precision,
+    footsteps: Scalar,
+) -> Cycle:
+    """The cycle, and in a lane of its own the looser one."""
+    leaves, structure = jtu.tree_flatten(scene)
+    for k, place in enumerate(active):
+        leaves[place] = values[k]
+    scene = jtu.tree_unflatten(structure, leaves)
+    return jax.vmap(
+        lambda *precision: _chain(
+            spec, scene, active, like, point, Precision(*precision), footsteps
+        )
+    )(*precisions)
+
+
+def _chain(
+    spec: ReturnMapSpec,
+    scene: AbstractScene,
+    active: tuple[int, ...],
+    like: PyTree,
+    point: Scalar,
+    precision: Precision,
+    footsteps: Scalar,
+) -> Cycle:
+    m, p = point.shape[0], len(active)
+    seeds, sizes = seed_directions(scene, active, m)
+    units = jnp.concatenate([jnp.ones(m), sizes])
+
+    def add(_: int, before: Cycle) -> Cycle:
+        y = state_with(spec.system, like, jnp.asarray(before.recurring))
+        once = linearised_return(spec, seeds, y, precision, before.code != 0)
+        own = once.jacobian / units
+        by_parameters = jnp.concatenate([jnp.zeros((m, m)), own[:, m:]], axis=1)
+        return Cycle(
+            recurring=once.recurring,
+            jacobian=own[:, :m] @ before.jacobian + by_parameters,
+            monodromy=once.monodromy[:, :m] @ before.monodromy,
+            velocity=once.velocity,
+            period=before.period + once.period,
+            advance=before.advance + once.advance[0],
+            peak=jnp.maximum(before.peak, once.peak),
+            code=jnp.where(before.code != 0, before.code, once.code),
+            sound=before.sound & is_sound(scene, y, once.advance[0], once.period),
+        )
+
+    zero = jnp.zeros(())
+    begin = Cycle(
+        recurring=point,
+        jacobian=jnp.eye(m, m + p),
+        monodromy=jnp.eye(m),
+        velocity=jnp.zeros(m),
+        period=zero,
+        advance=zero,
+        peak=zero,
+        code=jnp.asarray(0),
+        sound=jnp.asarray(True),
+    )
+    return jax.lax.fori_loop(0, footsteps, add, begin)

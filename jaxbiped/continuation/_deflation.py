@@ -1,0 +1,215 @@
+"""Deflation: further gaits of one scene, each found by making Newton's method avoid the known.
+
+Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026: the residual is multiplied by
+Π (1/|x − xᵢ|² + 1). As that factor is a scalar, the deflated step is Newton's own with another
+length, by the Sherman–Morrison formula.
+"""
+
+from collections.abc import Iterator
+from itertools import cycle, islice
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxbiped._checks import (
+    check_choice,
+    check_count,
+)
+from jaxbiped._progress import stage
+from jaxbiped.continuation._axis import axis_of
+from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint
+from jaxbiped.continuation._continuation_setup import (
+    ContinuationSetup,
+    check_followed,
+    checked_start,
+    continuation_setup,
+)
+from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.gait._pseudo_arclength import Change
+from jaxbiped.gait._rolling_starts import rolling_starts
+from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import GAIT_ACCURACIES
+
+_MOST_STEPS = 40
+_LARGEST = 0.1
+"""Step at most, in the sizes of the components."""
+_HALVINGS = 6
+"""Of a step from whose end the walk does not return."""
+_TRIALS = 20
+"""Starts drawn at most for each that is used: most end before a cycle is done."""
+_SAME = 1e-5
+"""Distance up to which two cycles are one."""
+_SPREADS = (0.003, 0.01, 0.03, 0.1, 0.3)
+"""Largest relative scatter of the starts' components."""
+
+
+class IsolatedGait(NamedTuple):
+    """A gait of a scene that a search found beside others.
+
+    Attributes:
+        state: on the section.
+        point: its measures and multipliers.
+    """
+
+    state: WalkerState
+    point: BranchPoint
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether it is stable; None where the errors leave it open."""
+        return self.point.stable
+
+
+def find_isolated(
+    scene: Scene | RigidScene,
+    *,
+    footsteps: int = 1,
+    known: tuple[WalkerState, ...] = (),
+    starts: int = 32,
+    seed: int = 0,
+    accuracy: str = "balanced",
+    engine: str = "auto",
+) -> tuple[IsolatedGait, ...]:
+    """Finds gaits of so many footsteps without a guess, by deflated Newton's method.
+
+    From each of many scattered starts gaits are sought as long as new ones are found, every search
+    avoiding those that are known with all the places where they cross the section.
+
+    Args:
+        scene: the walker, compliant or rigid.
+        footsteps: how many a cycle has; gaits that repeat themselves after fewer are avoided, but
+            not returned.
+        known: states of gaits to avoid.
+        starts: how many, scattered about the gait that `find_gait` finds.
+        seed: of their random numbers.
+        accuracy: "balanced" or "tight".
+        engine: "xla", "lanes" or "auto" (see `ENGINES`).
+
+    Returns:
+        The gaits in the order in which they were found, none twice.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled.
+    """
+    check_followed(scene)
+    for name, count in (("footsteps", footsteps), ("starts", starts)):
+        check_count(name, count)
+    check_choice("accuracy", accuracy, GAIT_ACCURACIES)
+    checked = [checked_start(scene, each) for each in known]
+    slope = float(parameter_values(scene)["slope"])
+    axis = axis_of(scene, "slope", (slope, slope + 0.01), None)
+    setup = continuation_setup(
+        scene, axis, footsteps=int(footsteps), accuracy=accuracy, engine=engine
+    )
+    search = _DeflatedNewton(setup, slope)
+    for state in checked:
+        search.learn(setup.recurring(state), keep=False)
+    with stage(f"searching from {starts} starts"):
+        drawn = islice(_scattered(setup, int(starts), seed, engine), _TRIALS * int(starts))
+        for point in islice(filter(search.returns, drawn), int(starts)):
+            while (found := search.from_start(point)) is not None:
+                search.learn(found)
+    return search.found()
+
+
+def _scattered(
+    setup: ContinuationSetup, count: int, seed: int, engine: str
+) -> Iterator[np.ndarray]:
+    """Components of starts, without end: about the gait that a search finds, itself the first.
+
+    Rolling starts where it finds none.
+    """
+    scene = setup.scene
+    gait = find_gait(
+        scene, parameters=(), radius_sensitivities=False, accuracy=setup.accuracy, engine=engine
+    )
+    if gait.outcome is not Search.FOUND:
+        rolling = rolling_starts(scene, _TRIALS * count, spread=max(_SPREADS), seed=seed)
+        yield from np.stack([np.asarray(leaf) for leaf in rolling[1:]], axis=1)
+        return
+    middle, random = setup.recurring(gait.measures.state), np.random.default_rng(seed)
+    yield middle
+    for spread in cycle(_SPREADS):
+        yield middle * (1.0 + spread * random.uniform(-1.0, 1.0, len(middle)))
+
+
+class _DeflatedNewton:
+    """Deflated Newton's method, and the cycles that it knows."""
+
+    def __init__(self, setup: ContinuationSetup, value: float) -> None:
+        self._setup, self._value = setup, value
+        self._sizes = setup.curve.sizes[:-1]
+        self._crossings: list[np.ndarray] = []
+        self._gaits: list[IsolatedGait] = []
+
+    def found(self) -> tuple[IsolatedGait, ...]:
+        """The gaits of as many footsteps as were asked for."""
+        return tuple(self._gaits)
+
+    def learn(self, point: np.ndarray, *, keep: bool = True) -> None:
+        """Makes a cycle known, wherever it crosses the section."""
+        crossings = [point]
+        for _ in range(self._setup.footsteps - 1):
+            after, code = self._walk(crossings[-1], 1)
+            if code or self._apart(after, point) < _SAME:
+                break
+            crossings.append(after)
+        self._crossings += [each / self._sizes for each in crossings]
+        place = self._setup.at_value(point, self._value).found
+        if keep and len(crossings) == self._setup.footsteps and place is not None:
+            told = self._setup.point(place)
+            self._gaits.append(IsolatedGait(self._setup.state_of(told.recurring), told))
+
+    def returns(self, start: np.ndarray) -> bool:
+        """Whether the walk from a start comes through a cycle."""
+        return self._walk(start, self._setup.footsteps + 1)[1] == 0
+
+    def from_start(self, start: np.ndarray) -> np.ndarray | None:
+        """A cycle that is not known yet, None where the search ends without."""
+        point, code = self._walk(start, 1)  # onto the section
+        for _ in range(_MOST_STEPS):
+            here = self._change(point)
+            if code or here.code:
+                return None
+            try:
+                step = np.linalg.solve(here.by_point, -here.value) / self._sizes
+            except np.linalg.LinAlgError:
+                return None
+            if np.linalg.norm(step) <= self._setup.curve.converged:
+                apart = [np.linalg.norm(point / self._sizes - each) for each in self._crossings]
+                return point if min(apart, default=np.inf) > _SAME else None
+            point, code = self._advance(point, self._deflated(point / self._sizes, step))
+        return None
+
+    def _deflated(self, scaled: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Newton's step with the length, or in the sense, that avoids the known crossings."""
+        away = [scaled - each for each in self._crossings]
+        squares = [float(each @ each) for each in away]
+        slopes = [-2.0 * each / (r2 * (r2 + 1.0)) for each, r2 in zip(away, squares, strict=True)]
+        step = step / (1.0 - float(sum(slopes, np.zeros_like(step)) @ step))
+        return step * min(1.0, _LARGEST / float(np.linalg.norm(step)))
+
+    def _advance(self, point: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, int]:
+        """A step on, or as much of it as leads to where the walk returns."""
+        for k in range(_HALVINGS):
+            ahead = point + 0.5**k * step * self._sizes
+            code = self._walk(ahead, self._setup.footsteps)[1]
+            if code == 0:
+                break
+        return ahead, code
+
+    def _walk(self, point: np.ndarray, footsteps: int) -> tuple[np.ndarray, int]:
+        leaf = self._setup.axis.leaf
+        found = self._setup.problem.cycle(point, (leaf,), [self._value], footsteps)
+        code = int(found.code[0]) or (0 if bool(found.sound[0]) else NO_WALK)
+        return np.asarray(found.recurring[0]), code
+
+    def _change(self, point: np.ndarray) -> Change:
+        return self._setup.curve.change(point, self._setup.axis.place(self._value))
+
+    def _apart(self, a: np.ndarray, b: np.ndarray) -> float:
+        return float(np.linalg.norm((a - b) / self._sizes))

@@ -1,0 +1,70 @@
+"""Nearest bifurcation of a gait in one of its scene's parameters."""
+
+import math
+from typing import NamedTuple
+
+from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped.continuation._bifurcations import BranchEvent
+from jaxbiped.continuation._continue_gait import continue_gait
+from jaxbiped.gait._gait import Gait
+from jaxbiped.scene._parameters import parameter_names, parameter_values
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+
+FACTOR = 8.0
+"""How far a parameter is followed to both sides of its own value."""
+
+
+class NearestBifurcation(NamedTuple):
+    """What a gait comes to first when a parameter grows or shrinks.
+
+    Attributes:
+        along: name of the parameter.
+        kind: what happens there; None where nothing does within the range that was followed.
+        value: of the parameter there, SI units; NaN for none.
+        ratio: of that value to the gait's own.
+        multiplier: the critical multiplier there, `error` its estimated error.
+    """
+
+    along: str
+    kind: BranchEvent | None
+    value: float
+    ratio: float
+    multiplier: complex
+    error: float
+
+
+def nearest_bifurcation(
+    scene: Scene | RigidScene, gait: Gait, along: str = "slope", *, factor: float = FACTOR
+) -> NearestBifurcation:
+    """Follows a gait in a parameter to both sides, and tells the first bifurcation or limit.
+
+    Args:
+        scene: the gait's.
+        gait: where to begin.
+        along: the parameter's name (see `parameter_names`).
+        factor: how far to follow it: from its own value over this to its own times this.
+
+    Returns:
+        The one whose value differs by the smallest factor.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled; a parameter
+            that is zero, which no factor changes.
+    """
+    check_choice("along", along, parameter_names(scene))
+    own = float(parameter_values(scene)[along])
+    if own == 0.0:
+        raise ArgumentError(f"along = {along!r} is not allowed where {along} is 0: no factor fits.")
+    if not factor > 1.0:
+        raise ArgumentError(f"factor = {factor!r} is not allowed: it must be above 1.")
+    steps = gait.orbit[0].shape[0]
+    branch = continue_gait(
+        scene, along, bounds=(own / factor, own * factor), guess=gait, footsteps=steps
+    )
+    seen = [each for each in branch.bifurcations if each.value / own > 0.0]
+    if not seen:
+        return NearestBifurcation(along, None, math.nan, math.nan, complex(math.nan), math.nan)
+    first = min(seen, key=lambda each: abs(math.log(each.value / own)))
+    ratio = first.value / own
+    return NearestBifurcation(along, first.kind, first.value, ratio, first.multiplier, first.error)

@@ -1,0 +1,103 @@
+"""Branch that a dataset holds, opened to be drawn or followed on."""
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped.continuation._axis import Axis
+from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
+from jaxbiped.continuation._branch import Branch
+from jaxbiped.continuation._branch_dataset import NUMBERS
+from jaxbiped.continuation._branch_point import BranchPoint
+from jaxbiped.continuation._trace import BranchStop
+from jaxbiped.dynamics._bristle_state import BristleState
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import State
+from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+
+if TYPE_CHECKING:
+    import xarray
+
+_STATES = {kind.__name__: kind for kind in (State, BristleState, RigidState)}
+
+
+def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
+    """The branch that a dataset holds, to be drawn, or followed on by `resume_branch`.
+
+    Args:
+        dataset: from `Branch.dataset`, also one that was stored and opened again.
+        scene: the walker that it was made with.
+
+    Returns:
+        The branch.
+
+    Raises:
+        ArgumentError: a dataset of something else, or of another scene.
+    """
+    check_type("scene", scene, Scene, RigidScene)
+    if "branch" not in dataset.attrs:
+        raise ArgumentError("dataset is not allowed: it must be that of a branch.")
+    settings = json.loads(dataset.attrs["branch"])
+    own = {name: float(value) for name, value in parameter_values(scene).items()}
+    if own != settings["scene"]:
+        kept = settings["scene"]
+        names = sorted(name for name in own.keys() | kept.keys() if own.get(name) != kept.get(name))
+        raise ArgumentError(
+            f"scene is not allowed: it differs from the branch's own in {', '.join(names)}."
+        )
+    state_type = _STATES[settings["state_type"]]
+    special = _points(dataset, state_type, settings["along"], "event_")
+    events = [
+        BifurcationPoint(EVENTS[int(kind)], point, complex(real, imaginary), float(error))
+        for kind, point, real, imaginary, error in zip(
+            dataset["event_kind"].values,
+            special,
+            dataset["event_multiplier_real"].values,
+            dataset["event_multiplier_imag"].values,
+            dataset["event_error"].values,
+            strict=True,
+        )
+    ]
+    first, last = (BranchStop(BranchEnd(end), why, at) for end, why, at in settings["stops"])
+    return Branch(
+        scene=scene,
+        points=tuple(_points(dataset, state_type, settings["along"], "")),
+        bifurcations=tuple(events),
+        stops=(first, last),
+        axis=Axis(**settings["axis"]),
+        state_type=state_type,
+        footsteps=settings["footsteps"],
+        accuracy=settings["accuracy"],
+        engine=settings["engine"],
+    )
+
+
+def _points(
+    dataset: "xarray.Dataset", state_type: Any, along: str, before: str
+) -> list[BranchPoint]:
+    def column(name: str) -> np.ndarray:
+        return np.asarray(dataset[before + name].values)
+
+    recurring = np.stack([column(f"state_{name}") for name in state_type._fields[1:]], axis=1)
+    values = column("multipliers_real") + 1j * column("multipliers_imag")
+    errors, codes = column("multipliers_error"), column("bifurcation")
+    numbers = {name: column(name) for name in NUMBERS}
+    value, place, tangent = column(along), column("place"), column("tangent")
+    return [
+        BranchPoint(
+            value=float(value[k]),
+            recurring=recurring[k],
+            multipliers=values[k],
+            multiplier_errors=errors[k],
+            bifurcation=int(codes[k]),
+            place=place[k],
+            tangent=tangent[k],
+            **{name: float(numbers[name][k]) for name in NUMBERS},
+        )
+        for k in range(len(value))
+    ]

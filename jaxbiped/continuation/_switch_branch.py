@@ -1,0 +1,200 @@
+"""Switching to the branch of doubled period at a period doubling, and on through a cascade.
+
+At the multiplier −1 a cycle of k footsteps throws off one of 2 k, at first along its eigenvector.
+Seydel, Practical Bifurcation and Stability Analysis (2010), section 7.4.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type
+from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
+from jaxbiped.continuation._branch import Branch
+from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
+from jaxbiped.continuation._trace import BranchStop, Trace, trace
+from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._pseudo_arclength import CurvePoint, correct
+
+_AMPLITUDES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
+"""Distances along the eigenvector, in the sizes of the curve, at which the branch is sought."""
+_NEAR = 0.01
+"""How far in s from the doubling it may be found, unless the doublings themselves lie close."""
+_APART = 0.5
+"""Share of the distance expected between the two halves of a cycle that tells it from its half."""
+_FINER, _NEARER = 20.0, 40.0
+"""Shares of the last interval of a cascade that the next branch's steps may have, and the distance
+in s from the doubling at which it begins: intervals shrink by 4.7."""
+
+
+class DoublingCascade(NamedTuple):
+    """Period doublings one after another.
+
+    Attributes:
+        branches: the first, then those of 2, 4, 8, … times its footsteps, each as far as it was
+            followed.
+        doublings: the first period doubling of each branch in the direction of the cascade.
+        values: of the parameter there, SI units, shape (n,).
+        ratios: of successive intervals of these, shape (n − 2,); they tend to Feigenbaum's
+            4.669….
+    """
+
+    branches: tuple[Branch, ...]
+    doublings: tuple[BifurcationPoint, ...]
+    values: np.ndarray
+    ratios: np.ndarray
+
+    @property
+    def accumulation(self) -> float:
+        """Where the doublings would accumulate if the last ratio stayed: where chaos sets in."""
+        last, ratio = self.values[-1] - self.values[-2], self.ratios[-1]
+        return float(self.values[-1] + last / (ratio - 1.0))
+
+
+def switch_branch(
+    branch: Branch,
+    doubling: BifurcationPoint | None = None,
+    *,
+    largest_step: float = 0.02,
+    max_points: int = 200,
+) -> Branch:
+    """Follows the gaits of twice the footsteps that branch off at a period doubling.
+
+    Args:
+        branch: from `continue_gait`.
+        doubling: one of its bifurcations, its first period doubling unless given.
+        largest_step: largest arclength of a step (see `continue_gait`).
+        max_points: points followed at most.
+
+    Returns:
+        The branch of doubled period, from just beside the doubling onwards.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, or no doubled gait near it.
+    """
+    check_type("branch", branch, Branch)
+    check_positive("largest_step", largest_step)
+    check_count("max_points", max_points)
+    found = _first_doubling(branch) if doubling is None else doubling
+    if found is None or found.kind is not BranchEvent.PERIOD_DOUBLING:
+        raise ArgumentError("doubling is not allowed: it must be a period doubling of the branch.")
+    return _switched(branch, found, largest_step, max_points)
+
+
+def doubling_cascade(
+    branch: Branch,
+    doublings: int = 4,
+    *,
+    doubling: BifurcationPoint | None = None,
+    largest_step: float = 0.02,
+    max_points: int = 200,
+) -> DoublingCascade:
+    """Follows period doublings from a branch to those of 2, 4, 8, … times its footsteps.
+
+    Args:
+        branch: from `continue_gait`, with a period doubling.
+        doublings: how many to follow, that of the branch among them.
+        doubling: where the cascade begins, the branch's first period doubling unless given.
+        largest_step: largest arclength of a step (see `continue_gait`); those of later branches
+            are smaller as they are shorter.
+        max_points: points on each branch at most.
+
+    Returns:
+        The branches and their doublings; fewer where a branch has none.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, or no doubled gait near a doubling.
+    """
+    check_count("doublings", doublings)
+    here = _first_doubling(branch) if doubling is None else doubling
+    if here is None:
+        raise ArgumentError("branch is not allowed: it has no period doubling.")
+    branches, found, step, near = [branch], [here], largest_step, _NEAR
+    while len(found) < doublings:
+        until = BranchEvent.PERIOD_DOUBLING
+        branches.append(
+            _switched(branches[-1], found[-1], step, max_points, until=until, near=near)
+        )
+        after = _first_doubling(branches[-1])
+        if after is None:
+            break
+        found.append(after)
+        length = np.linalg.norm(branches[-1].points[-1].place - branches[-1].points[0].place)
+        step = min(step, float(length) / _FINER)
+        near = min(near, abs(found[-1].point.place[-1] - found[-2].point.place[-1]) / _NEARER)
+    values = np.array([each.value for each in found])
+    intervals = np.diff(values)
+    return DoublingCascade(tuple(branches), tuple(found), values, intervals[:-1] / intervals[1:])
+
+
+def _first_doubling(branch: Branch) -> BifurcationPoint | None:
+    kinds = (each for each in branch.bifurcations if each.kind is BranchEvent.PERIOD_DOUBLING)
+    return next(kinds, None)
+
+
+def _switched(
+    branch: Branch,
+    doubling: BifurcationPoint,
+    largest_step: float,
+    max_points: int,
+    *,
+    until: BranchEvent | None = None,
+    near: float = _NEAR,
+) -> Branch:
+    setup = continuation_setup(
+        branch.scene,
+        branch.axis,
+        footsteps=2 * branch.footsteps,
+        accuracy=branch.accuracy,
+        engine=branch.engine,
+    )
+    begin = _doubled(setup, branch.footsteps, doubling, near)
+    if begin is None:
+        raise ArgumentError(
+            f"doubling at {branch.along} = {doubling.value:.6g} is not allowed: no gait of "
+            f"{setup.footsteps} footsteps was found near it."
+        )
+    beyond = trace(
+        setup.curve,
+        setup.axis,
+        begin,
+        largest_step=largest_step,
+        max_points=max_points,
+        until=until,
+    )
+    stop = BranchStop(
+        BranchEnd.BRANCHES_OFF,
+        f"a branch of {branch.footsteps} footsteps doubles its period",
+        doubling.value,
+    )
+    first = Trace(beyond.points[:1], [], stop)
+    return setup.branch(first, beyond)
+
+
+def _doubled(
+    setup: ContinuationSetup, footsteps: int, doubling: BifurcationPoint, near: float
+) -> CurvePoint | None:
+    """A cycle of doubled period beside a doubling, its tangent pointing away from there."""
+    point, leaf = doubling.point, (setup.axis.leaf,)
+    sizes = setup.curve.sizes
+    seen = setup.problem.cycle(point.recurring, leaf, [point.value], footsteps)
+    m = len(point.recurring)
+    values, vectors = np.linalg.eig(
+        np.asarray(seen.jacobian[0])[:, :m] / sizes[:m, None] * sizes[:m]
+    )
+    vector = vectors[:, np.argmin(np.abs(values + 1.0))].real
+    along = np.append(vector / np.linalg.norm(vector), 0.0)
+    # Normal to the branch of half the period, which then does not cross the plane of the search.
+    across = along - (along @ point.tangent) * point.tangent
+    across /= np.linalg.norm(across)
+    for amplitude in _AMPLITUDES:
+        guess = point.place + amplitude * along
+        found = correct(setup.curve, guess, across, across, patient=True).found
+        if found is None or abs(found.place[-1] - point.place[-1]) > near:
+            continue
+        own = found.place[:-1] * sizes[:-1]
+        half = setup.problem.cycle(own, leaf, [setup.axis.value(found.place[-1])], footsteps)
+        apart = np.linalg.norm((np.asarray(half.recurring[0]) - own) / sizes[:-1])
+        if apart > _APART * 2.0 * amplitude:
+            return found
+    return None

@@ -1,0 +1,151 @@
+"""Trace of a curve of gaits in one direction: its points, its bifurcations, and how it ends."""
+
+from collections.abc import Callable
+from itertools import islice
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxbiped._ending import Ending
+from jaxbiped.continuation._axis import Axis
+from jaxbiped.continuation._bifurcations import (
+    BifurcationPoint,
+    BranchEvent,
+    bifurcations_between,
+)
+from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint, branch_point
+from jaxbiped.continuation._limit_cause import NOT_SMOOTH, OF_ENDINGS
+from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, follow
+
+_SMALLEST = 1e-6
+_FIRST = 0.25
+"""Of the largest step."""
+_LEAST_COSINE, _ASIDE = 0.95, 0.02
+_DIVERGED = 1e6
+"""Multiplier by which the return map counts as not smooth: near grazing it grows as a root."""
+_AT_BOUND = 1e-9
+_SAME_WAY = 0.9
+"""Cosine between the tangents where a branch passes its own beginning once more."""
+
+LIMITS = (BranchEnd.WALK_ENDS, BranchEnd.BREAKS_OFF, BranchEnd.NO_WALK)
+"""Ends that are limits of the model."""
+
+
+class BranchStop(NamedTuple):
+    """Where and why a branch was followed no further.
+
+    Attributes:
+        end: how it ended.
+        cause: in words: the `Ending` of the walk beyond, or what else comes there.
+        value: of the parameter there, SI units; NaN where there is no point.
+    """
+
+    end: BranchEnd
+    cause: str
+    value: float
+
+
+class Trace(NamedTuple):
+    """A part of a branch that is followed in one direction.
+
+    Attributes:
+        points: in order, located bifurcations among them.
+        bifurcations: those that were located, and a limit where one ends it.
+        stop: how it ended.
+    """
+
+    points: list[BranchPoint]
+    bifurcations: list[BifurcationPoint]
+    stop: BranchStop
+
+    def reversed(self) -> "Trace":
+        """The same part in the other order."""
+        points = [point._replace(tangent=-point.tangent) for point in reversed(self.points)]
+        return Trace(points, self.bifurcations[::-1], self.stop)
+
+
+def trace(
+    curve: Curve,
+    axis: Axis,
+    begin: CurvePoint,
+    *,
+    largest_step: float,
+    max_points: int,
+    until: BranchEvent | None = None,
+    tell: Callable[[BranchPoint], object] = lambda point: None,
+) -> Trace:
+    """Follows a curve of gaits onwards along a point's tangent; that point is the first.
+
+    Args:
+        curve, axis: the gaits.
+        begin: where to begin.
+        largest_step: arclength of a step at most.
+        max_points: points at most.
+        until: a kind of bifurcation at the first of which to stop.
+        tell: is called with each point.
+    """
+    points = [branch_point(curve, axis, begin)]
+    events: list[BifurcationPoint] = []
+    here = begin
+
+    def stopped(end: BranchEnd, cause: str) -> Trace:
+        last = points[-1]
+        if end in LIMITS:
+            largest = complex(last.multipliers[0])
+            error = float(last.multiplier_errors[0])
+            events.append(BifurcationPoint(BranchEvent.LIMIT, last, largest, error))
+        return Trace(points, events, BranchStop(end, cause, last.value))
+
+    if leaves_range(begin):
+        return stopped(BranchEnd.REACHED, BOUND)
+    control = StepControl(_FIRST * largest_step, largest_step, _SMALLEST, _LEAST_COSINE, _ASIDE)
+    for attempt in islice(follow(curve, here, control, low=0.0, high=1.0), max_points):
+        if attempt.found is None:
+            return stopped(*reason_of(attempt.code))
+        there = attempt.found
+        for place, event in bifurcations_between(curve, axis, here, there):
+            points.append(branch_point(curve, axis, place))
+            events.append(event)
+            if event.kind is until:
+                return stopped(BranchEnd.UNFINISHED, f"stopped at the {until}")
+        points.append(branch_point(curve, axis, there))
+        tell(points[-1])
+        if abs(points[-1].multipliers[0]) > _DIVERGED:
+            return stopped(BranchEnd.BREAKS_OFF, NOT_SMOOTH)
+        if is_bound(there):
+            return stopped(BranchEnd.REACHED, BOUND)
+        if len(points) > 3 and _closes(begin, here, there):
+            return stopped(BranchEnd.CLOSED, "the branch is closed")
+        here = there
+    return stopped(BranchEnd.UNFINISHED, f"{max_points} points were followed")
+
+
+BOUND = "the range ends"
+
+
+def reason_of(code: int) -> tuple[BranchEnd, str]:
+    """Why a curve could not be followed on, from the code of the last attempt."""
+    if code == NO_WALK:
+        return BranchEnd.NO_WALK, "no walk: a foot deep underground, or a step uphill"
+    if code:
+        return BranchEnd.WALK_ENDS, OF_ENDINGS.get(Ending(code), str(Ending(code)))
+    return BranchEnd.BREAKS_OFF, NOT_SMOOTH
+
+
+def is_bound(point: CurvePoint) -> bool:
+    return bool(min(abs(point.place[-1]), abs(point.place[-1] - 1.0)) < _AT_BOUND)
+
+
+def leaves_range(point: CurvePoint) -> bool:
+    """Whether a point lies on the end of the range and the branch leads out of it."""
+    return is_bound(point) and bool((point.place[-1] > 0.5) == (point.tangent[-1] > 0.0))
+
+
+def _closes(begin: CurvePoint, here: CurvePoint, there: CurvePoint) -> bool:
+    """Whether a branch passes its own beginning between two points."""
+    step, back = there.place - here.place, begin.place - here.place
+    share = float(back @ step / (step @ step))
+    aside = np.linalg.norm(back - share * step)
+    near = 0.0 < share <= 1.0 and aside < 0.1 * np.linalg.norm(step)
+    return bool(near and begin.tangent @ there.tangent > _SAME_WAY)

@@ -1,0 +1,42 @@
+"""Foot preload: a compliant foot whose set point moves as its leg turns back."""
+
+import dataclasses
+from typing import ClassVar, Self
+
+import jax.numpy as jnp
+
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
+from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator
+
+
+class FootPreload(AbstractActuator):
+    """The foot's set point, (extension/2) (1 + tanh((φ − onset)/span)) below the leg's own.
+
+    φ is minus the leg's angle. The massless foot is pressed into the ground by so much while its
+    leg trails, and let up again in the swing: normal laws see the penetration δ with this added.
+    For compliant feet alone.
+
+    Attributes (leaves of any batch shape):
+        extension: of a leg that trails far [m].
+        onset: phase at which half of it is reached: minus the leg's angle [rad].
+        span: over which it builds up [rad].
+
+    Raises:
+        ArgumentError: extension below 0 or span not above 0.
+    """
+
+    name: ClassVar[str] = "foot-preload"
+    feet: ClassVar[str] = "compliant"
+    extension: Parameter = parameter("foot's extension", "$e$", "m", minimum=0.0)
+    onset: Parameter = parameter("extension's phase", r"$\varphi_e$", "rad", default=0.1)
+    span: Parameter = parameter("extension's span", "$w_e$", "rad", positive=True, default=0.05)
+
+    def set_point(self, angle: Scalar, rate: Scalar) -> tuple[Scalar, Scalar]:
+        """How far the foot is extended [m], and how fast it is [m/s]."""
+        rise = jnp.tanh((-angle - self.onset) / self.span)
+        half = 0.5 * self.extension
+        return half * (1.0 + rise), -half * (1.0 - rise * rise) * rate / self.span
+
+    def idle(self) -> Self:
+        return dataclasses.replace(self, extension=0.0 * self.extension)

@@ -1,0 +1,98 @@
+"""The flags that drive a walker."""
+
+import dataclasses
+import json
+
+import jax
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.cli import main
+from jaxbiped.cli._actuation_options import ActuationOptions
+from jaxbiped.cli._walk_options import SceneOptions
+
+
+def _run(*arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main(list(arguments))
+    return stopped.value.code
+
+
+def test_every_actuator_has_a_flag():
+    fields = [field.name.replace("_", "-") for field in dataclasses.fields(ActuationOptions)]
+    assert fields == list(jb.actuation.ACTUATORS)
+
+
+def test_flags_make_the_actuators():
+    asked = ActuationOptions(
+        hip_spring=("k=0.05", "theta_0=0.1"),
+        hip_torque=("torque=0.1", "reaction=trunk"),
+        hip_spline=("torque=0.1,0.2,0.3", "first=-0.1"),
+    )
+    found = SceneOptions(driven=asked, set=("torque_2=0.7", "b=0.001")).scene()
+    spring, torque, spline = found.actuation
+    assert [float(x) for x in (spring.k, spring.b, spring.theta_0)] == [0.05, 0.001, 0.1]
+    assert (float(torque.torque), torque.reaction) == (0.1, "trunk")
+    assert [float(x) for x in spline.torque] == [0.1, 0.7, 0.3]
+    assert float(spline.first) == -0.1
+    rigid = SceneOptions(model="rigid", driven=ActuationOptions(push_off=("impulse=0.2",))).scene()
+    assert float(rigid.actuation[0].impulse) == 0.2
+    redundant = SceneOptions(formulation="redundant", driven=asked).scene()
+    assert len(redundant.actuation) == 3
+    assert SceneOptions().scene().actuation is None
+    assert jax.tree_util.tree_structure(SceneOptions().scene()) == jax.tree_util.tree_structure(
+        jb.seed_scene()
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (("--hip-spring", "q=1"), "'q' is not known: choose one of k, b, theta_0"),
+        (("--hip-spring", "b=1"), "hip-spring needs k=value"),
+        (("--hip-spring", "k"), "write name=value"),
+        (("--hip-spring", "k=-1"), "k = -1"),
+        (("--hip-torque", "torque=much"), "'much' is none"),
+        (("--hip-torque", "torque=1,2"), "torque"),
+        (("--hip-torque", "torque=1", "reaction=hand"), "reaction = 'hand'"),
+        (("--hip-spline", "torque=1"), "two or more"),
+        (("--push-off", "impulse=1"), "needs rigid"),
+        (("--model", "rigid", "--foot-preload", "extension=0.1"), "needs compliant"),
+    ],
+)
+def test_what_is_not_allowed_costs_one_sentence(arguments, sentence, capsys):
+    assert _run("gait", *arguments) == 2
+    said = capsys.readouterr().err.strip()
+    assert sentence in said
+    assert said.count("\n") == 0
+
+
+@pytest.mark.slow
+def test_a_driven_gait_tells_its_cost(capsys):
+    level = ("--model", "rigid", "--slope", "0", "--push-off", "impulse=0.1", "--json", "-")
+    assert _run("gait", *level) == 0
+    numbers = json.loads(capsys.readouterr().out)
+    work = numbers["motor_work_J"]
+    expected = work / (2.0 * 9.8 * numbers["step_length_m"])
+    assert numbers["cost_of_transport"] == pytest.approx(expected, rel=1e-6)
+    assert numbers["elasticities"]["impulse"]["speed_m_s"] > 0.1
+    assert _run("walk", *level, "--duration", "4") == 0
+    assert json.loads(capsys.readouterr().out)["motor_work_J"] > 5.0 * work
+
+
+@pytest.mark.slow
+def test_a_driven_walk_tells_its_work(capsys):
+    arguments = ("--slope", "0", "--foot-preload", "extension=0.003", "--duration", "2")
+    assert _run("walk", *arguments, "--json", "-") == 0
+    numbers = json.loads(capsys.readouterr().out)
+    assert numbers["actuation_work_J"] > 0.1
+    assert abs(numbers["energy_residual_J"]) < 1e-5
+    assert 0.01 < numbers["cost_of_transport"] < 0.03
+    assert not numbers["warnings"]
+
+
+def test_models_lists_the_actuators(capsys):
+    assert _run("models", "--json", "-") == 0
+    listed = json.loads(capsys.readouterr().out)["actuation"]
+    assert [part["name"] for part in listed] == list(jb.actuation.ACTUATORS)
+    assert listed[0]["units"]["k"] == "N·m/rad"

@@ -1,0 +1,97 @@
+"""`jaxbiped continue` as a user meets it."""
+
+import json
+
+import pytest
+import xarray
+
+import jaxbiped as jb
+from jaxbiped.cli import main
+from tests.drawn import assert_is_drawn, saved_figures
+
+pytestmark = pytest.mark.slow
+
+
+def _run(*arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main(["continue", *arguments])
+    return stopped.value.code
+
+
+@pytest.fixture(scope="module")
+def followed(tmp_path_factory):
+    """The command run once, with every output: exit code, folder, figures."""
+    folder = tmp_path_factory.mktemp("continue")
+    with saved_figures() as figures:
+        code = _run(
+            "--model", "rigid", "--along", "slope", "--from", "0.01", "--to", "0.11",
+            "--out", str(folder / "out"), "--json", str(folder / "branch.json"),
+        )  # fmt: skip
+    return code, folder, figures
+
+
+def test_the_numbers(followed):
+    code, folder, _ = followed
+    assert code == 0
+    numbers = json.loads((folder / "branch.json").read_text())
+    for point in numbers["points"]:
+        assert set(point) == {
+            "slope", "value", "period_s", "step_length_m", "multipliers", "multiplier_errors",
+            "stable",
+        }  # fmt: skip
+        assert len(point["multipliers"]) == len(point["multiplier_errors"]) == 3
+        assert all(len(pair) == 2 for pair in point["multipliers"])
+        assert point["stable"] in (True, False, None)
+    (event,) = numbers["bifurcations"]
+    assert set(event) == {"kind", "value", "multiplier", "error"}
+    assert event["kind"] == "period-doubling"
+    assert 0.1 < event["value"] < 0.102
+    assert event["multiplier"] == pytest.approx([-1.0, 0.0], abs=1e-6)
+    assert [end["end"] for end in numbers["ends"]] == ["reached", "reached"]
+    assert numbers["points"][0]["value"] == pytest.approx(0.01, abs=1e-12)
+
+
+def test_figures_and_dataset(followed):
+    _, folder, figures = followed
+    assert set(figures) == {"branch.png", "spectral_radius.png"}
+    for figure in figures.values():
+        assert_is_drawn(figure)
+    scene = jb.RigidScene(walker=jb.seed_scene().walker, ground=jb.Ground(slope=0.02))
+    branch = jb.continuation.open_branch(xarray.open_dataset(folder / "out" / "branch.nc"), scene)
+    assert len(branch.bifurcations) == 1
+
+
+def test_what_is_printed(capsys):
+    assert _run("--model", "rigid", "--from", "0.018", "--to", "0.022") == 0
+    printed = capsys.readouterr()
+    assert "gaits" in printed.err
+    said = printed.out
+    assert "slope rad" in said
+    assert "last end at slope = 0.022: reached (the range ends)" in said
+    assert _run("--model", "rigid", "--from", "0.018", "--to", "0.022", "--json", "-") == 0
+    assert set(json.loads(capsys.readouterr().out)) >= {"points", "bifurcations"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--along", "slop"), "along = 'slop' is not known"),
+        (("--from", "0.1", "--to", "0.1"), "the range is empty"),
+        (("--along", "K", "--from", "-1", "--to", "1e6"), "K = -1 is not allowed"),
+        (("--formulation", "redundant"), "redundant coordinates"),
+        (("--footsteps", "0"), "footsteps = 0"),
+        (("--accuracy", "fast"), "accuracy = 'fast'"),
+    ],
+)
+def test_what_is_not_allowed_costs_a_sentence_and_exit_code_2(arguments, words, capsys):
+    assert _run(*arguments) == 2
+    said = capsys.readouterr()
+    assert words in said.err
+    assert said.err.count("\n") == 1
+    assert said.out == ""
+
+
+def test_no_gait_is_exit_code_1(capsys):
+    level = ("--model", "rigid", "--slope", "0", "--from", "-0.001", "--to", "0")
+    assert _run(*level) == 1
+    assert capsys.readouterr().out.startswith("no gait")

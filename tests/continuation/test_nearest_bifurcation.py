@@ -1,0 +1,34 @@
+"""The nearest bifurcation of a gait."""
+
+import pytest
+
+import jaxbiped as jb
+
+RIGID = jb.ladder()["rigid"]
+
+
+@pytest.fixture(scope="module")
+def gait():
+    return jb.find_gait(RIGID, parameters=(), radius_sensitivities=False)
+
+
+def test_it_is_that_of_the_whole_branch(gait):
+    found = jb.continuation.nearest_bifurcation(RIGID, gait)
+    branch = jb.continue_gait(RIGID, "slope", bounds=(0.01, 0.11))
+    (doubling,) = branch.bifurcations
+    assert found.kind is jb.continuation.BranchEvent.PERIOD_DOUBLING
+    assert found.value == pytest.approx(doubling.value, rel=1e-7)
+    assert found.ratio == pytest.approx(doubling.value / float(RIGID.ground.slope))
+
+
+def test_there_may_be_none(gait):
+    found = jb.continuation.nearest_bifurcation(RIGID, gait, factor=1.2)
+    assert found.kind is None
+    assert found.value != found.value
+
+
+def test_a_parameter_that_is_zero_is_refused(gait):
+    with pytest.raises(jb.ArgumentError, match="hip_mass is 0"):
+        jb.continuation.nearest_bifurcation(RIGID, gait, "hip_mass")
+    with pytest.raises(jb.ArgumentError, match="factor = 1"):
+        jb.continuation.nearest_bifurcation(RIGID, gait, factor=1)

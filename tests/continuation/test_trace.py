@@ -1,0 +1,163 @@
+"""Branches of maps whose bifurcations are known in closed form."""
+
+import numpy as np
+import pytest
+
+from jaxbiped._ending import Ending
+from jaxbiped.continuation._bifurcations import BranchEvent
+from jaxbiped.continuation._branch_point import NO_WALK, is_stable
+from jaxbiped.continuation._trace import trace
+from jaxbiped.gait._continuation import BranchEnd
+from tests.continuation.maps import (
+    begin_at,
+    curve_of,
+    delayed_logistic,
+    logistic,
+    pitchfork,
+    saddle_node,
+)
+
+USUAL = dict(largest_step=0.05, max_points=200)
+
+
+def test_a_period_doubling_is_located():
+    curve, axis = logistic((2.0, 4.0))
+    found = trace(curve, axis, begin_at(curve, axis, [0.5], 2.0), **USUAL)
+    (event,) = found.bifurcations
+    assert event.kind is BranchEvent.PERIOD_DOUBLING
+    assert event.value == pytest.approx(3.0, abs=1e-9)
+    assert event.multiplier == pytest.approx(-1.0, abs=1e-9)
+    assert found.stop.end is BranchEnd.REACHED
+    assert found.points[-1].value == pytest.approx(4.0, abs=1e-9)
+    for point in found.points:
+        assert point.recurring[0] == pytest.approx(1.0 - 1.0 / point.value, abs=1e-9)
+        assert point.multipliers[0] == pytest.approx(2.0 - point.value, abs=1e-8)
+    stable = [point.stable for point in found.points]
+    assert stable.count(None) == 1
+    assert stable == sorted(stable, key=[True, None, False].index)
+
+
+def test_a_cycle_of_two_doubles_at_one_plus_the_root_of_six():
+    curve, axis = logistic((3.2, 3.6), footsteps=2)
+    lower = (4.2 - np.sqrt(4.2 * 0.2)) / 6.4
+    found = trace(curve, axis, begin_at(curve, axis, [lower], 3.2), **USUAL)
+    (event,) = found.bifurcations
+    assert event.kind is BranchEvent.PERIOD_DOUBLING
+    assert event.value == pytest.approx(1.0 + np.sqrt(6.0), abs=1e-9)
+
+
+def test_a_fold_is_passed_and_located():
+    curve, axis = saddle_node((-0.5, 0.5))
+    begin = begin_at(curve, axis, [0.5], 0.25)
+    found = trace(curve, axis, begin._replace(tangent=-begin.tangent), **USUAL)
+    (event,) = found.bifurcations
+    assert event.kind is BranchEvent.FOLD
+    assert event.value == pytest.approx(0.0, abs=1e-12)
+    assert event.multiplier == pytest.approx(1.0, abs=1e-9)
+    assert found.points[0].stable is True
+    assert found.points[-1].stable is False
+    assert found.points[-1].recurring[0] == pytest.approx(-np.sqrt(0.5), abs=1e-9)
+
+
+def test_a_neimark_sacker_point_is_located():
+    curve, axis = delayed_logistic((1.5, 2.2))
+    found = trace(curve, axis, begin_at(curve, axis, [1.0 / 3.0] * 2, 1.5), **USUAL)
+    (event,) = found.bifurcations
+    assert event.kind is BranchEvent.NEIMARK_SACKER
+    assert event.value == pytest.approx(2.0, abs=1e-9)
+    assert abs(event.multiplier) == pytest.approx(1.0, abs=1e-9)
+    assert abs(np.angle(event.multiplier)) == pytest.approx(np.pi / 3.0, abs=1e-9)
+
+
+def test_where_branches_cross_is_no_fold():
+    curve, axis = pitchfork((-0.5, 0.5))
+    found = trace(curve, axis, begin_at(curve, axis, [0.0], -0.4), **USUAL)
+    (event,) = found.bifurcations
+    assert event.kind is BranchEvent.BRANCH_POINT
+    assert event.value == pytest.approx(0.0, abs=1e-8)
+
+
+def test_two_real_multipliers_of_product_one_are_no_bifurcation():
+    """Multipliers 2 and r: their product passes 1 at r = 1/2, where neither lies on the circle."""
+    curve, axis = curve_of(
+        lambda x, r: np.array([2.0 * x[0], r * x[1]]),
+        lambda x, r: np.array([[2.0, 0.0, 0.0], [0.0, r, x[1]]]),
+        (0.2, 0.8),
+    )
+    found = trace(curve, axis, begin_at(curve, axis, [0.0, 0.0], 0.3), **USUAL)
+    assert found.bifurcations == []
+
+
+@pytest.mark.parametrize(
+    ("code", "end", "words"),
+    [
+        (int(Ending.FELL_FORWARD), BranchEnd.WALK_ENDS, "fell forward"),
+        (int(Ending.STUMBLED), BranchEnd.WALK_ENDS, "scuffing"),
+        (int(Ending.TIMED_OUT), BranchEnd.WALK_ENDS, "no touch"),
+        (NO_WALK, BranchEnd.NO_WALK, "underground"),
+    ],
+)
+def test_a_limit_of_the_model_is_named(code, end, words):
+    curve, axis = logistic((2.0, 4.0), code=lambda x, r: code if r > 2.5 else 0)
+    found = trace(curve, axis, begin_at(curve, axis, [0.5], 2.0), **USUAL)
+    (limit,) = found.bifurcations
+    assert limit.kind is BranchEvent.LIMIT
+    assert found.stop.end is end
+    assert words in found.stop.cause
+    assert limit.value == pytest.approx(2.5, abs=1e-4)
+    assert limit.value < 2.5
+
+
+def test_a_jump_of_the_map_is_named_grazing():
+    curve, axis = curve_of(
+        lambda x, r: np.array([0.5 * x[0] + r + 10.0 * (r > 0.6)]),
+        lambda x, r: np.array([[0.5, 1.0]]),
+        (0.0, 1.0),
+    )
+    found = trace(curve, axis, begin_at(curve, axis, [0.0], 0.0), **USUAL)
+    assert found.stop.end is BranchEnd.BREAKS_OFF
+    assert "grazing" in found.stop.cause
+    assert found.stop.value == pytest.approx(0.6, abs=1e-4)
+
+
+def test_it_stops_at_the_first_of_a_kind():
+    curve, axis = logistic((2.0, 4.0))
+    begin = begin_at(curve, axis, [0.5], 2.0)
+    found = trace(curve, axis, begin, until=BranchEvent.PERIOD_DOUBLING, **USUAL)
+    assert found.points[-1].value == pytest.approx(3.0, abs=1e-9)
+    assert found.stop.end is BranchEnd.UNFINISHED
+
+
+def test_neighbouring_branches_are_not_mixed_up():
+    """Two branches close by, x = r² and x = r² + 0.02: large steps must not change over."""
+
+    def step(x, r):
+        a, b = r * r, r * r + 0.02
+        return np.array([x[0] + 4.0 * (x[0] - a) * (x[0] - b)])
+
+    def slopes(x, r):
+        a, b = r * r, r * r + 0.02
+        by_x = 1.0 + 4.0 * (2.0 * x[0] - a - b)
+        return np.array([[by_x, -4.0 * 2.0 * r * (2.0 * x[0] - a - b)]])
+
+    curve, axis = curve_of(step, slopes, (0.0, 1.0))
+    begin = begin_at(curve, axis, [0.0], 0.0)
+    found = trace(curve, axis, begin, largest_step=0.2, max_points=200)
+    assert found.stop.end is BranchEnd.REACHED
+    for point in found.points:
+        assert point.recurring[0] == pytest.approx(point.value**2, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("values", "errors", "expected"),
+    [
+        ([0.9, 0.1], [0.05, 0.0], True),
+        ([0.9, 0.1], [0.2, 0.0], None),
+        ([-1.1, 0.1], [0.05, 0.0], False),
+        ([-1.1, 0.1], [0.2, 0.0], None),
+        ([0.2, 0.99j, -0.99j], [0.0, 0.02, 0.02], None),
+        ([1.5, 1.0], [0.1, 0.1], False),
+    ],
+)
+def test_what_an_error_bar_leaves_open_is_undecided(values, errors, expected):
+    assert is_stable(np.array(values, complex), np.array(errors)) is expected

@@ -1,0 +1,130 @@
+"""Figures of branches, from branches made by hand: nothing is compiled."""
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.continuation import (
+    Axis,
+    BifurcationCurve,
+    BifurcationPoint,
+    Branch,
+    BranchEvent,
+    BranchPoint,
+    BranchStop,
+)
+from jaxbiped.plot import bifurcation_curves, branch
+from tests.drawn import assert_is_drawn, points_of
+
+STOP = BranchStop(jb.gait.BranchEnd.REACHED, "the range ends", 0.0)
+
+
+def _point(value, leading, error=1e-9, length=None):
+    return BranchPoint(
+        value=value,
+        recurring=np.array([0.1, 0.2, -1.0, value]),
+        period=0.4,
+        step_length=value if length is None else length,
+        peak_normal=20.0,
+        multipliers=np.array([leading, 0.1, 0.0], complex),
+        multiplier_errors=np.array([error, 0.0, 0.0]),
+        unit_multiplier_error=1e-9,
+        bifurcation=0,
+        residual=1e-12,
+        place=np.zeros(5),
+        tangent=np.eye(5)[-1],
+    )
+
+
+def _branch(points, events=(), footsteps=1, name="slope", log=False):
+    return Branch(
+        scene=jb.ladder()["rigid"],
+        points=tuple(points),
+        bifurcations=tuple(events),
+        stops=(STOP, STOP),
+        axis=Axis(name, 0.01, 0.1, log, 0),
+        state_type=jb.dynamics.RigidState,
+        footsteps=footsteps,
+        accuracy="balanced",
+        engine="lanes",
+    )
+
+
+POINTS = [
+    _point(0.02, 0.5),
+    _point(0.04, -0.9),
+    _point(0.05, -1.0),
+    _point(0.06, -1.1),
+    _point(0.07, -1.2),
+    _point(0.08, -1.2, error=0.5),
+    _point(0.09, -1.1, error=0.5),
+]
+DOUBLING = BifurcationPoint(BranchEvent.PERIOD_DOUBLING, POINTS[2], -1.0 + 0j, 1e-9)
+
+
+def test_stability_is_told_by_the_kind_of_line():
+    figure = branch(_branch(POINTS, [DOUBLING]))
+    assert_is_drawn(figure)
+    (ax,) = figure.axes
+    stable, unstable, undecided, mark = ax.lines
+    assert [line.get_linestyle() for line in (stable, unstable, undecided)] == ["-", "--", "--"]
+    assert unstable._dash_pattern != undecided._dash_pattern
+    lines = points_of(ax)
+    assert lines[0][:, 0].tolist() == [0.02, 0.04, 0.05]
+    assert lines[1][:, 0].tolist() == [0.05, 0.06, 0.07, 0.08]
+    assert lines[2][:, 0].tolist() == [0.08, 0.09]
+    assert mark.get_marker() == "D"
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert words == ["stable", "unstable", "undecided", "period doubling"]
+    assert ax.get_xlabel() == r"slope, $\alpha$ (rad)"
+    assert ax.get_ylabel() == "step length, $L$ (m)"
+
+
+def test_a_longer_cycle_is_drawn_by_its_footsteps():
+    ends = _point(0.05, 0.9, length=0.2), _point(0.06, -1.0, length=0.4)
+    again = BifurcationPoint(BranchEvent.PERIOD_DOUBLING, ends[1], -1.0 + 0j, 1e-9)
+    two = _branch(ends, [again], footsteps=2)
+    figure = branch([_branch(POINTS, [DOUBLING]), two])
+    assert_is_drawn(figure)
+    (ax,) = figure.axes
+    assert points_of(ax)[3][:, 1].tolist() == [0.1, 0.2]
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert {"1 footstep", "2 footsteps"} <= set(words)
+    marks = [line.get_xdata()[0] for line in ax.lines if line.get_marker() == "D"]
+    assert marks == [0.05, 0.06]
+
+
+@pytest.mark.parametrize(
+    "measure", ["period", "speed", "peak_normal", "spectral_radius", "theta_2"]
+)
+def test_every_measure_has_its_unit(measure):
+    assert_is_drawn(branch(_branch(POINTS), measure))
+
+
+def test_a_logarithmic_axis():
+    figure = branch(_branch(POINTS, name="m", log=True))
+    assert figure.axes[0].get_xscale() == "log"
+
+
+def test_curves_of_bifurcations():
+    values = np.array([[0.1, 1e5], [0.11, 1e6], [0.12, 1e7]])
+    curve = BifurcationCurve(
+        BranchEvent.FOLD, ("slope", "K"), ("rad", "N/m^1.5"), values, (), np.ones(3), np.zeros(3),
+        (STOP, STOP),
+    )  # fmt: skip
+    figure = bifurcation_curves([curve])
+    assert_is_drawn(figure)
+    (ax,) = figure.axes
+    assert ax.get_xscale() == "log"
+    assert points_of(ax, "fold")[0].tolist() == values[:, ::-1].tolist()
+    with pytest.raises(jb.ArgumentError, match="same two parameters"):
+        bifurcation_curves([curve, curve._replace(along=("slope", "c"))])
+
+
+def test_what_cannot_be_drawn():
+    with pytest.raises(jb.ArgumentError, match="must have a point"):
+        branch(_branch([]))
+    with pytest.raises(jb.ArgumentError, match="one parameter"):
+        branch([_branch(POINTS), _branch(POINTS, name="m")])
+    with pytest.raises(jb.ArgumentError, match="measure = 'hip_z' is not known"):
+        branch(_branch(POINTS), "hip_z")
