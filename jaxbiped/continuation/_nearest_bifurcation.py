@@ -23,7 +23,8 @@ class NearestBifurcation(NamedTuple):
         kind: what happens there; None where nothing does within the range that was followed.
         value: of the parameter there, SI units; NaN for none.
         ratio: of that value to the gait's own.
-        multiplier: the critical multiplier there, `error` its estimated error.
+        multiplier: the critical multiplier there.
+        error: its estimated error.
     """
 
     along: str

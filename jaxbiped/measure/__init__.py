@@ -9,3 +9,4 @@ from jaxbiped.measure._footsteps import heel_strikes as heel_strikes
 from jaxbiped.measure._operation_counts import operation_counts as operation_counts
 from jaxbiped.measure._rigid_ledger import RigidLedger as RigidLedger
 from jaxbiped.measure._rigid_ledger import rigid_ledger as rigid_ledger
+from jaxbiped.solve._trajectory import Arrivals as Arrivals

@@ -50,7 +50,6 @@ def test_the_nearest_bifurcation_is_where_searches_lose_stability(best):
     radii = [
         jb.find_gait(
             jb.with_parameters(best.scene, {"slope": nearest.value * share}),
-            best.gait.measures.state,
             parameters=(),
             radius_sensitivities=False,
         ).measures.spectral_radius
