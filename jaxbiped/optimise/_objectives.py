@@ -26,6 +26,14 @@ def _of_any(scene: Scene | RigidScene) -> str | None:
     return None
 
 
+def _of_passive(scene: Scene | RigidScene) -> str | None:
+    return None if scene.actuation is None else "its actuators' work is not counted"
+
+
+def _of_impacts(scene: Scene | RigidScene) -> str | None:
+    return None if isinstance(scene, Scene) else _of_passive(scene)
+
+
 def _of_slip(scene: Scene | RigidScene) -> str | None:
     return None if isinstance(scene, Scene) else "a rigid walker's feet roll without slip"
 
@@ -64,16 +72,18 @@ OBJECTIVES = {
     "spectral_radius": Objective(Quantity("spectral radius", "$\\rho$")),
     "radius_bound": Objective(Quantity("smooth bound of the spectral radius", "$\\rho_q$")),
     "sensitivity_norm": Objective(Quantity("gait sensitivity norm", "$\\|G\\|$")),
-    "cost_of_transport": Objective(Quantity("cost of transport", "$C$")),
-    "impact_loss": Objective(Quantity("energy lost in impacts", "$E_i$", "J")),
+    "cost_of_transport": Objective(Quantity("cost of transport", "$C$"), _of_passive),
+    "impact_loss": Objective(Quantity("energy lost in impacts", "$E_i$", "J"), _of_impacts),
     "friction_loss": Objective(Quantity("energy lost to friction", "$E_f$", "J"), _of_friction),
     "slip_distance": Objective(Quantity("slip distance", "$s$", "m"), _of_slip),
     "foot_clearance": Objective(Quantity("foot clearance", "$h$", "m"), _of_swing),
 }
 """By name. Those of a cycle: losses and slip are sums over its footsteps.
 
-- cost of transport: energy lost over weight times step length; a passive gait's is sin(slope).
-- impact loss: work of the normal reactions; a rigid walker's kinetic energy lost in its impacts.
+- cost of transport: energy lost over weight times step length, which is sin(slope); of passive
+  walkers.
+- impact loss: work of the normal reactions; a rigid walker's kinetic energy lost in its impacts,
+  which it must not push off from.
 - slip distance: path of the feet that touch, along the ground.
 - foot clearance: least height of the swinging foot, negative where it passes underground.
 - radius bound: never below the spectral radius, and smooth also where multipliers meet or have

@@ -171,5 +171,11 @@ def test_an_objective_that_a_scene_lacks_is_refused_in_a_sentence():
     scuffs = dataclasses.replace(scene, clearance=jb.laws.AlwaysTouching())
     with pytest.raises(jb.ArgumentError, match=r"foot_clearance.*AlwaysTouching"):
         check_objective("foot_clearance", scuffs)
+    pushed = dataclasses.replace(rigid, actuation=jb.actuation.PushOff(0.1))
+    driven = dataclasses.replace(scene, actuation=jb.actuation.HipTorque(0.1))
+    for name, each in (("cost_of_transport", driven), ("impact_loss", pushed)):
+        with pytest.raises(jb.ArgumentError, match=rf"{name}.*actuators' work"):
+            check_objective(name, each)
+    check_objective("impact_loss", driven)
     with pytest.raises(jb.ArgumentError, match="objective = 'beauty'"):
         check_objective("beauty", scene)
