@@ -26,8 +26,8 @@ def _refused(arguments, capsys):
         (["walk", "--hip-z", "abc"], ("--hip-z", "'abc'", "FLOAT")),
         (["basin", "--samples", "1.5"], ("--samples", "'1.5'", "INT")),
         (["walk", "--out"], ("--out", "missing value")),
-        (["wlak"], ("wlak", "walk, gait, basin")),
-        ([], ("walk, gait, basin",)),
+        (["wlak"], ("wlak", "walk, gait, continue, optimise, fit, basin")),
+        ([], ("walk, gait, continue, optimise, fit, basin",)),
     ],
 )
 def test_what_the_parser_refuses(arguments, words, capsys):
