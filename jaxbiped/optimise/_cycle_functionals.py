@@ -23,7 +23,8 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.linalg._small_matrices import solve
-from jaxbiped.optimise._cycle_integrals import MotionSection, integrals_of, with_integrals
+from jaxbiped.optimise._augmented_state import MotionSection
+from jaxbiped.optimise._cycle_integrals import integrals_of, with_integrals
 from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene

@@ -5,46 +5,23 @@ it is a column of the return map's Jacobian, and the response's derivatives a se
 """
 
 import dataclasses
-from collections import namedtuple
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
-from jaxbiped.dynamics._bristle_state import BristleState
-from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
-from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._switches import Switch
+from jaxbiped.optimise._augmented_state import augment, joined, motion_of
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.variational._hybrid_system import AbstractSystem, system_of
 
 
-def _disturbed(kind: Any) -> Any:
-    place, *recurring = kind._fields
-    return namedtuple("_Disturbed", (place, "clock", "push", *recurring))
-
-
-_KINDS: dict[type, Any] = {kind: _disturbed(kind) for kind in (State, BristleState, RigidState)}
-_OWN = {kind: own for own, kind in _KINDS.items()}
-
-
 def undisturbed(state: WalkerState) -> PyTree:
     """A walker's state without a push, its clock at zero."""
-    zero = jnp.zeros_like(state.hip_x)
-    return _KINDS[type(state)](**state._asdict(), clock=zero, push=zero)
-
-
-def motion_of(y: PyTree) -> Any:
-    """The walker's own state."""
-    own: Any = _OWN[type(y)]
-    return own(*(getattr(y, name) for name in own._fields))
-
-
-def _joined(like: PyTree, motion: PyTree, clock: Scalar, push: Scalar) -> PyTree:
-    return type(like)(**motion._asdict(), clock=clock, push=push)
+    return augment(state, ("clock", "push"))
 
 
 class DisturbedCycle(AbstractSystem):
@@ -62,7 +39,7 @@ class DisturbedCycle(AbstractSystem):
         pushed = eqx.tree_at(lambda scene: scene.ground, args, leaning)
         rates = self.walker.vector_field(t, motion_of(y), pushed)
         zero = jnp.zeros_like(y.push)
-        return _joined(y, rates, zero + 1.0, zero)
+        return joined(y, rates, {"clock": zero + 1.0, "push": zero})
 
     def switches(self, args: AbstractScene, y: PyTree) -> tuple[Switch, ...]:
         return self.walker.switches(args, motion_of(y))
@@ -72,7 +49,7 @@ class DisturbedCycle(AbstractSystem):
 
     def reset_map(self, args: AbstractScene, y: PyTree) -> PyTree:
         after = self.walker.reset_map(args, motion_of(y))
-        return _joined(y, after, y.clock, jnp.zeros_like(y.push))
+        return joined(y, after, {"clock": y.clock, "push": jnp.zeros_like(y.push)})
 
     def load(self, args: AbstractScene, y: PyTree) -> None:
         return None
@@ -81,19 +58,3 @@ class DisturbedCycle(AbstractSystem):
 def disturbed(scene: AbstractScene) -> DisturbedCycle:
     """The walker of a scene, which can be pushed."""
     return DisturbedCycle(system_of(scene))
-
-
-class UndisturbedSection(AbstractSection):
-    """The walker's own section, of a state with clock and push.
-
-    Attributes:
-        section: of the walker.
-    """
-
-    section: AbstractSection
-
-    def value(self, args: PyTree, y: PyTree) -> Scalar:
-        return self.section.value(args, motion_of(y))
-
-    def counts(self, args: PyTree, y: PyTree) -> Scalar:
-        return self.section.counts(args, motion_of(y))

@@ -24,13 +24,14 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.linalg._small_matrices import eigenpairs, invert, singular_pairs
+from jaxbiped.optimise._augmented_state import MotionSection
 from jaxbiped.optimise._cycle_functionals import (
     Functionals,
     corrected,
     cycle_spec,
     with_errors,
 )
-from jaxbiped.optimise._disturbed_cycle import UndisturbedSection, disturbed, undisturbed
+from jaxbiped.optimise._disturbed_cycle import disturbed, undisturbed
 from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -87,7 +88,7 @@ def jacobian_functionals(
     Returns:
         Those, with respect to all parameters in the order of `parameter_names`.
     """
-    section = UndisturbedSection(section_of(scene, None))
+    section = MotionSection(section_of(scene, None))
     spec = cycle_spec(scene, disturbed(scene), section, footsteps, accuracy, engine)
     return _functionals(spec, scene, state, names, accuracy)
 
