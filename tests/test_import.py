@@ -5,7 +5,16 @@ import sys
 
 import pytest
 
-_LATER = ("dask", "matplotlib", "pandas", "scipy.ndimage", "scipy.stats", "xarray", "zarr")
+_LATER = (
+    "dask",
+    "matplotlib",
+    "pandas",
+    "scipy.ndimage",
+    "scipy.optimize",
+    "scipy.stats",
+    "xarray",
+    "zarr",
+)
 _LOADED = "import sys; print(*sys.modules)"
 
 

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import lsq_linear
+import scipy  # its submodules are imported where they are first used
 
 from jaxbiped.optimise._design_problem import Design, DesignProblem, scale_of
 from jaxbiped.optimise._optimisers import Row, rows_of
@@ -80,7 +80,7 @@ def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
     if normals:
         matrix = np.stack([each.gradient for each in normals], axis=1)
         limits = np.asarray([each.least for each in normals])
-        multipliers = lsq_linear(matrix, gradient, bounds=(limits, np.inf)).x
+        multipliers = scipy.optimize.lsq_linear(matrix, gradient, bounds=(limits, np.inf)).x
         left = gradient - matrix @ multipliers
         spreads = np.stack([each.error for each in normals], axis=1) @ np.abs(multipliers)
         gradient_error = gradient_error + spreads

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
-from scipy.optimize import Bounds, NonlinearConstraint, minimize
+import scipy  # its submodules are imported where they are first used
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.optimise._design_problem import DesignProblem, scale_of
@@ -120,12 +120,12 @@ def run_slsqp(functions: Functions, u: np.ndarray, iterations: int, told: Callba
         for kind, rows in kinds.items()
         if rows
     ]
-    found = minimize(
+    found = scipy.optimize.minimize(
         functions.objective,
         u,
         jac=True,
         method="SLSQP",
-        bounds=Bounds(0.0, 1.0),
+        bounds=scipy.optimize.Bounds(0.0, 1.0),
         constraints=constraints,
         callback=told,
         options={"maxiter": iterations, "ftol": 1e-8},
@@ -140,7 +140,7 @@ def run_trust_constr(functions: Functions, u: np.ndarray, iterations: int, told:
         rows = functions.rows
         upper = np.asarray([0.0 if row.equality else np.inf for row in rows])
         constraints.append(
-            NonlinearConstraint(
+            scipy.optimize.NonlinearConstraint(
                 lambda x: functions.spare(x, rows),
                 0.0,
                 upper,
@@ -148,12 +148,12 @@ def run_trust_constr(functions: Functions, u: np.ndarray, iterations: int, told:
             )
         )
     try:
-        found = minimize(
+        found = scipy.optimize.minimize(
             functions.objective,
             np.clip(u, _EDGE, 1.0 - _EDGE),
             jac=True,
             method="trust-constr",
-            bounds=Bounds(0.0, 1.0, keep_feasible=True),
+            bounds=scipy.optimize.Bounds(0.0, 1.0, keep_feasible=True),
             constraints=constraints,
             callback=lambda x, _: told(x),
             options={"maxiter": iterations, "gtol": 1e-6, "xtol": 1e-7},

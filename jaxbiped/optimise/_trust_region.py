@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import Bounds, lsq_linear, minimize
+import scipy  # its submodules are imported where they are first used
 
 from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._objectives import CLUSTER, Evaluation
@@ -200,7 +200,7 @@ def _step(
     bent = np.zeros((size, size))
     bent[:k, :k] = curvature * reach * reach
     lower, upper = np.maximum(-here.u / reach, -1.0), np.minimum((1.0 - here.u) / reach, 1.0)
-    bounds = Bounds(
+    bounds = scipy.optimize.Bounds(
         np.concatenate([lower, np.zeros(r), np.full(int(has_radius), -np.inf)]),
         np.concatenate([upper, np.full(r + int(has_radius), np.inf)]),
     )
@@ -213,7 +213,7 @@ def _step(
         constraints.append(
             {"type": "ineq", "fun": lambda x: rows @ x + values, "jac": lambda x: rows}
         )
-    found = minimize(
+    found = scipy.optimize.minimize(
         lambda x: (slopes @ x + 0.5 * x @ bent @ x, slopes + bent @ x),
         begin,
         jac=True,
@@ -258,5 +258,7 @@ def _multipliers(of: _Local) -> np.ndarray:
     if active.any():
         normals = np.concatenate([of.spare_gradients, -of.radii_gradients])[active]
         least = np.where(np.append(of.equal, np.zeros(len(of.radii), dtype=bool)), -np.inf, 0.0)
-        found[active] = lsq_linear(normals.T, of.gradient, bounds=(least[active], np.inf)).x
+        found[active] = scipy.optimize.lsq_linear(
+            normals.T, of.gradient, bounds=(least[active], np.inf)
+        ).x
     return found
