@@ -113,6 +113,8 @@ COMPILING = {
     "jb.energy_ledger",
     "jb.find_gait",
     "jb.rigid_walk",
+    "jb.fit_gait",
+    "jb.optimise_gait",
 }
 """Functions whose examples compile a walk or a gait."""
 EXAMPLES = list(_examples())

@@ -9,6 +9,8 @@ import jaxbiped as jb
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same, simplest_grid
 
+pytestmark = pytest.mark.slow
+
 THREADS = 4
 
 
@@ -79,7 +81,7 @@ def test_threads_while_another_one_clears(expected):
     over, cleared, results = threading.Event(), [], []
 
     def clear():
-        while not over.wait(0.2 if cleared else 0.0):
+        while not over.wait(1.0 if cleared else 0.0):
             jb.clear_caches()
             cleared.append(True)
 

@@ -7,6 +7,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.cli import main
 
+pytestmark = pytest.mark.slow
+
 
 def _run(*words):
     with pytest.raises(SystemExit) as ended:

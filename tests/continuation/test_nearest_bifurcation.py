@@ -4,6 +4,8 @@ import pytest
 
 import jaxbiped as jb
 
+pytestmark = pytest.mark.slow
+
 RIGID = jb.ladder()["rigid"]
 
 

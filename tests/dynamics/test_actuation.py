@@ -100,6 +100,7 @@ def test_rolling_is_that_of_lagranges_equations():
         np.testing.assert_allclose([found.alpha_1, found.alpha_2], expected, rtol=1e-11)
 
 
+@pytest.mark.slow
 def test_a_driven_walk_is_scipys():
     """Over a heel strike, by an implicit method on the second writing."""
     scene = dataclasses.replace(jb.seed_scene(), actuation=(*AT_HIP, PRELOAD))
@@ -201,6 +202,7 @@ def test_at_strength_zero_compliant_walks_are_the_passive_ones():
     np.testing.assert_allclose(np.array(ends[0]), np.array(ends[1]), rtol=1e-6, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_both_engines_roll_alike():
     start = jb.dynamics.rigid_state(jb.seed_state())
     one, other = (

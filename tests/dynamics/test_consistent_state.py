@@ -81,7 +81,7 @@ def test_only_projecting_methods_project():
 
 
 # Not compiled: XLA takes minutes over derivatives of an unrolled elimination standing alone.
-@pytest.mark.parametrize("orientation", ["angle", "euler"])
+@pytest.mark.parametrize("orientation", ["angle", pytest.param("euler", marks=pytest.mark.slow)])
 def test_derivatives_pass_through_every_projection_exactly(orientation):
     """On the constraints, what a projection lets through obeys them, and passes unchanged."""
     for name in ("index1", "index1aug", "described"):

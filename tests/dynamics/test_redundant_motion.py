@@ -21,7 +21,7 @@ def scattered(count=COUNT):
 
 
 @pytest.mark.parametrize("hip_mass", [0.0, 0.7])
-@pytest.mark.parametrize("orientation", ["angle", "euler"])
+@pytest.mark.parametrize("orientation", ["angle", pytest.param("euler", marks=pytest.mark.slow)])
 def test_accelerations_and_hip_force_are_the_minimal_ones(orientation, hip_mass):
     scene, states = jb.seed_scene(hip_mass=hip_mass), scattered()
     scenes = [

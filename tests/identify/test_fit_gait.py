@@ -7,6 +7,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.identify import FitEnding, MeasuredAngles, MeasuredGait
 
+pytestmark = pytest.mark.slow
+
 SLOPES = (0.01, 0.03)
 
 

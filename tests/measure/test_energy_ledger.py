@@ -27,6 +27,7 @@ def test_the_residual_follows_the_tolerance():
     assert residuals[0] > 1e3 * residuals[-1]
 
 
+@pytest.mark.slow
 def test_parts_are_those_of_an_independent_solve(seed_walk):
     """Not only their sum: what goes into one part could be missing in another."""
     ledger = jb.energy_ledger(*seed_walk)

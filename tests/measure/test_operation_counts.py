@@ -81,6 +81,7 @@ def test_operations_fall_as_scenes_use_less():
     assert total(SEED) < total(scene(friction=BRISTLES))
 
 
+@pytest.mark.slow
 def test_a_foot_that_never_touches_falls_through_the_ground():
     only_leg_1 = scene(clearance=jb.laws.OneFoot(leg=1))
     forces = jb.dynamics.foot_forces(only_leg_1, jb.seed_state())

@@ -61,6 +61,7 @@ def test_a_walker_at_rest_waits_in_vain(engine):
     assert [float(leaf) for leaf in walk.final] == [0.0] * 5
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=8)
 @given(st.lists(st.floats(-0.3, 0.3, allow_subnormal=False), min_size=4, max_size=4))
 def test_engines_agree(moves):

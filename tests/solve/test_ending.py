@@ -45,7 +45,7 @@ def test_out_of_steps():
     )
 
 
-@pytest.mark.parametrize("engine", ["lanes", "xla"])
+@pytest.mark.parametrize("engine", ["lanes", pytest.param("xla", marks=pytest.mark.slow)])
 def test_waiting_in_vain_is_not_the_cap_on_steps(engine):
     """Let down on both feet, legs astride, nothing ever comes down again."""
     seed = jb.seed_scene(slope=0.0)

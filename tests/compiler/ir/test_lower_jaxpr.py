@@ -113,7 +113,9 @@ def test_what_is_emitted_computes_what_jax_does(name):
     function = CASES[name]
     # An exact zero times infinity is zero in lanes.
     points = POINTS[np.isfinite(POINTS)] if name in ("whole numbers", "arrays") else POINTS
-    expected = jax.vmap(function)(jnp.asarray(points))
+    # XLA compiles a long body for many seconds; operation by operation it computes the same.
+    with jax.disable_jit(name == "long body"):
+        expected = jax.vmap(function)(jnp.asarray(points))
     found = evaluate(function, points)
     assert found.dtype == expected.dtype
     np.testing.assert_allclose(found, expected, rtol=1e-14, atol=1e-14)

@@ -63,6 +63,7 @@ def test_only_arrays_are_pulled_back(monkeypatch):
     assert len(pulled) == 1
 
 
+@pytest.mark.slow
 def test_the_walker_in_fewer_operations_than_by_reverse_mode():
     """The kept rates in state and parameters: of their derivatives those of a step are made."""
     leaves, structure = jax.tree.flatten(jb.seed_scene())
