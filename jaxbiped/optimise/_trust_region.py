@@ -197,8 +197,8 @@ def _step(
         for value, gradient in zip(each.radii, each.radii_gradients, strict=True):
             add(gradient, value + gradient @ back, k + r, -1.0)
     slopes = np.concatenate([here.gradient * reach, np.full(r, penalty), np.ones(int(has_radius))])
-    bent = np.zeros((size, size))
-    bent[:k, :k] = curvature * reach * reach
+    quadratic = np.zeros((size, size))
+    quadratic[:k, :k] = curvature * reach * reach
     lower, upper = np.maximum(-here.u / reach, -1.0), np.minimum((1.0 - here.u) / reach, 1.0)
     bounds = scipy.optimize.Bounds(
         np.concatenate([lower, np.zeros(r), np.full(int(has_radius), -np.inf)]),
@@ -214,7 +214,7 @@ def _step(
             {"type": "ineq", "fun": lambda x: rows @ x + values, "jac": lambda x: rows}
         )
     found = scipy.optimize.minimize(
-        lambda x: (slopes @ x + 0.5 * x @ bent @ x, slopes + bent @ x),
+        lambda x: (slopes @ x + 0.5 * x @ quadratic @ x, slopes + quadratic @ x),
         begin,
         jac=True,
         method="SLSQP",
@@ -237,14 +237,14 @@ def _updated(curvature: np.ndarray, here: _Local, there: _Local) -> np.ndarray:
         normals = np.concatenate([of.spare_gradients, -of.radii_gradients])
         return of.gradient - multipliers @ normals
 
-    change, bent = gradient(there) - gradient(here), curvature @ step
-    own = float(step @ bent)
+    change, image = gradient(there) - gradient(here), curvature @ step
+    own = float(step @ image)
     if own <= 1e-16:
         return curvature
     if step @ change < 0.2 * own:
         mixed = 0.8 * own / (own - float(step @ change))
-        change = mixed * change + (1.0 - mixed) * bent
-    updated = curvature - np.outer(bent, bent) / own
+        change = mixed * change + (1.0 - mixed) * image
+    updated = curvature - np.outer(image, image) / own
     updated += np.outer(change, change) / float(step @ change)
     # Across a corner derivatives jump, which tells of no curvature.
     return updated if np.linalg.norm(updated) < _STEEPEST else np.eye(len(step))
