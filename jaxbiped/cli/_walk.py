@@ -27,7 +27,7 @@ from jaxbiped.measure._footsteps import Footsteps, footsteps
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.simulate._simulate import Simulation
+from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._trajectory import Trajectory
 
 if TYPE_CHECKING:
