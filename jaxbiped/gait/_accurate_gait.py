@@ -26,6 +26,8 @@ from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
 
 _FIRST = 1e-2
 """First tolerance as a share of the relative error wanted, at most the draft's."""
+_FINEST = 1e-9
+"""Finest tolerance of gaits, that of "tight": Newton's method comes to no finer residual."""
 _COLUMNS = 10.0
 """Tolerance of the columns over that of the state, as in the named accuracies."""
 _NUMBERS = ("period", "step_length", "speed", "peak_normal")
@@ -62,7 +64,8 @@ def accurate_gait(
 
     def attempt(tolerance: float) -> tuple[Gait, Judged]:
         nonlocal near
-        precision = Precision(tolerance, _COLUMNS * tolerance)
+        # Arrays: inputs of the compiled programs, which no round compiles anew.
+        precision = Precision(jnp.asarray(tolerance), jnp.asarray(_COLUMNS * tolerance))
         gait = find(near, accuracy=precision, solver=solver)
         if gait.outcome is not Search.FOUND:
             return gait, ({}, np.inf, f"the search ended as {gait.outcome}")
@@ -70,9 +73,9 @@ def accurate_gait(
         witness = find(near, accuracy=precision, solver=other)
         return gait, judge_gait(scene, gait, witness, radius)
 
-    first = min(max(_FIRST * wanted, 1e-10), 1e-5)
+    first = min(max(_FIRST * wanted, _FINEST), 1e-5)
     dtype = np.dtype(jnp.result_type(*jtu.tree_leaves(scene)))
-    gait, error = refine(attempt, wanted, first=first, dtype=dtype)
+    gait, error = refine(attempt, wanted, first=first, dtype=dtype, finest=_FINEST)
     return eqx.tree_at(lambda each: each.error, gait, error, is_leaf=lambda leaf: leaf is None)
 
 

@@ -21,8 +21,6 @@ _GAIN = 0.7
 _ROUNDS = 6
 _ROUNDINGS = 32.0
 """Finest relative tolerance, in roundings of the precision."""
-_FINEST = 1e-12
-"""Finest relative tolerance of 64 bits: below it the coefficients' own rounding shows."""
 
 
 class ErrorEstimate(eqx.Module):
@@ -75,6 +73,7 @@ def refine(
     *,
     first: float,
     dtype: np.dtype,
+    finest: float = 1e-12,
 ) -> tuple[Result, ErrorEstimate]:
     """Tightens the tolerance until the estimated error is what is wanted, or nothing is gained.
 
@@ -83,12 +82,13 @@ def refine(
         wanted: relative error [–].
         first: relative tolerance to begin with.
         dtype: precision of the solve.
+        finest: finest relative tolerance of 64 bits.
 
     Returns:
         The result of the least error, and its estimate; where that is too large a
         `RuntimeWarning` is issued.
     """
-    floor = max(_FINEST, _ROUNDINGS * float(np.finfo(dtype).eps))
+    floor = max(finest, _ROUNDINGS * float(np.finfo(dtype).eps))
     tolerance, best, reason = max(first, floor), None, ""
     for rounds in range(1, _ROUNDS + 1):
         result, (bars, relative, hopeless) = attempt(tolerance)
@@ -97,7 +97,7 @@ def refine(
             best = (result, bars, relative, tolerance)
         stalled = np.isfinite(before) and relative > _GAIN * before
         if relative <= wanted or hopeless or stalled or tolerance <= floor:
-            reason = hopeless or f"the floor of {dtype} at this scene: finer steps gain nothing"
+            reason = hopeless or f"the floor of {dtype} here: finer steps gain nothing"
             break
         reason = f"{_ROUNDS} tolerances were tried"
         known = np.isfinite(relative)
