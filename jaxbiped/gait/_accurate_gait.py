@@ -71,7 +71,7 @@ def accurate_gait(
             return gait, ({}, np.inf, f"the search ended as {gait.outcome}")
         near = gait.measures.state
         witness = find(near, accuracy=precision, solver=other)
-        return gait, judge_gait(scene, gait, witness, radius)
+        return gait, judge_gait(scene.minimal, gait, witness, radius)
 
     first = min(max(_FIRST * wanted, _FINEST), 1e-5)
     dtype = np.dtype(jnp.result_type(*jtu.tree_leaves(scene)))
@@ -88,9 +88,7 @@ def judge_gait(scene: AbstractScene, gait: Gait, other: Gait, radius: bool) -> J
     if other.outcome is not Search.FOUND:
         return {}, np.inf, f"another method's search ended as {other.outcome}"
     bars = {
-        "measures": jtu.tree_map(
-            _larger, gait.measure_errors, gait.measures, other.measures
-        ),
+        "measures": jtu.tree_map(_larger, gait.measure_errors, gait.measures, other.measures),
         "multipliers": _larger(gait.multiplier_errors, gait.multipliers, other.multipliers),
         "sensitivities": jtu.tree_map(
             _larger, gait.sensitivity_errors, gait.sensitivities, other.sensitivities
@@ -119,7 +117,9 @@ def _elasticity_shares(
     names = [*_NUMBERS, "spectral_radius"] if radius else list(_NUMBERS)
     shares, lacking = [], []
     for name in names:
-        slopes, errors = (np.asarray(getattr(each, name)) * sizes for each in (gait.sensitivities, bars))
+        slopes, errors = (
+            np.asarray(getattr(each, name)) * sizes for each in (gait.sensitivities, bars)
+        )
         if not np.all(np.isfinite(slopes)):
             lacking.append(name)
         shares.append(_ratio(errors.max(), np.abs(slopes).max()))

@@ -41,7 +41,7 @@ from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, Precision, precision_of
+from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
 from jaxbiped.solve._error_estimate import check_wanted
 from jaxbiped.variational._hybrid_system import section_of
 
@@ -132,7 +132,7 @@ def find_gait(
             find, scene, float(accuracy), guess=guess, solver=solver, radius=radius_sensitivities
         )
     if isinstance(accuracy, str):
-        check_choice("accuracy", accuracy, GAIT_ACCURACIES)
+        check_accuracy_name(accuracy)
     check_choice("method", method, ("newton", "optax"))
     check_count("footsteps", footsteps)
     check_unbatched("scene", scene)

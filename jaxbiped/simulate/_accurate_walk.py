@@ -11,10 +11,10 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._checks import ArgumentError
+from jaxbiped._ending import Ending
 from jaxbiped.simulate._simulation import Simulation
-from jaxbiped.solve._accuracy import ACCURACIES
-from jaxbiped.solve._ending import Ending
+from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name
 from jaxbiped.solve._error_estimate import LOOSER, Judged, check_wanted, refine
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
@@ -22,8 +22,8 @@ from jaxbiped.solve._units import relative_to_scene
 from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
 
 _FIRST = 1e-2
-"""First tolerance as a share of the relative error wanted: errors of walks are about 10 to 100
-tolerances (measured on the seed's walk of two seconds, 1e-5 to 1e-10), and bars a few times that."""
+"""First tolerance as a share of the relative error wanted: errors of walks are about 6 to 80
+tolerances (the seed's walk of two seconds, 1e-5 to 1e-10), and bars a few times that."""
 
 _FINEST_FIRST = 1e-10
 """Finest tolerance to begin with."""
@@ -37,9 +37,9 @@ def check_accurate_walk(accuracy: str | float, **replaced: object) -> float | No
             a number leaves no room for.
     """
     if isinstance(accuracy, str):
-        check_choice("accuracy", accuracy, ACCURACIES)
+        check_accuracy_name(accuracy)
         return None
-    if isinstance(accuracy, jax.core.Tracer):
+    if isinstance(accuracy, jax.core.Tracer):  # type: ignore[unreachable]
         raise ArgumentError("accuracy is traced: a number must be known beforehand.")
     check_wanted(accuracy, **replaced)
     return float(accuracy)
@@ -76,7 +76,7 @@ def accurate_walk(run: Simulation, wanted: float) -> Trajectory:
             solved(LOOSER * tolerance),
             solved(other_looser * tolerance, solver=other),
         )
-        return walk, judge_walk(run.scene, walk, witnesses)
+        return walk, judge_walk(run.scene.minimal, walk, witnesses)
 
     # What cannot be met is told with the error that can: not at once by the finest steps.
     first = min(max(_FIRST * wanted, _FINEST_FIRST), float(run.rtol) * 10.0)
@@ -103,9 +103,7 @@ def judge_walk(scene: PyTree, walk: Trajectory, witnesses: tuple[Trajectory, ...
 
 
 def _outputs(walk: Trajectory) -> dict[str, Any]:
-    found = {
-        name: getattr(walk, name) for name in ("t", "state", "arrivals", "lowest", "highest")
-    }
+    found = {name: getattr(walk, name) for name in ("t", "state", "arrivals", "lowest", "highest")}
     return jtu.tree_map(np.asarray, {k: v for k, v in found.items() if v is not None})
 
 
@@ -126,9 +124,7 @@ def _on_times_of(walk: Trajectory, other: Trajectory) -> dict[str, Any]:
 
 def _largest_change(told: np.ndarray, *others: np.ndarray) -> np.ndarray:
     # What no arrival filled is infinite in all of them.
-    return np.max(
-        [np.where(told == other, 0.0, np.abs(told - other)) for other in others], axis=0
-    )
+    return np.max([np.where(told == other, 0.0, np.abs(told - other)) for other in others], axis=0)
 
 
 def _shapes(tree: PyTree) -> list[tuple[int, ...]]:

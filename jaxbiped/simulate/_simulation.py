@@ -1,7 +1,7 @@
 """Checked request to simulate, which can be compiled and run at other tolerances."""
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 import diffrax
 import equinox as eqx

@@ -148,3 +148,25 @@ def check_precision(scene: CompliantScene, dtype: np.dtype) -> None:
             f"dtype = {np.dtype(dtype).name} is too coarse for this contact: rounding a position "
             f"changes the reaction by {worst:.3g} times the walker's weight; use float64."
         )
+
+
+def accuracy_told(text: str) -> str | float:
+    """An accuracy as a command was told it: a number where it is one, else a name.
+
+    Raises:
+        ArgumentError: neither.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        check_accuracy_name(text)
+        return text
+
+
+def check_accuracy_name(accuracy: object) -> None:
+    """Raises `ArgumentError` unless `accuracy` is a name of `ACCURACIES`."""
+    if accuracy not in ACCURACIES:
+        raise ArgumentError(
+            f"accuracy = {accuracy!r} is not known: choose one of {', '.join(ACCURACIES)}, or a "
+            "relative error above 0."
+        )

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_positive
+from jaxbiped._types import JsonObject
 
 LOOSER = 10.0
 """How many times looser a tolerance the first witness of an error takes."""
@@ -90,7 +91,9 @@ def refine(
     """
     floor = max(finest, _ROUNDINGS * float(np.finfo(dtype).eps))
     tolerance, best, reason = max(first, floor), None, ""
-    for rounds in range(1, _ROUNDS + 1):
+    rounds = 0
+    while rounds < _ROUNDS:
+        rounds += 1
         result, (bars, relative, hopeless) = attempt(tolerance)
         before = np.inf if best is None else best[2]
         if best is None or relative < before:
@@ -119,4 +122,26 @@ def shortfall(error: ErrorEstimate) -> str:
     return (
         f"accuracy = {error.wanted:g} is not met: the estimated relative error is "
         f"{error.relative:.2g} ({error.reason})."
+    )
+
+
+def error_numbers(error: ErrorEstimate) -> JsonObject:
+    """What is known of an error but its bars, ready for JSON."""
+    return {
+        "relative": error.relative if np.isfinite(error.relative) else None,
+        "wanted": error.wanted,
+        "rtol": error.rtol,
+        "rounds": error.rounds,
+        "met": error.met,
+        "reason": error.reason,
+    }
+
+
+def error_sentence(error: ErrorEstimate) -> str:
+    """One sentence on the estimated error, for people."""
+    if not error.met:
+        return f"WARNING: {shortfall(error)}"
+    return (
+        f"estimated relative error {error.relative:.1e}, of {error.wanted:g} allowed "
+        f"(tolerance {error.rtol:.1e}, {error.rounds} rounds)"
     )
