@@ -21,7 +21,8 @@ QUICK_WALKS, QUICK_GAITS = 6, 1
 DURATION = 1.0
 PARAMETERS = ("K", "c", "xi")
 FINEST = 1e-11
-SEED = 23
+SEED = 24
+"""Not that of the draw (23) after which the bars' safety factor was chosen."""
 MEASURES = ("period", "step_length", "speed", "peak_normal")
 
 
@@ -34,15 +35,24 @@ def main() -> None:
     for found in (*walks, *gaits):
         for name, points in found["pairs"].items():
             pairs.setdefault(name, []).extend(points)
+    coverage = {name: _coverage(np.array(points)) for name, points in pairs.items()}
+    for name, row in coverage.items():
+        scenes = [
+            np.array(each["pairs"][name]) for each in (*walks, *gaits) if name in each["pairs"]
+        ]
+        rows = [_coverage(points) for points in scenes]
+        row["scenes"] = len(rows)
+        row["scenes_all_covered"] = sum(each["covered"] == each["resolved"] for each in rows)
     numbers = {
         "walks": _counts(walks),
         "gaits": _counts(gaits),
-        "coverage": {name: _coverage(np.array(points)) for name, points in pairs.items()},
+        "coverage": coverage,
         "picture": str(_draw(options, pairs)),
     }
     for name, row in numbers["coverage"].items():
         options.say(
-            f"{name}: {row['covered']} of {row['resolved']} within their bars, "
+            f"{name}: all of them in {row['scenes_all_covered']} of {row['scenes']} scenes, "
+            f"{row['covered']} of {row['resolved']} within their bars, "
             f"bars {row['median_ratio'] or float('nan'):.3g} times the error in the median"
         )
     options.finish(numbers)
