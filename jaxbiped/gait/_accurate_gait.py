@@ -31,8 +31,8 @@ _FINEST = 1e-9
 _COLUMNS = 10.0
 """Tolerance of the columns over that of the state, as in the named accuracies."""
 _SAFETY = 2.0
-"""Error bars over the larger change of both witnesses. Without it a derivative of the spectral radius
-lay beyond its bar by an eighth (the seed's gait at an accuracy of 1e-2)."""
+"""Error bars over the larger change of both witnesses. Without it a derivative of the spectral
+radius lay beyond its bar by an eighth (the seed's gait at an accuracy of 1e-2)."""
 _NUMBERS = ("period", "step_length", "speed", "peak_normal")
 
 
