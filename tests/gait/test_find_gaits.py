@@ -36,4 +36,4 @@ def test_starts_of_another_shape_are_refused(shape):
 
 def test_bad_arguments():
     with pytest.raises(jb.ArgumentError, match="accuracy"):
-        jb.find_gaits(jb.seed_scene(), jb.gait.rolling_starts(jb.seed_scene(), 2), accuracy="draft")
+        jb.find_gaits(jb.seed_scene(), jb.gait.rolling_starts(jb.seed_scene(), 2), accuracy="fast")
