@@ -1,6 +1,7 @@
 """`jaxbiped optimise`: the parameters within bounds whose gait is best, and what certifies it."""
 
 import dataclasses
+import math
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -13,6 +14,7 @@ from jaxbiped._types import JsonObject
 from jaxbiped.cli._gait import finite, parts
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import SceneOptions
+from jaxbiped.continuation._nearest_bifurcation import NearestBifurcation
 from jaxbiped.optimise._certificate import Certificate, certify
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.optimise._optimise_gait import Optimum, optimise_gait
@@ -237,6 +239,13 @@ def _print(
         report.say(line)
 
 
+def _bifurcation_line(nearest: NearestBifurcation) -> str:
+    if nearest.kind is None:
+        return f"no bifurcation along {nearest.along} in the range that was followed"
+    times = "" if math.isnan(nearest.ratio) else f" ({nearest.ratio:.3g} times its value)"
+    return f"along {nearest.along} the nearest is {nearest.kind} at {nearest.value:.6g}{times}"
+
+
 def _certificate_lines(certificate: Certificate) -> list[str]:
     told = certificate.optimality
     lines = [
@@ -260,13 +269,7 @@ def _certificate_lines(certificate: Certificate) -> list[str]:
     if walk is not None:
         back = "back to the gait" if walk.returned else "NOT back to the gait"
         lines.append(f"walk from a push of {walk.push:g}: {walk.footsteps} footsteps, {back}")
-    lines += [
-        f"no bifurcation along {each.along} from an eighth to eight times its value"
-        if each.kind is None
-        else f"along {each.along} the nearest is {each.kind} at {each.value:.6g} ({each.ratio:.3g} "
-        "times its value)"
-        for each in certificate.nearest_bifurcations
-    ]
+    lines += [_bifurcation_line(each) for each in certificate.nearest_bifurcations]
     if other is not None:
         lines.append(
             f"engine {other.engine}: period differs by {other.period_difference:.1e}, length by "

@@ -13,6 +13,8 @@ from jaxbiped.scene._scene import Scene
 
 FACTOR = 8.0
 """How far a parameter is followed to both sides of its own value."""
+STEEPEST = 0.1
+"""How far the slope is followed to both sides of level ground [rad]."""
 
 
 class NearestBifurcation(NamedTuple):
@@ -22,7 +24,7 @@ class NearestBifurcation(NamedTuple):
         along: name of the parameter.
         kind: what happens there; None where nothing does within the range that was followed.
         value: of the parameter there, SI units; NaN for none.
-        ratio: of that value to the gait's own.
+        ratio: of that value to the gait's own; NaN on level ground.
         multiplier: the critical multiplier there.
         error: its estimated error.
     """
@@ -44,28 +46,32 @@ def nearest_bifurcation(
         scene: the gait's.
         gait: where to begin.
         along: the parameter's name (see `parameter_names`).
-        factor: how far to follow it: from its own value over this to its own times this.
+        factor: how far to follow it: from its own value over this to its own times this; the slope
+            of level ground by 0.1 rad to both sides.
 
     Returns:
         The one whose value differs by the smallest factor.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled; a parameter
-            that is zero, which no factor changes.
+            other than the slope that is zero, which no factor changes.
     """
     check_choice("along", along, parameter_names(scene))
     own = float(parameter_values(scene)[along])
-    if own == 0.0:
+    level = own == 0.0 and along == "slope"
+    if own == 0.0 and not level:
         raise ArgumentError(f"along = {along!r} is not allowed where {along} is 0: no factor fits.")
     if not factor > 1.0:
         raise ArgumentError(f"factor = {factor!r} is not allowed: it must be above 1.")
     steps = gait.orbit[0].shape[0]
-    branch = continue_gait(
-        scene, along, bounds=(own / factor, own * factor), guess=gait, footsteps=steps
-    )
-    seen = [each for each in branch.bifurcations if each.value / own > 0.0]
+    bounds = (-STEEPEST, STEEPEST) if level else (own / factor, own * factor)
+    branch = continue_gait(scene, along, bounds=bounds, guess=gait, footsteps=steps)
+    seen = [each for each in branch.bifurcations if level or each.value / own > 0.0]
     if not seen:
         return NearestBifurcation(along, None, math.nan, math.nan, complex(math.nan), math.nan)
-    first = min(seen, key=lambda each: abs(math.log(each.value / own)))
-    ratio = first.value / own
+    if level:
+        first, ratio = min(seen, key=lambda each: abs(each.value)), math.nan
+    else:
+        first = min(seen, key=lambda each: abs(math.log(each.value / own)))
+        ratio = first.value / own
     return NearestBifurcation(along, first.kind, first.value, ratio, first.multiplier, first.error)

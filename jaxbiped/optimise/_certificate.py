@@ -108,7 +108,8 @@ def certify(
         other_engine: whether to find the gait by the other engine, too, which compiles for minutes
             where that is XLA.
         bifurcations_along: parameters in each of which the gait is followed to its nearest
-            bifurcation, from an eighth to eight times the value; each compiles a program.
+            bifurcation, from an eighth to eight times the value (from level ground by 0.1 rad to
+            both sides); each compiles a program.
         seed: of the starts.
 
     Returns:

@@ -1,6 +1,6 @@
 """Functionals of a periodic orbit: values, derivatives by the implicit function theorem, errors."""
 
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -8,7 +8,6 @@ from jaxtyping import PyTree
 
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._fixed_point_search import LOOSER
@@ -24,7 +23,7 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.optimise._augmented_state import MotionSection
-from jaxbiped.optimise._cycle_integrals import integrals_of, with_integrals
+from jaxbiped.optimise._cycle_integrals import AbstractIntegrals, integrals_of
 from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -80,15 +79,7 @@ def cycle_functionals(
 
 def integral_names(scene: Scene | RigidScene) -> tuple[str, ...]:
     """What `cycle_functionals` tells of a scene."""
-    kind = type(integrals_of(scene))
-    count = len(kind.cyclic_coordinates)
-    fields = with_integrals(_zero_state(scene))._fields
-    return (*fields[1:count], "foot_clearance")
-
-
-def _zero_state(scene: Scene | RigidScene) -> WalkerState:
-    kind = state_type(scene)
-    return cast(WalkerState, kind(*[0.0] * len(kind._fields)))
+    return (*integrals_of(scene).integrals, "foot_clearance")
 
 
 def cycle_spec(
@@ -115,7 +106,8 @@ def cycle_spec(
 def _functionals(
     spec: ReturnMapSpec, scene: Scene | RigidScene, state: WalkerState, accuracy: str
 ) -> Functionals:
-    y = with_integrals(state)
+    assert isinstance(spec.system, AbstractIntegrals)
+    y = spec.system.begin(state)
     _, active = select_parameters(scene, None)
     seeds, sizes = seed_directions(scene, active, len(recurring_components(spec.system, y)))
     fine = precision_of(accuracy, scene)

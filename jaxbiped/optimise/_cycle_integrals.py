@@ -1,4 +1,4 @@
-"""Cycle integrals as cyclic coordinates: slip, losses and depth of the swing foot along an orbit.
+"""Cycle integrals as cyclic coordinates: slip, losses, motors' work, depth of the swing foot.
 
 A coordinate whose rate is the integrand, and on which no rate depends, gains the integral over a
 cycle. The return map then has its value, its derivatives and their errors from one solve.
@@ -10,11 +10,13 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
+from jaxbiped.dynamics._actuation import actuator_powers
 from jaxbiped.dynamics._energy import powers
 from jaxbiped.dynamics._feet import feet, touches
 from jaxbiped.dynamics._impact import impact
+from jaxbiped.dynamics._push_off import push_off_work
 from jaxbiped.dynamics._rigid_state import RigidState, WalkerState, whole_state
-from jaxbiped.dynamics._rolling import inertia_of, support_of
+from jaxbiped.dynamics._rolling import inertia_of, rolling_hip_motion, support_of
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.optimise._augmented_state import augment, joined, motion_of
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -25,21 +27,39 @@ COMPLIANT = ("slip_distance", "friction_loss", "impact_loss")
 """Integrals of a walker with laws of contact."""
 RIGID = ("impact_loss",)
 """Those of the rigid walker."""
-
-
-def with_integrals(state: WalkerState) -> PyTree:
-    """A walker's state with integrals that begin at zero."""
-    return augment(state, RIGID if isinstance(state, RigidState) else COMPLIANT)
+MOTOR_WORK = "motor_work"
+"""What a driven walker of either kind has beside them."""
 
 
 def _depth(penetration: Scalar, admitted: Scalar, deepest: Scalar) -> Scalar:
     return jnp.where(admitted, -deepest, penetration)
 
 
-class WalkingIntegrals(AbstractSystem):
+def _driving(motors: tuple[Scalar, ...], like: Scalar) -> Scalar:
+    """Power of the motors that drive, added up [W]: none gains energy by braking."""
+    power = jnp.zeros_like(like)
+    for motor in motors:
+        power = power + jnp.maximum(motor, 0.0)
+    return power
+
+
+class AbstractIntegrals(AbstractSystem):
+    """A walker with integrals over its cycle.
+
+    Attributes:
+        integrals: their names, as they lie behind hip_x. A property of the class.
+    """
+
+    integrals: ClassVar[tuple[str, ...]] = ()
+
+    def begin(self, state: WalkerState) -> PyTree:
+        """A walker's state with integrals that begin at zero."""
+        return augment(state, self.integrals)
+
+
+class AbstractWalkingIntegrals(AbstractIntegrals):
     """`Walking` with its integrals; its load is the depth of a foot that swings [m]."""
 
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(range(1 + len(COMPLIANT)))
     reset_is_symmetry: ClassVar[bool] = True
 
     def vector_field(self, t: Time, y: PyTree, args: Scene) -> PyTree:
@@ -53,23 +73,29 @@ class WalkingIntegrals(AbstractSystem):
             "friction_loss": power.friction,
             "impact_loss": power.indentation,
         }
+        if power.motors is not None:
+            rates[MOTOR_WORK] = _driving(power.motors, slip)
         return joined(y, Walking().vector_field(t, state, args), rates)
 
     def switches(self, args: Scene, y: PyTree) -> tuple[Switch, ...]:
-        """The walker's, touchdown as a jump of the rate of slip, and slip's change of sign."""
+        """The walker's, touchdown as a jump of the rate of slip, and changes of sign.
+
+        Those of slip, and of each motor's power.
+        """
         state = motion_of(y)
         own = Walking().switches(args, state)
         for foot in feet(args, state):
             admitted = True if foot.admitted is None else foot.admitted
             own += (Switch(foot.penetration, admitted, force_jumps=True),)
             own += (Switch(foot.slip_speed, touches(foot)),)
-        return own
+        motors = powers(args, state).motors or ()
+        return own + tuple(Switch(power, True) for power in motors)
 
     def ending(self, args: Scene, y: PyTree) -> Scalar:
         return Walking().ending(args, motion_of(y))
 
     def reset_map(self, args: Scene, y: PyTree) -> PyTree:
-        gained = {name: getattr(y, name) for name in COMPLIANT}
+        gained = {name: getattr(y, name) for name in self.integrals}
         return joined(y, Walking().reset_map(args, motion_of(y)), gained)
 
     def load(self, args: Scene, y: PyTree) -> Scalar:
@@ -82,18 +108,33 @@ class WalkingIntegrals(AbstractSystem):
         return found
 
 
-class RollingIntegrals(AbstractSystem):
-    """`Rolling` with the energy that impacts take; its load is the swing foot's depth [m]."""
+class WalkingIntegrals(AbstractWalkingIntegrals):
+    """A passive walker's."""
 
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(range(1 + len(RIGID)))
+    integrals: ClassVar[tuple[str, ...]] = COMPLIANT
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(range(1 + len(COMPLIANT)))
+
+
+class DrivenWalkingIntegrals(AbstractWalkingIntegrals):
+    """A driven walker's: its motors' work too."""
+
+    integrals: ClassVar[tuple[str, ...]] = (*COMPLIANT, MOTOR_WORK)
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(range(2 + len(COMPLIANT)))
+
+
+class AbstractRollingIntegrals(AbstractIntegrals):
+    """`Rolling` with the energy that impacts take; its load is the swing foot's depth [m]."""
 
     def vector_field(self, t: Time, y: PyTree, args: RigidScene) -> PyTree:
         state = motion_of(y)
         rates = {"impact_loss": jnp.zeros_like(state.hip_x)}
+        if MOTOR_WORK in self.integrals:
+            rates[MOTOR_WORK] = _driving(_rolling_motors(args, state), state.hip_x)
         return joined(y, Rolling().vector_field(t, state, args), rates)
 
     def switches(self, args: RigidScene, y: PyTree) -> tuple[Switch, ...]:
-        return ()
+        """Each motor's change of sign."""
+        return tuple(Switch(power, True) for power in _rolling_motors(args, motion_of(y)))
 
     def ending(self, args: RigidScene, y: PyTree) -> Scalar:
         return Rolling().ending(args, motion_of(y))
@@ -101,12 +142,37 @@ class RollingIntegrals(AbstractSystem):
     def reset_map(self, args: RigidScene, y: PyTree) -> PyTree:
         state = motion_of(y)
         after = impact(args, state).state
-        lost = _kinetic(args, state) - _kinetic(args, after)
-        return joined(y, after, {"impact_loss": y.impact_loss + lost})
+        push = push_off_work(args, state)
+        lost = _kinetic(args, state) + push - _kinetic(args, after)
+        gained = {"impact_loss": y.impact_loss + lost}
+        if MOTOR_WORK in self.integrals:
+            gained[MOTOR_WORK] = y.motor_work + jnp.maximum(push, 0.0)
+        return joined(y, after, gained)
 
     def load(self, args: RigidScene, y: PyTree) -> Scalar:
         """How deep the swing foot is underground [m]."""
         return args.walker.hip_to_foot * (jnp.cos(y.theta_1) - jnp.cos(y.theta_2))
+
+
+class RollingIntegrals(AbstractRollingIntegrals):
+    """A passive walker's."""
+
+    integrals: ClassVar[tuple[str, ...]] = RIGID
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(range(1 + len(RIGID)))
+
+
+class DrivenRollingIntegrals(AbstractRollingIntegrals):
+    """A driven walker's: the work of its motors and of its push-off too."""
+
+    integrals: ClassVar[tuple[str, ...]] = (*RIGID, MOTOR_WORK)
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(range(2 + len(RIGID)))
+
+
+def _rolling_motors(scene: RigidScene, state: RigidState) -> tuple[Scalar, ...]:
+    """Power of each motor at the hip of the walker that rolls on leg 2 [W]."""
+    if scene.actuation is None:
+        return ()
+    return actuator_powers(scene, rolling_hip_motion(state), (None, None)).motors
 
 
 def _kinetic(scene: RigidScene, state: RigidState) -> Scalar:
@@ -118,6 +184,9 @@ def _kinetic(scene: RigidScene, state: RigidState) -> Scalar:
     return 0.5 * own + inertia.coupling * state.omega_1 * state.omega_2
 
 
-def integrals_of(scene: Scene | RigidScene) -> AbstractSystem:
+def integrals_of(scene: Scene | RigidScene) -> AbstractIntegrals:
     """The walker with its integrals."""
-    return WalkingIntegrals() if scene.compliant else RollingIntegrals()
+    driven = scene.actuation is not None
+    if scene.compliant:
+        return DrivenWalkingIntegrals() if driven else WalkingIntegrals()
+    return DrivenRollingIntegrals() if driven else RollingIntegrals()

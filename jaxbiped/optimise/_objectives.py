@@ -26,12 +26,8 @@ def _of_any(scene: Scene | RigidScene) -> str | None:
     return None
 
 
-def _of_passive(scene: Scene | RigidScene) -> str | None:
-    return None if scene.actuation is None else "its actuators' work is not counted"
-
-
-def _of_impacts(scene: Scene | RigidScene) -> str | None:
-    return None if isinstance(scene, Scene) else _of_passive(scene)
+def _of_driven(scene: Scene | RigidScene) -> str | None:
+    return "it has no actuators" if scene.actuation is None else None
 
 
 def _of_slip(scene: Scene | RigidScene) -> str | None:
@@ -72,18 +68,20 @@ OBJECTIVES = {
     "spectral_radius": Objective(Quantity("spectral radius", "$\\rho$")),
     "radius_bound": Objective(Quantity("smooth bound of the spectral radius", "$\\rho_q$")),
     "sensitivity_norm": Objective(Quantity("gait sensitivity norm", "$\\|G\\|$")),
-    "cost_of_transport": Objective(Quantity("cost of transport", "$C$"), _of_passive),
-    "impact_loss": Objective(Quantity("energy lost in impacts", "$E_i$", "J"), _of_impacts),
+    "cost_of_transport": Objective(Quantity("cost of transport", "$C$")),
+    "impact_loss": Objective(Quantity("energy lost in impacts", "$E_i$", "J")),
     "friction_loss": Objective(Quantity("energy lost to friction", "$E_f$", "J"), _of_friction),
     "slip_distance": Objective(Quantity("slip distance", "$s$", "m"), _of_slip),
+    "motor_work": Objective(Quantity("work of the motors", "$W$", "J"), _of_driven),
     "foot_clearance": Objective(Quantity("foot clearance", "$h$", "m"), _of_swing),
 }
 """By name. Those of a cycle: losses and slip are sums over its footsteps.
 
-- cost of transport: energy lost over weight times step length, which is sin(slope); of passive
-  walkers.
+- cost of transport: work of gravity and of the motors over weight times way, as
+  `measure.cost_of_transport` has it; a passive walker's is what it loses, sin(slope) in all.
 - impact loss: work of the normal reactions; a rigid walker's kinetic energy lost in its impacts,
-  which it must not push off from.
+  after its push-off.
+- motor work: of each motor where its power is positive, added up, and the push-off's.
 - slip distance: path of the feet that touch, along the ground.
 - foot clearance: least height of the swinging foot, negative where it passes underground.
 - radius bound: never below the spectral radius, and smooth also where multipliers meet or have
@@ -198,19 +196,26 @@ def _rows_of(found: object) -> list[_Row]:
 
 
 def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, _Row]) -> _Row:
-    """Losses over weight times length, by their logarithmic derivatives."""
-    losses = [rows[name] for name in ("impact_loss", "friction_loss") if name in rows]
-    length, names = rows["step_length"], parameter_names(scene)
+    """Losses, or what the motors do and gravity's share, over weight times length."""
+    if scene.actuation is None:
+        losses = [rows[name] for name in ("impact_loss", "friction_loss") if name in rows]
+        return _over_weight_and_length(scene, losses, rows["step_length"])
+    driven = _over_weight_and_length(scene, [rows["motor_work"]], rows["step_length"])
+    slope = float(scene.ground.slope)
+    by_slope = np.zeros(len(driven.slopes))
+    by_slope[parameter_names(scene).index("slope")] = np.cos(slope)
+    return driven._replace(value=driven.value + np.sin(slope), slopes=driven.slopes + by_slope)
+
+
+def _over_weight_and_length(scene: Scene | RigidScene, works: list[_Row], length: _Row) -> _Row:
     known = {name: float(value) for name, value in parameter_values(scene).items()}
-    mass = float(scene.walker.total_mass)
-    own = np.zeros(len(names))
+    mass, names = float(scene.walker.total_mass), parameter_names(scene)
+    own = length.slopes / length.value
     for name, share in (("m", 2.0 / mass), ("hip_mass", 1.0 / mass), ("g", 1.0 / known["g"])):
-        own[names.index(name)] = share
-    lost = sum(row.value for row in losses)
-    cost = lost / (mass * known["g"] * length.value)
-    slopes = sum(row.slopes for row in losses) / lost - length.slopes / length.value - own
-    errors = sum(row.error for row in losses) / lost + length.error / length.value
-    slope_errors = (
-        sum(row.slope_errors for row in losses) / lost + length.slope_errors / length.value
-    )
-    return _Row(cost, cost * errors, cost * slopes, cost * slope_errors)
+        own[names.index(name)] += share
+    divisor = mass * known["g"] * length.value
+    cost = sum(row.value for row in works) / divisor
+    slopes = sum(row.slopes for row in works) / divisor - cost * own
+    errors = sum(row.error for row in works) / divisor + cost * length.error / length.value
+    slope_errors = sum(row.slope_errors for row in works) / divisor
+    return _Row(cost, errors, slopes, slope_errors + cost * length.slope_errors / length.value)

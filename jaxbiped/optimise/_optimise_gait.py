@@ -66,6 +66,13 @@ class Optimum(NamedTuple):
     evaluations: int
     lost: int
 
+    def __repr__(self) -> str:
+        variables = ", ".join(f"{name}={value:.6g}" for name, value in self.variables.items())
+        return (
+            f"Optimum({self.outcome}, objective={self.objective:.6g}, {variables}, "
+            f"engine={self.gait.engine}, {self.evaluations} gaits)"
+        )
+
 
 def optimise_gait(
     scene: Scene | RigidScene,

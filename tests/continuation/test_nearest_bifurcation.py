@@ -21,6 +21,18 @@ def test_it_is_that_of_the_whole_branch(gait):
     assert found.ratio == pytest.approx(doubling.value / float(RIGID.ground.slope))
 
 
+def test_level_ground_is_left_to_both_sides():
+    """A driven gait's slope has no factor to go by: the first of both ways by its distance."""
+    push = jb.actuation.PushOff(0.1)
+    level = jb.with_parameters(jb.RigidScene(RIGID.walker, RIGID.ground, push), {"slope": 0.0})
+    gait = jb.find_gait(level, parameters=(), radius_sensitivities=False)
+    found = jb.continuation.nearest_bifurcation(level, gait)
+    seen = jb.continue_gait(level, "slope", bounds=(-0.1, 0.1), guess=gait).bifurcations
+    assert len(seen) > 1
+    assert found.value == pytest.approx(min((each.value for each in seen), key=abs), rel=1e-7)
+    assert found.ratio != found.ratio
+
+
 def test_there_may_be_none(gait):
     found = jb.continuation.nearest_bifurcation(RIGID, gait, factor=1.2)
     assert found.kind is None

@@ -47,6 +47,36 @@ def test_an_optimum_of_two_variables_is_that_of_a_grid():
     assert held.known.values["spectral_radius"] <= 0.45 * (1.0 + 1e-6)
 
 
+def test_level_ground_is_walked_at_the_least_cost():
+    """From nothing, held by a grid of gaits at the speed that is asked for, and certified."""
+    walker, ground = RIGID.walker, jb.Ground(slope=0.0, g=RIGID.ground.g)
+    level = jb.RigidScene(walker, ground, jb.actuation.PushOff(0.1))
+    best = jb.optimise_gait(
+        level,
+        vary={"impulse": (0.05, 0.2), "d": (0.06, 0.12)},
+        minimise="cost_of_transport",
+        subject_to={"speed": (0.28, 0.28)},
+    )
+    assert best.outcome is jb.optimise.Outcome.CONVERGED
+    assert best.known.values["speed"] == pytest.approx(0.28, rel=1e-6)
+    assert repr(best).startswith("Optimum(converged, objective=0.00")
+    impulses = np.linspace(0.08, 0.12, 9)
+    for d in (0.9 * best.variables["d"], 1.1 * best.variables["d"]):
+        other = jb.with_parameters(level, {"d": d})
+        grid = jb.gait_sweep(
+            other, {"impulse": impulses}, parameters=(), radius_sensitivities=False
+        )
+        # Work of the push-off is found by the speed alone: interpolate the impulse that has it.
+        (impulse,) = np.interp([0.28], grid.speed.values, impulses)
+        same = jb.with_parameters(other, {"impulse": impulse})
+        gait = jb.find_gait(same, parameters=(), radius_sensitivities=False)
+        walk = jb.rigid_walk(same, gait.measures.state, footsteps=2, max_arrivals=2)
+        assert jb.measure.cost_of_transport(same, walk).cost[-1] > best.objective
+    certificate = jb.optimise.certify(best, starts=0, footsteps=40)
+    assert certificate.stable
+    assert certificate.walk.returned
+
+
 def test_optimisers_agree_and_the_conditions_of_optimality_hold():
     found = {
         name: best_of(subject_to="step_length<0.19", optimiser=name)
