@@ -215,7 +215,18 @@ def of_period_doubling(numbers: dict[str, Any]) -> Iterator[str]:
     yield f"doubling at {places['period-doubling']:.6f}"
 
 
+def of_accuracy_coverage(numbers: dict[str, Any]) -> Iterator[str]:
+    """How many true errors lie within their bars."""
+    walks, gaits = numbers["walks"], numbers["gaits"]
+    yield f"{walks['met']} of {walks['run']} walks and {gaits['met']} of {gaits['run']} gaits"
+    for name, found in numbers["coverage"].items():
+        ratio = f"{found['median_ratio']:.1f}"
+        counts = ("numbers", "resolved", "covered", "scenes", "scenes_all_covered")
+        yield row(name, *(str(found[each]) for each in counts), ratio)
+
+
 QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
+    "accuracy_coverage": of_accuracy_coverage,
     "basin_seed": of_basin_seed,
     "basin_simplest": of_basin_simplest,
     "force_models": of_force_models,

@@ -47,8 +47,8 @@ class SweepOptions:
 
     footsteps: int = 30
     """After which a start that is not certain yet is unresolved."""
-    accuracy: str = "fast"
-    """How accurately to solve: fast, balanced or tight."""
+    accuracy: str = "draft"
+    """How accurately to solve: draft, balanced or tight."""
     engine: str = "auto"
     """What computes: xla, lanes, or auto for the faster one that can."""
     store: Path | None = None

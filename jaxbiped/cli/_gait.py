@@ -3,6 +3,7 @@
 import dataclasses
 import math
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -25,6 +26,8 @@ from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.solve._accuracy import accuracy_told
+from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +58,7 @@ class FindGait:
         default_factory=OutputOptions
     )
     accuracy: str = "balanced"
-    """How accurately to solve: balanced or tight."""
+    """How accurately to solve: draft, balanced or tight; or a relative error, such as 1e-4."""
     footsteps: int = 1
     """Footsteps in a cycle."""
     section: str | None = None
@@ -74,20 +77,24 @@ class FindGait:
         check_count("footsteps", self.footsteps)
         self.output.check()
         section = None if self.section is None else _SECTIONS[self.section]()
-        gait = find_gait(
-            scene,
-            state,
-            footsteps=self.footsteps,
-            section=section,
-            accuracy=self.accuracy,
-            engine=self.engine,
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
+            gait = find_gait(
+                scene,
+                state,
+                footsteps=self.footsteps,
+                section=section,
+                accuracy=accuracy_told(self.accuracy),
+                engine=self.engine,
+            )
         found = gait.outcome is Search.FOUND  # waits for the result
         wall = {
             "import": imported - _clock.IMPORT_BEGAN,
             "total": time.perf_counter() - _clock.IMPORT_BEGAN,
         }
         numbers = gait_numbers(gait) | {"search": explain_search(scene, gait), "wall_s": wall}
+        if gait.error is not None:
+            numbers["error"] = error_numbers(gait.error)
         if found and isinstance(scene, RigidScene):
             numbers["assumptions"] = _assumptions(scene, gait)
         cost = gait_cost(scene, gait, self.footsteps) if found else {}
@@ -101,6 +108,8 @@ class FindGait:
                 report.say(cost_sentence(cost))
         else:
             report.say(_failure(numbers, gait))
+        if gait.error is not None:
+            report.say(error_sentence(gait.error))
         if found and self.output.out is not None:
             for path in write_figures(gait, self.output.out):
                 report.say(f"wrote {path}")

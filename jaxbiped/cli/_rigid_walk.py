@@ -17,6 +17,7 @@ from jaxbiped.cli._warnings import cut_short
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._rigid_walk import rigid_walk
+from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._trajectory import Arrivals
 
 _MOST_ROWS = 24
@@ -41,10 +42,15 @@ def run_rigid_walk(
                 f'{name} = {getattr(solve, name)} is not allowed with model = "rigid": its steps '
                 "are dopri8's, with an absolute tolerance of a hundredth of the relative one."
             )
+    if solve.wanted() is not None:
+        raise ArgumentError(
+            f'accuracy = {solve.accuracy} is not allowed with model = "rigid": name one of '
+            f"{', '.join(ACCURACIES)}."
+        )
     prepared = time.perf_counter()
     options: dict[str, Any] = dict(
         duration=solve.duration,
-        rtol=solve.rtol,
+        **({"rtol": solve.rtol} if solve.accuracy is None else {"accuracy": solve.accuracy}),
         engine=solve.engine,
         max_arrivals=_MOST_STRIKES,
         max_solver_steps=solve.most_steps(),

@@ -2,6 +2,7 @@
 
 import dataclasses
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,7 +28,9 @@ from jaxbiped.measure._footsteps import Footsteps, footsteps
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.simulate._simulate import Simulation
+from jaxbiped.simulate._accurate_walk import accurate_walk
+from jaxbiped.simulate._simulation import Simulation
+from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 from jaxbiped.solve._trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -70,13 +73,13 @@ class Walk:
             request = self._request(scene, state)
         self.output.check()
         began = time.perf_counter()
-        trajectory, seconds = _simulate(request)
+        trajectory, seconds = _simulate(request, self.solve.wanted())
         wall = {
             "import": imported - _clock.IMPORT_BEGAN,
             "compile": time.perf_counter() - began - seconds,
             "run": seconds,
         }
-        self._report(scene, trajectory, wall)
+        self._report(scene, trajectory, wall, float(request.rtol))
         return 1 if trajectory.outcome == Ending.SOLVER_FAILED else 0
 
     def _request(self, scene: Scene | RedundantScene, state: State) -> Simulation:
@@ -85,18 +88,20 @@ class Walk:
             state,
             duration=self.solve.duration,
             solver=self.solve.solver,
-            rtol=self.solve.rtol,
-            atol=self.solve.atol,
+            **self.solve.tolerances(),
             dt=self.solve.dt,
             engine=self.solve.engine,
             max_solver_steps=self.solve.most_steps(),
         )
 
-    def _report(self, scene: Any, trajectory: Trajectory, wall: dict[str, float]) -> None:
+    def _report(
+        self, scene: Any, trajectory: Trajectory, wall: dict[str, float], tolerance: float
+    ) -> None:
         with stage("measuring the footsteps"):
             steps = footsteps(scene, trajectory)
             ledger = energy_ledger(scene, trajectory)
-        rtol = self.solve.rtol if self.solve.dt is None else None
+        known = tolerance if trajectory.error is None else trajectory.error.rtol
+        rtol = known if self.solve.dt is None else None
         numbers: JsonObject = {
             "ending": ending_name(scene, trajectory),
             "slope_rad": float(scene.ground.slope),
@@ -115,6 +120,8 @@ class Walk:
             },
             "wall_s": wall,
         }
+        if trajectory.error is not None:
+            numbers["error"] = error_numbers(trajectory.error)
         cost: JsonObject = {}
         if scene.actuation is not None:
             cost = walk_cost(scene, trajectory)
@@ -126,6 +133,8 @@ class Walk:
         _print(report, numbers)
         if cost:
             report.say(cost_sentence(cost))
+        if trajectory.error is not None:
+            report.say(error_sentence(trajectory.error))
         for sentence in numbers["warnings"]:
             report.say(f"WARNING: {sentence}")
         if scene.redundant:
@@ -138,8 +147,16 @@ class Walk:
         report.finish(numbers)
 
 
-def _simulate(request: Simulation) -> tuple[Trajectory, float]:
-    """The trajectory, and how long the solve took once it was compiled [s]."""
+def _simulate(request: Simulation, wanted: float | None) -> tuple[Trajectory, float]:
+    """The trajectory, and how long the solve took once it was compiled [s].
+
+    To a `wanted` relative error it takes several solves, compiling among them.
+    """
+    if wanted is not None:
+        began = time.perf_counter()
+        with warnings.catch_warnings(), stage("simulating, with error bars"):
+            warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
+            return accurate_walk(request, wanted), time.perf_counter() - began
     most = room = request.max_solver_steps
     if request.engine == "xla" and request.dt is None:
         # It makes room beforehand, and time asked for need not be walked.

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Iterable
 from inspect import signature
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.conf import OmitArgPrefixes
 
@@ -35,6 +35,8 @@ from jaxbiped.scene.laws._catalogue import (
     friction_law_like,
     normal_law_like,
 )
+from jaxbiped.simulate._accurate_walk import check_accurate_walk
+from jaxbiped.solve._accuracy import accuracy_told
 
 _SEED = {
     parameter.name: parameter.default for parameter in signature(seed_scene).parameters.values()
@@ -243,6 +245,8 @@ class SolveOptions:
     """Simulated time [s]."""
     solver: str = "rodas4"
     """Name of a solver: ours (rodas3p, rodas4, rodas4p, rodas5p) or one of diffrax's."""
+    accuracy: str | None = None
+    """In place of tolerances: draft, balanced or tight; or a relative error, such as 1e-4."""
     rtol: float = 1e-6
     """Relative tolerance."""
     atol: float | None = None
@@ -253,6 +257,20 @@ class SolveOptions:
     """Cap on the solver's steps: unless given 65536 for each ten seconds, at most 1048576."""
     engine: str = "auto"
     """What computes: xla, lanes, or auto for the faster one that can."""
+
+    def wanted(self) -> float | None:
+        """The relative error asked for; None where tolerances decide. Raises `ArgumentError`."""
+        if self.accuracy is None:
+            return None
+        return check_accurate_walk(accuracy_told(self.accuracy), atol=self.atol, dt=self.dt)
+
+    def tolerances(self) -> dict[str, Any]:
+        """What decides on the steps' sizes, as `simulate` takes it; raises `ArgumentError`."""
+        if self.wanted() is not None:
+            return {}
+        if self.accuracy is not None:
+            return {"accuracy": self.accuracy, "atol": self.atol}
+        return {"rtol": self.rtol, "atol": self.atol}
 
     def most_steps(self) -> int:
         """The cap on the solver's steps; raises `ArgumentError`."""

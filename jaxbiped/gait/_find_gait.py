@@ -1,6 +1,7 @@
 """Search for a periodic gait of a scene."""
 
 import dataclasses
+import functools
 from concurrent.futures import ThreadPoolExecutor
 from typing import Literal, cast
 
@@ -24,6 +25,7 @@ from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
 from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import check_state
+from jaxbiped.gait._accurate_gait import accurate_gait
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._fixed_point_search import Found, Search, SearchArguments, search
@@ -39,7 +41,8 @@ from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of
+from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
+from jaxbiped.solve._error_estimate import check_wanted
 from jaxbiped.variational._hybrid_system import section_of
 
 _RESIDUAL_SHARE = 0.3
@@ -53,7 +56,7 @@ def find_gait(
     footsteps: int = 1,
     section: AbstractSection | None = None,
     parameters: tuple[str, ...] | None = None,
-    accuracy: str = "balanced",
+    accuracy: str | float | Precision = "balanced",
     method: Literal["newton", "optax"] = "newton",
     optimiser: optax.GradientTransformation | None = None,
     max_evaluations: int | None = None,
@@ -85,7 +88,9 @@ def find_gait(
             just after its impact, at `HeelStrike()`.
         parameters: names of the parameters to differentiate with respect to (see
             `parameter_names`); all of them unless given, none for ().
-        accuracy: "balanced" or "tight".
+        accuracy: "draft", "balanced" or "tight"; a `Precision`; or a number, the relative error
+            wanted of measures, multipliers and sensitivities. Then tolerances are tightened until
+            the error bars in the gait's `error` meet it, or a `RuntimeWarning` tells why not.
         method: "newton", or "optax" to minimise the squared residual by gradient.
         optimiser: for "optax"; Adam with a rate of 1e-2 unless given.
         max_evaluations: cycles allowed, and no stages beyond the first; unless given, 40 in each
@@ -110,7 +115,24 @@ def find_gait(
         ('found', 0.4438)
     """
     check_type("scene", scene, Scene, RigidScene, RedundantScene)
-    check_choice("accuracy", accuracy, GAIT_ACCURACIES)
+    if not isinstance(accuracy, str | Precision):
+        check_wanted(accuracy, optimiser=optimiser)
+        find = functools.partial(
+            find_gait,
+            scene,
+            footsteps=footsteps,
+            section=section,
+            parameters=parameters,
+            method=method,
+            max_evaluations=max_evaluations,
+            radius_sensitivities=radius_sensitivities,
+            engine=engine,
+        )
+        return accurate_gait(
+            find, scene, float(accuracy), guess=guess, solver=solver, radius=radius_sensitivities
+        )
+    if isinstance(accuracy, str):
+        check_accuracy_name(accuracy)
     check_choice("method", method, ("newton", "optax"))
     check_count("footsteps", footsteps)
     check_unbatched("scene", scene)
@@ -122,7 +144,7 @@ def find_gait(
     # A redundant scene's leaves begin with those of what it models.
     modelled = scene.minimal
     names, active = select_parameters(modelled, parameters)
-    precision = precision_of(accuracy, scene)
+    precision = precision_of(accuracy, scene) if isinstance(accuracy, str) else accuracy
     method_of_steps = orbit_solver(solver, rigid=not scene.compliant)
     section = section_of(scene, section)
     runs_on = orbit_engine(
@@ -138,7 +160,7 @@ def find_gait(
         method_of_steps,
         runs_on,
         steps=int(footsteps),
-        most=ACCURACIES[accuracy].max_solver_steps,
+        most=ACCURACIES[accuracy if isinstance(accuracy, str) else "tight"].max_solver_steps,
     )
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),

@@ -24,6 +24,7 @@ from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameters import parameter_quantities
+from jaxbiped.solve._error_estimate import ErrorEstimate
 
 _NOTHING = 1e-9
 """A measure (SI units) that is zero but for the solve's error has no elasticity."""
@@ -86,6 +87,8 @@ class Gait(eqx.Module):
         origin: how the search came to it, which other gaits it saw, and where the seed's gait
             ended on the way to this scene; see `found_by` and `others`.
         orbit: times [s] and states at the ends of the last cycle's solver steps, NaN beyond.
+        error: error bars of `measures`, `multipliers` and `sensitivities`, an `ErrorEstimate`; None
+            unless the accuracy was asked for by a number.
         parameters: names of the p parameters.
         engine: what computed it, "xla" or "lanes".
         quantities: what the parameters are, with their units; () where that is not known.
@@ -115,6 +118,7 @@ class Gait(eqx.Module):
     parameters: tuple[str, ...] = eqx.field(static=True)
     engine: str = eqx.field(static=True)
     quantities: tuple[Quantity, ...] = eqx.field(static=True, default=())
+    error: ErrorEstimate | None = None
 
     def __repr__(self) -> str:
         like, code = self.measures.period, self.ending

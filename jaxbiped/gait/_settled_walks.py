@@ -79,7 +79,7 @@ def _arrivals(scene: Scene, starts: PyTree) -> tuple[Scalar, PyTree]:
             scene,
             start,
             footsteps=_FOOTSTEPS + 1,
-            accuracy="fast",
+            accuracy="draft",
             save=MidStance(),
             max_arrivals=_FOOTSTEPS,
             engine="lanes",

@@ -66,7 +66,8 @@ def cost_of_transport(
     Examples:
         >>> import jaxbiped as jb
         >>> scene = jb.seed_scene(slope=0.02)
-        >>> walk = jb.simulate(scene, jb.seed_state(), footsteps=2, accuracy="fast", engine="lanes")
+        >>> how = dict(footsteps=2, accuracy="draft", engine="lanes")
+        >>> walk = jb.simulate(scene, jb.seed_state(), **how)
         >>> jb.measure.cost_of_transport(scene, walk).cost.round(3)
         array([0.02])
     """

@@ -58,7 +58,8 @@ def energy_ledger(
     Examples:
         >>> import jaxbiped as jb
         >>> scene = jb.seed_scene()
-        >>> walk = jb.simulate(scene, jb.seed_state(), footsteps=2, accuracy="fast", engine="lanes")
+        >>> how = dict(footsteps=2, accuracy="draft", engine="lanes")
+        >>> walk = jb.simulate(scene, jb.seed_state(), **how)
         >>> books = jb.energy_ledger(scene, walk)
         >>> books.gravity_work.round(3), books.damper_loss.round(3)
         (array([0.195]), array([0.071]))

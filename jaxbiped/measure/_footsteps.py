@@ -103,7 +103,8 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     Examples:
         >>> import jaxbiped as jb
         >>> scene = jb.seed_scene()
-        >>> walk = jb.simulate(scene, jb.seed_state(), footsteps=2, accuracy="fast", engine="lanes")
+        >>> how = dict(footsteps=2, accuracy="draft", engine="lanes")
+        >>> walk = jb.simulate(scene, jb.seed_state(), **how)
         >>> jb.footsteps(scene, walk).length_m.round(3)
         array([0.18])
     """

@@ -30,7 +30,7 @@ from jaxbiped.variational._differentiable_solve import (
 )
 
 if TYPE_CHECKING:
-    from jaxbiped.simulate._simulate import Simulation
+    from jaxbiped.simulate._simulation import Simulation
 
 
 _QUICK = 100_000

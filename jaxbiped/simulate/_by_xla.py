@@ -22,7 +22,7 @@ from jaxbiped.solve.controllers._footstep_limit import PATIENCE, FootstepLimit
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 
 if TYPE_CHECKING:
-    from jaxbiped.simulate._simulate import Simulation
+    from jaxbiped.simulate._simulation import Simulation
 
 
 @cached_jit

@@ -50,7 +50,7 @@ def rigid_walk(
         state: start, leg 2 standing.
         footsteps: heel strikes after which to end; with a `duration`, too, whichever comes first.
         duration: simulated time [s].
-        accuracy: "fast" (1e-4), "balanced" (1e-6) or "tight" (1e-11): the relative tolerance; the
+        accuracy: "draft" (1e-4), "balanced" (1e-6) or "tight" (1e-11): the relative tolerance; the
             absolute one (SI) is a hundredth of it.
         rtol: relative tolerance, in place of the accuracy's.
         max_arrivals: how many heel strikes to keep.

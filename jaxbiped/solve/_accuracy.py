@@ -42,7 +42,7 @@ class Accuracy(NamedTuple):
     """What a named accuracy stands for, in relative tolerances.
 
     Attributes:
-        walk: of a walk with laws of contact, at most: looser than "fast" is no faster, for the
+        walk: of a walk with laws of contact, at most: looser than "draft" is no faster, for the
             tolerance of a velocity comes near the speed over which friction builds up.
         rigid_walk: of the rigid walker.
         gait, rigid_gait: of gaits and return maps; None where derivatives cannot be asked for.
@@ -58,7 +58,7 @@ class Accuracy(NamedTuple):
 
 
 ACCURACIES = {
-    "fast": Accuracy(1e-5, 1e-4),
+    "draft": Accuracy(1e-5, 1e-4, Precision(1e-4, 1e-3), Precision(1e-6, 1e-5), 4096),
     "balanced": Accuracy(1e-6, 1e-6, Precision(3e-7, 3e-6), Precision(1e-9, 1e-8), 4096),
     "tight": Accuracy(2e-9, 1e-11, Precision(1e-9, 1e-8), Precision(1e-12, 1e-11), 32768),
 }
@@ -147,4 +147,26 @@ def check_precision(scene: CompliantScene, dtype: np.dtype) -> None:
         raise ArgumentError(
             f"dtype = {np.dtype(dtype).name} is too coarse for this contact: rounding a position "
             f"changes the reaction by {worst:.3g} times the walker's weight; use float64."
+        )
+
+
+def accuracy_told(text: str) -> str | float:
+    """An accuracy as a command was told it: a number where it is one, else a name.
+
+    Raises:
+        ArgumentError: neither.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        check_accuracy_name(text)
+        return text
+
+
+def check_accuracy_name(accuracy: object) -> None:
+    """Raises `ArgumentError` unless `accuracy` is a name of `ACCURACIES`."""
+    if accuracy not in ACCURACIES:
+        raise ArgumentError(
+            f"accuracy = {accuracy!r} is not known: choose one of {', '.join(ACCURACIES)}, or a "
+            "relative error above 0."
         )

@@ -17,6 +17,7 @@ from jaxbiped._summary import summary
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._state import State
 from jaxbiped.solve._dense_output import evaluate_dense
+from jaxbiped.solve._error_estimate import ErrorEstimate
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar
@@ -59,6 +60,8 @@ class Trajectory(eqx.Module, Generic[SomeState]):
             how far off it was, ‖Φ‖ [m].
         violation: distance of a linkage from its constraints, ‖Φ‖ at the times saved [m],
             shape (n,).
+        error: its estimated errors, an `ErrorEstimate` with bars by field; None unless the
+            accuracy was asked for by a number.
         engine: what computed it, "xla" or "lanes".
     """
 
@@ -73,6 +76,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     highest: PyTree = None
     correction: PyTree = None
     violation: Float[Array, "..."] | None = None
+    error: ErrorEstimate | None = None
     engine: str = eqx.field(static=True, default="xla")
 
     def __repr__(self) -> str:

@@ -78,3 +78,27 @@ def _length_and_time(args: AbstractScene) -> tuple[Scalar, Scalar]:
     gravity = xp.asarray(ground.g) / _GRAVITY
     found = length, xp.sqrt(length / xp.where(gravity > 0.0, gravity, 1.0))
     return found if known else jax.lax.stop_gradient(found)
+
+
+def relative_to_scene(args: PyTree, times: Numbers, states: PyTree) -> float:
+    """The largest of errors of times and states, told in l, √(l/g) and their quotients [–].
+
+    An error that is no number is infinite.
+
+    Args:
+        args: a scene with a walker's leg length and gravity, numbers.
+        times: errors of times [s], of any shape.
+        states: errors of states, SI units, leaves of any shape.
+    """
+    length, gravity = float(args.walker.l), float(args.ground.g)
+    time = np.sqrt(length / gravity) if gravity > 0.0 else 1.0
+    by_name = dict.fromkeys(_LENGTHS, length) | dict.fromkeys(_SPEEDS, length / time)
+    by_name |= dict.fromkeys(_RATES, 1.0 / time)
+    shares = [np.max(np.asarray(times), initial=0.0) / time]
+    shares += [
+        np.max(np.asarray(leaf), initial=0.0) / by_name.get(name, 1.0)
+        for name, leaf in states._asdict().items()
+        if leaf is not None
+    ]
+    worst = float(np.max(shares))
+    return worst if np.isfinite(worst) else np.inf

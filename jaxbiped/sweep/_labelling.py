@@ -165,7 +165,7 @@ def effort_of(
     scene: Scene | RigidScene,
     *,
     footsteps: int = 30,
-    accuracy: str = "fast",
+    accuracy: str = "draft",
     rtol: float | None = None,
     solver: str | AbstractRosenbrock = "rodas4",
     max_solver_steps: int = 65536,

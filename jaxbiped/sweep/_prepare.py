@@ -29,7 +29,7 @@ def labelling(
     parameters: Mapping[str, Sequence[float] | np.ndarray] | None = None,
     guess: PyTree = None,
     footsteps: int = 30,
-    accuracy: str = "fast",
+    accuracy: str = "draft",
     rtol: float | None = None,
     solver: str | AbstractRosenbrock = "rodas4",
     max_solver_steps: int = 65536,
@@ -42,7 +42,7 @@ def labelling(
         parameters: values of scene parameters for every combination of which the gait is sought.
         guess: where the search begins; the seed's start unless given.
         footsteps: after which a start that is not certain is "unresolved".
-        accuracy: "fast", "balanced" or "tight" (see `ACCURACIES`).
+        accuracy: "draft", "balanced" or "tight" (see `ACCURACIES`).
         rtol: relative tolerance, in place of the accuracy's; the absolute one is a hundredth.
         solver: of the compliant walker, "rodas3p" to "rodas5p".
         max_solver_steps: cap on a start's attempted steps.

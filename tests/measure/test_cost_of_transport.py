@@ -47,7 +47,7 @@ def test_the_ledger_closes_with_actuators(driven):
 
 
 def test_the_column_of_a_passive_walk_is_zero():
-    walk = jb.simulate(SEED, START, footsteps=2, accuracy="fast", engine="lanes")
+    walk = jb.simulate(SEED, START, footsteps=2, accuracy="draft", engine="lanes")
     books = jb.energy_ledger(SEED, walk)
     assert books._fields == (*PASSIVE_LEDGER, "actuation_work")
     assert books.actuation_work.tolist() == [0.0]

@@ -94,7 +94,7 @@ def test_extremes_by_both_engines_agree():
     [
         dict(engine="lanes"),
         dict(engine="xla"),
-        dict(solver="kvaerno3", accuracy="fast", duration=0.3),
+        dict(solver="kvaerno3", accuracy="draft", duration=0.3),
         dict(solver="euler", dt=1e-6, duration=0.05, max_solver_steps=1 << 16),
     ],
     ids=["lanes", "xla", "kvaerno3", "dt"],

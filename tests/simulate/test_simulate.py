@@ -203,7 +203,7 @@ def test_a_bad_lane_ends_alone():
 
     def run(angles):
         more = [good[0]] * (8 - len(angles))
-        return _batch(jnp.array(angles + more), contact, 0.5, ACCURACIES["fast"].walk)
+        return _batch(jnp.array(angles + more), contact, 0.5, ACCURACIES["draft"].walk)
 
     alone, mixed = run(good), run(good + bad)
     kept = np.array(alone.final)[:, :3]
@@ -246,7 +246,7 @@ def test_forward_and_reverse_derivatives_of_a_swing_equal_differences():
 
 def test_single_precision_is_the_users_choice_and_refused_where_too_coarse():
     start = jax.tree_util.tree_map(lambda leaf: leaf.astype(jnp.float32), jb.seed_state())
-    walk = jb.simulate(jb.seed_scene(), start, duration=0.3, accuracy="fast", save="end")
+    walk = jb.simulate(jb.seed_scene(), start, duration=0.3, accuracy="draft", save="end")
     assert walk.final.theta_1.dtype == jnp.float32
     full = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=0.3, save="end")
     np.testing.assert_allclose(np.array(walk.final), np.array(full.final), atol=2e-2)

@@ -24,10 +24,10 @@ def test_a_start_in_float32_stays_so(kind):
 @pytest.mark.slow
 def test_a_simulation_from_numpy_s_float32_is_solved_in_it():
     start = jb.State(*[np.float32(x) for x in jb.seed_state()])
-    walk = jb.simulate(SEED, start, duration=0.05, accuracy="fast", solver="rodas3p", save="end")
+    walk = jb.simulate(SEED, start, duration=0.05, accuracy="draft", solver="rodas3p", save="end")
     assert walk.final.theta_1.dtype == jnp.float32
     rolling = jb.RigidScene(SEED.walker, SEED.ground)
-    rolled = jb.rigid_walk(rolling, jb.dynamics.rigid_state(start), footsteps=1, accuracy="fast")
+    rolled = jb.rigid_walk(rolling, jb.dynamics.rigid_state(start), footsteps=1, accuracy="draft")
     assert rolled.final.theta_1.dtype == jnp.float32
     assert rolled.outcome is jb.Ending.WALKING
 

@@ -24,13 +24,13 @@ def test_a_slip_speed_is_resolved_and_what_is_given_stays():
     assert float(tolerances("balanced", None, None, sticky).rtol) < 1e-8
     assert tolerances("balanced", 1e-6, 1e-9, sticky) == (1e-6, 1e-9)
     larger = jb.seed_scene(v0=1e-8, g=9.8e-4)
-    fine, less = (float(tolerances("fast", None, None, s).rtol) for s in (sticky, larger))
+    fine, less = (float(tolerances("draft", None, None, s).rtol) for s in (sticky, larger))
     assert less == pytest.approx(100.0 * fine)
     weightless = jb.seed_scene(v0=1e-8, g=0.0)
-    assert float(tolerances("fast", None, None, weightless).rtol) == ACCURACIES["fast"].walk
-    traced = jax.vmap(lambda v0: tolerances("fast", None, None, jb.seed_scene(v0=v0)).rtol)
+    assert float(tolerances("draft", None, None, weightless).rtol) == ACCURACIES["draft"].walk
+    traced = jax.vmap(lambda v0: tolerances("draft", None, None, jb.seed_scene(v0=v0)).rtol)
     found = traced(jnp.array([1e-8, 1e-4])).tolist()
-    assert found == [pytest.approx(fine, rel=1e-14), ACCURACIES["fast"].walk]
+    assert found == [pytest.approx(fine, rel=1e-14), ACCURACIES["draft"].walk]
 
 
 @pytest.mark.parametrize("v0", [1e-6, 1e-8])

@@ -78,7 +78,7 @@ def test_a_walker_without_friction_slides():
         friction=jb.laws.Frictionless(),
         clearance=jb.laws.AlwaysTouching(),
     )
-    labelling = gaitless(scene, jb.seed_state(), accuracy="fast")
+    labelling = gaitless(scene, jb.seed_state(), accuracy="draft")
     axes = {"theta_stance": [0.0], "theta_swing": [0.0], "omega_stance": [0.0], "hip_vx": [4.0]}
     axes["omega_swing"] = [0.0]
     found = labelling(jb.starts.grid(scene, axes, place=True).batch(labelling, 0, 1).states)
@@ -305,7 +305,7 @@ def test_bristles_start_straight():
         clearance=seed.clearance,
     )
     straight = jb.dynamics.BristleState(*jb.seed_state(), *[np.zeros(())] * 2)
-    labelling = gaitless(scene, straight, accuracy="fast", footsteps=1)
+    labelling = gaitless(scene, straight, accuracy="draft", footsteps=1)
     short, full = (stacked([state] * 2) for state in (jb.seed_state(), straight))
     same(labelling(short), labelling(full))
     found = jb.sweep(labelling, jb.starts.GivenStarts(short), look_for_gaits=False)

@@ -13,7 +13,7 @@ from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same
 
 SCENE = jb.seed_scene()
-LABELLING = gaitless(SCENE, jb.seed_state(), accuracy="fast")
+LABELLING = gaitless(SCENE, jb.seed_state(), accuracy="draft")
 BOUNDS = {"theta_stance": (-0.1, 0.3), "omega_stance": (-2.0, 0.0), "hip_vx": (0.1, 0.9)}
 
 

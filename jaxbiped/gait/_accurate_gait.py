@@ -1,0 +1,143 @@
+"""Gait to a wanted accuracy, with error bars by two witnesses.
+
+One is the ten times looser solve that every gait has beside it, the other another method of steps.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped.gait._fixed_point_search import Search
+from jaxbiped.gait._gait import Gait, Measures
+from jaxbiped.gait._solver import orbit_solver
+from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
+from jaxbiped.solve._error_estimate import Judged, refine
+from jaxbiped.solve._units import relative_to_scene
+from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
+
+_FIRST = 1e-2
+"""First tolerance as a share of the relative error wanted, at most the draft's."""
+_FINEST = 1e-9
+"""Finest tolerance of gaits, that of "tight": Newton's method comes to no finer residual."""
+_COLUMNS = 10.0
+"""Tolerance of the columns over that of the state, as in the named accuracies."""
+_SAFETY = 2.0
+"""Error bars over the larger change of both witnesses. Without it a derivative of the spectral
+radius lay beyond its bar by an eighth (the seed's gait at an accuracy of 1e-2)."""
+_NUMBERS = ("period", "step_length", "speed", "peak_normal")
+
+
+def accurate_gait(
+    find: Callable[..., Gait],
+    scene: AbstractScene,
+    wanted: float,
+    *,
+    guess: PyTree,
+    solver: PyTree,
+    radius: bool,
+) -> Gait:
+    """The gait whose estimated relative error is at most `wanted`, or as small as can be had.
+
+    Args:
+        find: finds a gait from a guess at an `accuracy`, by a `solver` of its own or another.
+        scene: the scene, known numbers.
+        wanted: relative error [–].
+        guess: the user's, or None.
+        solver: the method of steps, or None for the usual one; the witness takes Rodas5P, or
+            Rodas4P where that is the method itself.
+        radius: whether derivatives of the spectral radius are wanted.
+    """
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves((scene, guess))):
+        raise ArgumentError(
+            f"accuracy = {wanted:g} is not allowed under jit, vmap or differentiation: name one of "
+            f"{', '.join(GAIT_ACCURACIES)} there."
+        )
+    fifth = isinstance(orbit_solver(solver, rigid=not scene.compliant), Rodas5P)
+    other = "rodas4p" if fifth else "rodas5p"
+    near = guess
+
+    def attempt(tolerance: float) -> tuple[Gait, Judged]:
+        nonlocal near
+        # Arrays: inputs of the compiled programs, which no round compiles anew.
+        precision = Precision(jnp.asarray(tolerance), jnp.asarray(_COLUMNS * tolerance))
+        gait = find(near, accuracy=precision, solver=solver)
+        if gait.outcome is not Search.FOUND:
+            return gait, ({}, np.inf, f"the search ended as {gait.outcome}")
+        near = gait.measures.state
+        witness = find(near, accuracy=precision, solver=other)
+        return gait, judge_gait(scene.minimal, gait, witness, radius)
+
+    first = min(max(_FIRST * wanted, _FINEST), 1e-5)
+    dtype = np.dtype(jnp.result_type(*jtu.tree_leaves(scene)))
+    gait, error = refine(attempt, wanted, first=first, dtype=dtype, finest=_FINEST)
+    return eqx.tree_at(lambda each: each.error, gait, error, is_leaf=lambda leaf: leaf is None)
+
+
+def judge_gait(scene: AbstractScene, gait: Gait, other: Gait, radius: bool) -> Judged:
+    """Error bars of `measures`, `multipliers` and `sensitivities`.
+
+    Relative errors: of measures to themselves, of states and times in the scene's l and √(l/g), of
+    multipliers to the largest or 1, of a measure's elasticities to its largest one.
+    """
+    if other.outcome is not Search.FOUND:
+        return {}, np.inf, f"another method's search ended as {other.outcome}"
+    bars = {
+        "measures": jtu.tree_map(_larger, gait.measure_errors, gait.measures, other.measures),
+        "multipliers": _larger(gait.multiplier_errors, gait.multipliers, other.multipliers),
+        "sensitivities": jtu.tree_map(
+            _larger, gait.sensitivity_errors, gait.sensitivities, other.sensitivities
+        ),
+    }
+    of, found = bars["measures"], gait.measures
+    shares = [relative_to_scene(scene, of.period, of.state)]
+    shares += [_ratio(getattr(of, name), getattr(found, name)) for name in _NUMBERS]
+    multipliers = np.abs(np.asarray(gait.multipliers))
+    shares.append(_ratio(bars["multipliers"].max(), max(1.0, multipliers.max())))
+    slopes, unknown = _elasticity_shares(scene, gait, bars["sensitivities"], radius)
+    worst = float(np.max([*shares, *slopes]))
+    relative = worst if np.isfinite(worst) else np.inf
+    return bars, relative, unknown
+
+
+def _elasticity_shares(
+    scene: AbstractScene, gait: Gait, bars: Measures, radius: bool
+) -> tuple[list[float], str]:
+    """Relative errors of the sensitivities, and a sentence where there are none to be had."""
+    if not gait.parameters:
+        return [], ""
+    values = parameter_values(scene)
+    sizes = np.abs([float(values[name]) for name in gait.parameters])
+    sizes = np.where(sizes > 0.0, sizes, 1.0)
+    names = [*_NUMBERS, "spectral_radius"] if radius else list(_NUMBERS)
+    shares, lacking = [], []
+    for name in names:
+        slopes, errors = (
+            np.asarray(getattr(each, name)) * sizes for each in (gait.sensitivities, bars)
+        )
+        if not np.all(np.isfinite(slopes)):
+            lacking.append(name)
+        shares.append(_ratio(errors.max(), np.abs(slopes).max()))
+    if not lacking:
+        return shares, ""
+    told = " and ".join(each.replace("_", " ") for each in lacking)
+    return shares, f"derivatives of the {told} are unknown: the law's force jumps there"
+
+
+def _larger(estimate: Any, told: Any, other: Any) -> np.ndarray:
+    """The larger of an estimated error and what another method changes, with a safety factor."""
+    change = np.abs(np.asarray(told) - np.asarray(other))
+    return _SAFETY * np.maximum(np.asarray(estimate), change)
+
+
+def _ratio(error: Any, value: Any) -> float:
+    size = abs(float(value))
+    return float(error) / size if size > 0.0 else float("inf")

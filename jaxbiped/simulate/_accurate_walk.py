@@ -1,0 +1,135 @@
+"""Walk to a wanted accuracy, with estimates of its global error by two witnesses.
+
+One witness is the same method at a looser tolerance, the other another method.
+"""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped._ending import Ending
+from jaxbiped.simulate._simulation import Simulation
+from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name
+from jaxbiped.solve._error_estimate import LOOSER, Judged, check_wanted, refine
+from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._units import relative_to_scene
+from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
+
+_FIRST = 1e-2
+"""First tolerance as a share of the relative error wanted: errors of walks are about 6 to 80
+tolerances (the seed's walk of two seconds, 1e-5 to 1e-10), and bars a few times that."""
+
+_FINEST_FIRST = 1e-10
+"""Finest tolerance to begin with."""
+
+
+def check_accurate_walk(accuracy: str | float, **replaced: object) -> float | None:
+    """The relative error wanted; None where an accuracy is asked for by name.
+
+    Raises:
+        ArgumentError: an unknown name, a number that is not above 0, or `replaced` arguments that
+            a number leaves no room for.
+    """
+    if isinstance(accuracy, str):
+        check_accuracy_name(accuracy)
+        return None
+    if isinstance(accuracy, jax.core.Tracer):  # type: ignore[unreachable]
+        raise ArgumentError("accuracy is traced: a number must be known beforehand.")
+    check_wanted(accuracy, **replaced)
+    return float(accuracy)
+
+
+def accurate_walk(run: Simulation, wanted: float) -> Trajectory:
+    """The walk whose estimated relative error is at most `wanted`, or as small as can be had.
+
+    Tolerances are inputs of the compiled programs: no round compiles anything anew.
+
+    Raises:
+        ArgumentError: under `jit`, `vmap` or differentiation.
+    """
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(run)):
+        raise ArgumentError(
+            f"accuracy = {wanted:g} is not allowed under jit, vmap or differentiation: name one of "
+            f"{', '.join(ACCURACIES)} there."
+        )
+    share = float(run.atol) / float(run.rtol)
+    other = solver_named("rodas4p" if isinstance(run.solver, Rodas5P) else "rodas5p")
+    # Rodas4P takes about as many steps as Rodas5P at a ten times looser tolerance.
+    other_looser = LOOSER if isinstance(run.solver, Rodas5P) else 1.0
+
+    def solved(tolerance: float, **changes: Any) -> Trajectory:
+        rtol = np.asarray(tolerance, run.rtol.dtype)
+        atol = np.asarray(share * tolerance, run.rtol.dtype)
+        return dataclasses.replace(
+            run, rtol=jax.numpy.asarray(rtol), atol=jax.numpy.asarray(atol), **changes
+        )()
+
+    def attempt(tolerance: float) -> tuple[Trajectory, Judged]:
+        walk = solved(tolerance)
+        witnesses = (
+            solved(LOOSER * tolerance),
+            solved(other_looser * tolerance, solver=other),
+        )
+        return walk, judge_walk(run.scene.minimal, walk, witnesses)
+
+    # What cannot be met is told with the error that can: not at once by the finest steps.
+    first = min(max(_FIRST * wanted, _FINEST_FIRST), float(run.rtol) * 10.0)
+    walk, error = refine(attempt, wanted, first=first, dtype=run.rtol.dtype)
+    return dataclasses.replace(walk, error=error)
+
+
+def judge_walk(scene: PyTree, walk: Trajectory, witnesses: tuple[Trajectory, ...]) -> Judged:
+    """Error bars of a walk from other solves of it: fields `t`, `state` and what else was asked."""
+    if walk.outcome in (Ending.OUT_OF_STEPS, Ending.SOLVER_FAILED):
+        return _unknown(walk), np.inf, f"the solve ended as {walk.outcome}"
+    if any(int(each.ending) != int(walk.ending) for each in witnesses):
+        return _unknown(walk), np.inf, ""
+    told = [_on_times_of(walk, each) for each in witnesses]
+    own = _outputs(walk)
+    if any(_shapes(each) != _shapes(own) for each in told):
+        return _unknown(walk), np.inf, ""
+    bars = jtu.tree_map(_largest_change, own, *told)
+    relative = relative_to_scene(scene, bars["t"], bars["state"])
+    if "arrivals" in bars:
+        reached = bars["arrivals"]
+        relative = max(relative, relative_to_scene(scene, reached.t, reached.state))
+    return bars, relative, ""
+
+
+def _outputs(walk: Trajectory) -> dict[str, Any]:
+    found = {name: getattr(walk, name) for name in ("t", "state", "arrivals", "lowest", "highest")}
+    return jtu.tree_map(np.asarray, {k: v for k, v in found.items() if v is not None})
+
+
+def _on_times_of(walk: Trajectory, other: Trajectory) -> dict[str, Any]:
+    """What another solve tells at a walk's own times; at the end, its own end."""
+    found = _outputs(other)
+    if walk.dense is None:
+        return found
+    times = np.array(walk.t)
+    inside = np.clip(times, None, found["t"][-1])
+    between = jtu.tree_map(lambda leaf: np.array(leaf), other.at(inside))
+    last = other.final
+    for leaf, end in zip(jtu.tree_leaves(between), jtu.tree_leaves(last), strict=True):
+        leaf[-1] = end
+    times[-1] = found["t"][-1]
+    return found | {"t": times, "state": between}
+
+
+def _largest_change(told: np.ndarray, *others: np.ndarray) -> np.ndarray:
+    # What no arrival filled is infinite in all of them.
+    return np.max([np.where(told == other, 0.0, np.abs(told - other)) for other in others], axis=0)
+
+
+def _shapes(tree: PyTree) -> list[tuple[int, ...]]:
+    return [np.shape(leaf) for leaf in jtu.tree_leaves(tree)]
+
+
+def _unknown(walk: Trajectory) -> dict[str, Any]:
+    return jtu.tree_map(lambda leaf: np.full(leaf.shape, np.inf), _outputs(walk))

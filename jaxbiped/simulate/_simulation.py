@@ -1,0 +1,204 @@
+"""Checked request to simulate, which can be compiled and run at other tolerances."""
+
+from collections.abc import Callable
+from typing import Any
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import Array, ArrayLike, PyTree
+
+from jaxbiped._checks import (
+    ArgumentError,
+    check_choice,
+    check_count,
+    check_positive,
+    check_type,
+    check_unbatched,
+)
+from jaxbiped._types import Numbers, Scalar
+from jaxbiped.compiler import Request
+from jaxbiped.dynamics._bristle_state import BristleState
+from jaxbiped.dynamics._consistent_state import Consistent
+from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._state import State
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.simulate._by_lanes import able_request, by_lanes, prepare_lanes
+from jaxbiped.simulate._by_xla import by_xla, trim
+from jaxbiped.simulate._engine_choice import choose_engine
+from jaxbiped.simulate._saved_times import check_times
+from jaxbiped.simulate._start import check_steps, start_for
+from jaxbiped.simulate._start_height import check_start_height
+from jaxbiped.solve._accuracy import check_precision, tolerances
+from jaxbiped.solve._ending import WATCHES
+from jaxbiped.solve._projected_solver import check_adjoint
+from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._units import Units, si_units, units_of
+from jaxbiped.solve.controllers._footstep_limit import PATIENCE
+
+
+class Simulation(eqx.Module):
+    """A checked request to simulate. `prepare` it, then `compile` it to run it apart from that.
+
+    Attributes:
+        scene, state, duration, rtol, atol, dt, solver, adjoint: as in `simulate`, checked, all of
+            one precision.
+        footsteps, watch, max_solver_steps, section, max_arrivals, extremes: as in `simulate`.
+        correction: how a redundant start was put on its constraints, or None.
+        times: at which to save [s], shape (n,), or None.
+        save_steps: whether every step is saved.
+        units: scale of each leaf of the state, in which `atol` is measured.
+        engine: "xla" or "lanes".
+        replaceable: whether XLA may take over from lanes.
+    """
+
+    scene: Scene | RedundantScene
+    state: PyTree
+    correction: Consistent | None
+    duration: Scalar
+    times: Array | None
+    rtol: Scalar
+    atol: Scalar
+    units: Units
+    dt: Scalar | None
+    solver: diffrax.AbstractSolver[PyTree]
+    adjoint: diffrax.AbstractAdjoint
+    footsteps: int | None = eqx.field(static=True)
+    save_steps: bool = eqx.field(static=True)
+    watch: tuple[str, ...] = eqx.field(static=True)
+    max_solver_steps: int = eqx.field(static=True)
+    engine: str = eqx.field(static=True)
+    replaceable: bool = eqx.field(static=True)
+    section: AbstractSection | None = eqx.field(static=True)
+    max_arrivals: int = eqx.field(static=True)
+    extremes: Callable[..., PyTree] | None = eqx.field(static=True)
+
+    @staticmethod
+    def prepare(
+        scene: Scene | RedundantScene,
+        state: PyTree,
+        *,
+        duration: float | None = None,
+        footsteps: int | None = None,
+        solver: str | diffrax.AbstractSolver[PyTree] = "rodas4",
+        accuracy: str = "balanced",
+        rtol: float | None = None,
+        atol: float | None = None,
+        dt: float | None = None,
+        save: Any = "steps",
+        max_arrivals: int = 64,
+        extremes: Callable[..., PyTree] | None = None,
+        watch: tuple[str, ...] = WATCHES,
+        max_solver_steps: int = 65536,
+        adjoint: diffrax.AbstractAdjoint | None = None,
+        engine: str = "auto",
+    ) -> "Simulation":
+        """Checks the arguments, which are those of `simulate`."""
+        check_type("scene", scene, Scene, RedundantScene)
+        given = state
+        state, correction = start_for(scene, state)
+        if duration is None and footsteps is None:
+            raise ArgumentError("duration = None and footsteps = None: say how long to simulate.")
+        if footsteps is not None:
+            check_count("footsteps", footsteps)
+        allowed_time = PATIENCE * footsteps if footsteps is not None else 0.0
+        time = allowed_time if duration is None else duration
+        for name, value in (("duration", time), ("rtol", rtol), ("atol", atol)):
+            check_unbatched(name, value)
+        check_positive("duration", time, "s")
+        check_count("max_solver_steps", max_solver_steps)
+        for name in watch:
+            check_choice("watch", name, WATCHES)
+        if isinstance(save, str):
+            check_choice("save", save, ("steps", "end"))
+        check_count("max_arrivals", max_arrivals)
+        section = save if isinstance(save, AbstractSection) else None
+        timed = section is None and not isinstance(save, str)
+        if timed:
+            check_times(save, time)
+        relative, absolute = tolerances(accuracy, rtol, atol, scene)
+        dtype = jnp.result_type(jtu.tree_leaves(state)[0])
+        check_precision(scene, dtype)
+        if isinstance(given, State | BristleState):
+            check_start_height(scene, given)
+        method = solver_named(solver)
+        check_steps(method, dt, most_steps=max_solver_steps, duration=time)
+        if isinstance(scene, RedundantScene):
+            check_adjoint(scene.method, adjoint)
+
+        def cast(leaf: ArrayLike) -> Array:
+            return jnp.asarray(leaf, dtype=dtype)
+
+        def known(leaf: ArrayLike) -> Numbers:
+            # As it is where nothing is traced: each array of JAX's costs 0.1 ms.
+            return cast(leaf) if isinstance(leaf, jax.core.Tracer) else np.asarray(leaf, dtype)
+
+        # A tolerance that is given is one in SI units.
+        units = units_of(scene, state)
+        units = units if atol is None else si_units(units)
+        save_steps = isinstance(save, str) and save == "steps"
+        chosen = choose_engine(
+            engine,
+            solver=method,
+            save_steps=save_steps,
+            adjoint=adjoint,
+            leaves=(scene, state, time),
+            dt=dt,
+            redundant=scene.redundant,
+            times=save,
+            section=section,
+        )
+        return Simulation(
+            scene=jtu.tree_map(cast, scene),
+            state=state,
+            correction=correction,
+            duration=cast(time),
+            times=cast(save) if timed else None,
+            rtol=cast(relative),
+            atol=cast(absolute),
+            units=jtu.tree_map(known, units),
+            dt=None if dt is None else cast(dt),
+            solver=method,
+            adjoint=diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint,
+            footsteps=None if footsteps is None else int(footsteps),
+            save_steps=save_steps,
+            watch=tuple(watch),
+            max_solver_steps=int(max_solver_steps),
+            engine=chosen,
+            replaceable=engine == "auto" and section is None,
+            section=section,
+            max_arrivals=int(max_arrivals),
+            extremes=extremes,
+        )
+
+    def __call__(self) -> Trajectory:
+        """Compiles what is not compiled yet, and runs."""
+        request = self.lane_request()
+        return trim(by_xla(self)) if request is None else by_lanes(self, request)
+
+    def lane_request(self) -> Request | None:
+        """What it asks of `jaxbiped.compiler.LANES`; None where XLA runs it."""
+        return able_request(self)
+
+    def compile(self) -> "CompiledSimulation":
+        """Compiles the solve, so that its run can be timed by itself."""
+        if (request := self.lane_request()) is not None:
+            return CompiledSimulation(prepare_lanes(self, request), self)
+        return CompiledSimulation(by_xla.lower(self).compile(), self)
+
+
+class CompiledSimulation:
+    """A compiled request; call it to run."""
+
+    def __init__(self, program: Callable[[Simulation], Trajectory], request: Simulation) -> None:
+        self._program = program
+        self._request = request
+
+    def __call__(self) -> Trajectory:
+        """Runs the solve and waits for it."""
+        return trim(jax.block_until_ready(self._program(self._request)))

@@ -1,0 +1,18 @@
+"""Coverage of error bars, at the experiment's quick size."""
+
+import pytest
+
+from tests.drawn import assert_is_drawn
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
+
+
+def test_true_errors_lie_within_their_bars(tmp_path):
+    numbers, figures = quick_run("accuracy_coverage", tmp_path)
+    assert_is_drawn(figures["accuracy_coverage.png"])
+    assert numbers["walks"]["silently_wrong"] == 0
+    state = numbers["coverage"]["state"]
+    assert state["resolved"] >= 40
+    assert state["covered"] >= 0.9 * state["resolved"]
+    assert set(numbers["coverage"]) >= {"period", "multipliers", "sensitivities"}
