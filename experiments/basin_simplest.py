@@ -18,7 +18,7 @@ from jaxbiped.plot.style import new_figure
 
 SLOPES = (0.004, 0.009)
 SIDES, QUICK_SIDES = (200, 400), (100, 200)
-TOLERANCES = {"fast": 1e-4, "balanced": 1e-6}
+TOLERANCES = {"draft": 1e-4, "balanced": 1e-6}
 DRAWN, QUICK_DRAWN = 400, 100
 CHECKED, QUICK_CHECKED = 300, 40
 """Starts that SciPy walks too, at each slope."""

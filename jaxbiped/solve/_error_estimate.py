@@ -100,7 +100,8 @@ def refine(
             best = (result, bars, relative, tolerance)
         stalled = np.isfinite(before) and relative > _GAIN * before
         if relative <= wanted or hopeless or stalled or tolerance <= floor:
-            reason = hopeless or f"the floor of {dtype} here: finer steps gain nothing"
+            ended = f"rounding of {dtype}: finer steps gain nothing" if stalled else ""
+            reason = hopeless or ended or f"{floor:.0e} is the finest tolerance"
             break
         reason = f"{_ROUNDS} tolerances were tried"
         known = np.isfinite(relative)
