@@ -1,7 +1,7 @@
 """Simulators of others on the bouncing ball, where they are installed: MuJoCo MJX and Warp.
 
-MuJoCo's soft constraints cancel the share `IMPEDANCE` of all other forces while they act and give
-the floor that share of its stiffness: its ball has a truth of its own, in the same closed form.
+MuJoCo's soft constraints cancel the share `IMPEDANCE` of all other forces while they act: its ball
+has a truth of its own, in the same closed form.
 """
 
 import dataclasses
@@ -37,12 +37,11 @@ _MODEL = """
 def mujoco_law(problem: Problem) -> Problem | None:
     """The ball as MuJoCo's constraint has it, or None where the two differ by more than numbers.
 
-    Damping does: the constraint lets go where the ball would fall freely anyway.
+    Under damping the constraint lets go elsewhere, where the ball would fall freely anyway.
     """
     if problem.c != 0.0:
         return None
-    stiffness = IMPEDANCE * problem.K
-    return dataclasses.replace(problem, K=stiffness, weight_in_contact=1.0 - IMPEDANCE)
+    return dataclasses.replace(problem, weight_in_contact=1.0 - IMPEDANCE)
 
 
 def by_mjx(problem: Problem, dt: float) -> Run:

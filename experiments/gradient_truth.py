@@ -87,9 +87,9 @@ def _seconds(run: Run, repeats: int) -> float:
 
 
 def _print(options: Options, rows: list[dict[str, Any]]) -> None:
-    options.say(f"{'problem':17s}{'way':28s}{'setting':12s}{'state':>9s}{'gradient':>10s}  said")
+    options.say(f"{'problem':19s}{'way':28s}{'setting':12s}{'state':>9s}{'gradient':>10s}  said")
     for row in rows:
-        start = f"{row['problem']:17s}{row['way']:28s}"
+        start = f"{row['problem']:19s}{row['way']:28s}"
         if row["outcome"] != "answered":
             options.say(f"{start}{row['outcome']}")
             continue
@@ -108,10 +108,14 @@ def _draw(options: Options, rows: list[dict[str, Any]]) -> Any:
     )
     for ax, problem in zip(panels, PROBLEMS, strict=True):
         own = [row for row in answered if row["problem"] == problem.name]
-        for name in dict.fromkeys(row["way"] for row in own):
+        for colour, name in enumerate(dict.fromkeys(row["way"] for row in answered)):
             points = [row for row in own if row["way"] == name]
+            if not points:
+                continue
             errors = [[row[key] for row in points] for key in ("state_error", "gradient_error")]
-            (line,) = ax.loglog(*errors, "o-", label=name)
+            # The two semi-implicit steps are the same: rings about dots.
+            ring = dict(markersize=10.0, markerfacecolor="none") if name == "Warp" else {}
+            (line,) = ax.loglog(*errors, "o-", color=f"C{colour}", label=name, **ring)
             if points[0]["said"] is not None:
                 said = [row["said"] for row in points]
                 ax.loglog(
