@@ -44,7 +44,7 @@ def objectives_of(scene):
 
 
 def usual_gait(scene, guess=None, accuracy="balanced"):
-    """One kind of search for all tests, as their functionals are of one set of names."""
+    """One kind of search for all tests here, compiled once for each scene."""
     gait = jb.find_gait(scene, guess, radius_sensitivities=False, accuracy=accuracy, engine="lanes")
     assert gait.outcome is jb.gait.Search.FOUND
     return gait
@@ -75,8 +75,7 @@ def test_gradients_are_those_of_central_differences(which):
                 k: jb.with_parameters(scene, {varied: own * (1.0 + k * step)})
                 for k in (-2, -1, 1, 2)
             }
-            # Of all of them each time: other names are another program to compile.
-            at = {k: evaluation(each, names, guess, "tight")[0] for k, each in scenes.items()}
+            at = {k: evaluation(each, kind, guess, "tight")[0] for k, each in scenes.items()}
             for name in kind:
                 f = {k: each.values[name] for k, each in at.items()}
                 size = abs(tight.values[name])
