@@ -5,18 +5,28 @@ CPU time and steps. Rows lie in trade.jsonl as they come: a run that was cut off
 fail stay, in a band of their own.
 """
 
+import _trade_batches
+import _trade_gaits
+import _trade_slopes
 import _trade_walks
 from _options import Options, parse
 from _trade_store import Store
 from tqdm import tqdm
+
+GROUPS = (
+    _trade_walks.cases,
+    _trade_batches.cases,
+    _trade_slopes.cases,
+    _trade_gaits.cases,
+    _trade_gaits.stepping_cases,
+)
 
 
 def main() -> None:
     options = parse(__doc__ or "")
     options.out.mkdir(parents=True, exist_ok=True)
     store = Store(options.path("trade_quick.jsonl" if options.quick else "trade.jsonl"))
-    groups = [_trade_walks]
-    cases = [case for group in groups for case in group.cases(store, options.quick)]
+    cases = [case for group in GROUPS for case in group(store, options.quick)]
     for case in tqdm([case for case in cases if not store.measured(case)], unit="cases"):
         row = store.measure(case)
         tqdm.write(f"{case.group}: {case.way}, {case.setting}: {row['outcome']} {row['errors']} {row['cpu_s']}")

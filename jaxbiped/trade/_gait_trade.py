@@ -48,15 +48,18 @@ class GaitTrade(NamedTuple):
     def truth(self) -> Truth | None:
         """By Rodas5P at the finest tolerance, its floor by Rodas4P's; None without a gait."""
         finest = _FINEST[self.scene.compliant]
-        gaits = [self._find(Way(solver, "auto", "", finest)) for solver in _REFERENCES]
-        if any(gait.outcome is not Search.FOUND for gait in gaits):
-            return None
-        return truth_of(*map(gait_values, gaits))
+        first, second = (self.values(Way(s, "auto", "", finest)) for s in _REFERENCES)
+        return None if first is None or second is None else truth_of(first, second)
+
+    def values(self, way: Way) -> Values | None:
+        """What a way gives; None where it finds no gait."""
+        gait = self.find(way)
+        return gait_values(gait) if gait.outcome is Search.FOUND else None
 
     def row(self, way: Way, truth: Truth) -> Row:
         """The row of one way; steps are those of the gait's last cycle."""
         try:
-            gait, work = work_of(lambda: self._find(way), self.repeats)
+            gait, work = work_of(lambda: self.find(way), self.repeats)
         except ArgumentError as error:
             return failed_row(way.name, way.setting, f"refused: {error}")
         found = gait.outcome is Search.FOUND
@@ -70,7 +73,8 @@ class GaitTrade(NamedTuple):
             attempted=int(gait.solver_steps),
         )
 
-    def _find(self, way: Way) -> Gait:
+    def find(self, way: Way) -> Gait:
+        """The gait by one way: with its derivatives, but without the spectral radius's."""
         return find_gait(
             self.scene,
             parameters=self.parameters,
