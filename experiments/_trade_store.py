@@ -58,11 +58,19 @@ class Store:
             if "truth" not in entry and entry["group"] == group
         ]
 
+    def truths(self) -> dict[str, Truth]:
+        """The truths that were solved, by name."""
+        return {
+            entry["truth"]: truth_of(*(_arrays(entry[k]) for k in ("first", "second")))
+            for entry in self._entries
+            if "truth" in entry
+        }
+
     def truth(self, name: str, references: Callable[[], tuple[Any, Any]]) -> Truth:
         """A truth and its floor, from what two references give; solved once."""
-        for entry in self._entries:
-            if entry.get("truth") == name:
-                return truth_of(*(_arrays(entry[k]) for k in ("first", "second")))
+        known = self.truths().get(name)
+        if known is not None:
+            return known
         first, second = references()
         self._add({"truth": name, "first": _lists(first), "second": _lists(second)})
         return truth_of(first, second)

@@ -15,7 +15,7 @@ from _trade_store import Case, Store
 import jaxbiped as jb
 from jaxbiped.trade import Row, Truth, WalkTrade, Way, failed_row, row_of, work_of
 
-DURATION, QUICK_DURATION = 2.0, 0.2
+DURATION, QUICK_DURATION = 2.0, 0.45
 FINEST = 1e-12
 LANES = ("rodas4", "rodas5p", "rodas4p", "rodas3p")
 THROUGH_XLA = ("rodas4", "rodas5p", "kvaerno3", "kvaerno5", "tsit5", "dopri8")

@@ -5,31 +5,104 @@ CPU time and steps. Rows lie in trade.jsonl as they come: a run that was cut off
 fail stay, in a band of their own.
 """
 
+from typing import Any
+
 import _trade_batches
 import _trade_gaits
 import _trade_slopes
 import _trade_walks
 from _options import Options, parse
+from _trade_pictures import draw
 from _trade_store import Store
 from tqdm import tqdm
 
-GROUPS = (
+from jaxbiped.trade import Row, cheapest, cost_at
+
+CASES = (
     _trade_walks.cases,
     _trade_batches.cases,
     _trade_slopes.cases,
     _trade_gaits.cases,
     _trade_gaits.stepping_cases,
 )
+ERRORS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
+"""At which ways are compared, never at equal tolerance."""
 
 
 def main() -> None:
     options = parse(__doc__ or "")
-    options.out.mkdir(parents=True, exist_ok=True)
     store = Store(options.path("trade_quick.jsonl" if options.quick else "trade.jsonl"))
-    cases = [case for group in GROUPS for case in group(store, options.quick)]
+    cases = [case for group in CASES for case in group(store, options.quick)]
     for case in tqdm([case for case in cases if not store.measured(case)], unit="cases"):
-        row = store.measure(case)
-        tqdm.write(f"{case.group}: {case.way}, {case.setting}: {row['outcome']} {row['errors']} {row['cpu_s']}")
+        store.measure(case)
+    rows = {group: store.rows(group) for group in dict.fromkeys(case.group for case in cases)}
+    floors = {name: truth.floor for name, truth in store.truths().items()}
+    compared = {group: comparison(found) for group, found in rows.items()}
+    report(options, rows, floors, compared)
+    options.finish(
+        {
+            "floors": floors,
+            "counts": {
+                "rows": sum(map(len, rows.values())),
+                "failed": sum(row.outcome != "ok" for found in rows.values() for row in found),
+            },
+            "rows": {group: [row.numbers() for row in found] for group, found in rows.items()},
+            "at_equal_error": compared,
+            "picture": draw(options, rows, floors),
+        }
+    )
+
+
+def comparison(rows: list[Row]) -> dict[str, Any]:
+    """By error axis: steps and CPU time of every way at equal errors, and the cheapest setting."""
+    axes = dict.fromkeys(name for row in rows for name in row.errors)
+    ways = dict.fromkeys(row.way for row in rows)
+    table: dict[str, Any] = {}
+    for axis in axes:
+        mine = {way: [row for row in rows if row.way == way] for way in ways}
+        table[axis] = {
+            "steps": {way: at_errors(found, axis, "attempted") for way, found in mine.items()},
+            "cpu_s": {way: at_errors(found, axis, "cpu_s") for way, found in mine.items()},
+            "cheapest_by_cpu": [_best(rows, axis, error) for error in ERRORS],
+        }
+    return table
+
+
+def at_errors(rows: list[Row], axis: str, cost: str) -> list[float | None]:
+    """A way's cost at each of the errors, None where it does not reach them."""
+    return [cost_at(rows, axis, error, lambda row: getattr(row, cost)) for error in ERRORS]
+
+
+def _best(rows: list[Row], axis: str, error: float) -> list[str] | None:
+    best = cheapest(rows, axis, error, lambda row: row.cpu_s)
+    return None if best is None else [best.way, best.setting]
+
+
+def report(
+    options: Options,
+    rows: dict[str, list[Row]],
+    floors: dict[str, dict[str, float]],
+    compared: dict[str, Any],
+) -> None:
+    for group, found in rows.items():
+        options.say(f"\n{group}; the references disagree by {_told(floors.get(group, {}))}")
+        for row in found:
+            work = "" if row.cpu_s is None else f"{1e3 * row.cpu_s:10.2f} ms of CPU"
+            steps = "" if row.attempted is None else f", {row.attempted} steps"
+            options.say(
+                f"  {row.way:42}{row.setting:12}{_told(row.errors)}{work}{steps}"
+                + ("" if row.outcome == "ok" else f"  {row.outcome.upper()}")
+            )
+        for axis, table in compared[group].items():
+            options.say(f"  CPU time [ms] at equal errors of {axis}")
+            options.say(f"    {'':40}" + "".join(f"{error:>9.0e}" for error in ERRORS))
+            for way, times in table["cpu_s"].items():
+                cells = ["–" if t is None else f"{1e3 * t:.3g}" for t in times]
+                options.say(f"    {way:40}" + "".join(f"{cell:>9}" for cell in cells))
+
+
+def _told(errors: dict[str, float | None]) -> str:
+    return ", ".join(f"{k} {'–' if v is None else f'{v:.1e}'}" for k, v in errors.items())
 
 
 if __name__ == "__main__":

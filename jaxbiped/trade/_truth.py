@@ -27,11 +27,14 @@ class Truth(NamedTuple):
     floor: dict[str, float]
 
     def errors(self, found: Values) -> dict[str, float]:
-        """Errors of what a solve gave; infinite where it is no number, or not as many numbers."""
+        """Errors of what a solve gave; infinite where it is no number, or not as many numbers.
+
+        Nothing is told of an axis whose truth has no numbers, as of heel strikes that never came.
+        """
         return {
             name: _error(found[name], self.values[name], scale)
             for name, scale in self.scales.items()
-            if name in found
+            if name in found and np.size(self.values[name])
         }
 
 
@@ -50,8 +53,8 @@ def truth_of(values: Values, other: Values) -> Truth:
 def _scale(name: str, value: np.ndarray) -> float:
     if name in _IN_UNITS:
         return 1.0
-    largest = float(np.max(np.abs(value)))
-    return max(largest, 1.0) if name in _AT_LEAST_ONE else largest
+    largest = float(np.max(np.abs(value), initial=0.0))
+    return max(largest, 1.0) if name in _AT_LEAST_ONE or largest == 0.0 else largest
 
 
 def _error(found: np.ndarray, true: np.ndarray, scale: float) -> float:

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import jax
 
-_ENOUGH = 20.0
-"""A run that takes longer is not repeated [s]."""
+_ENOUGH = 3.0
+"""Runs that took so long together are not repeated again [s]."""
 
 
 class Work(NamedTuple):
@@ -30,14 +30,14 @@ def work_of(run: Callable[[], Any], repeats: int) -> tuple[Any, Work]:
 
     Args:
         run: solves; what it compiles is kept for its next call.
-        repeats: warm runs of which the median counts; one where a run takes longer than 20 s.
+        repeats: warm runs of which the median counts; fewer where they take over 3 s together.
 
     Returns:
         What it returned last, and its work.
     """
     first, found = _timed(run)
     spans: list[tuple[float, float]] = []
-    while len(spans) < repeats and not (spans and spans[0][0] > _ENOUGH):
+    while not spans or (len(spans) < repeats and sum(wall for wall, _ in spans) < _ENOUGH):
         span, found = _timed(run)
         spans.append(span)
     wall, cpu = (statistics.median(span[k] for span in spans) for k in range(2))
