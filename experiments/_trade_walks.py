@@ -73,9 +73,17 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
     for dt in FIXED_STEPS[:1] if quick else FIXED_STEPS:
         how = functools.partial(_semi_implicit, walk, dt, truth)
         yield Case("walk", "semi-implicit Euler", f"dt={dt:g}", how)
+    if not quick:
+        yield from _laws(store, seed)
+
+
+def cases_through_xla(store: Store, quick: bool) -> Iterator[Case]:
+    """Of diffrax's solvers, of ours through XLA, and of redundant coordinates: slow to compile."""
     if quick:
         return
-    yield from _laws(store, seed)
+    seed = jb.seed_scene()
+    truth = functools.partial(seed_truth, store, quick)
+    walk = walk_of(seed, quick)
     for solver in THROUGH_XLA:
         last = -9 if solver.startswith("rodas") else (-6 if solver in EXPLICIT else -7)
         yield from _ours(walk, "walk", solver, "xla", tolerances(quick, last=last), truth)

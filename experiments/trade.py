@@ -20,9 +20,10 @@ from jaxbiped.trade import Row, cheapest, cost_at
 
 CASES = (
     _trade_walks.cases,
-    _trade_batches.cases,
     _trade_slopes.cases,
     _trade_gaits.cases,
+    _trade_batches.cases,
+    _trade_walks.cases_through_xla,
     _trade_gaits.stepping_cases,
 )
 ERRORS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)

@@ -68,6 +68,7 @@ def work_precision(
             label=way,
         )
     if floor is not None and floor > 0.0:
+        ax.set_xlim(left=min(ax.get_xlim()[0], 0.3 * floor))
         ax.axvspan(ax.get_xlim()[0], floor, color="#F3F3F3", zorder=0)
         ax.axvline(floor, color=GROUND_COLOUR, linestyle=":", label="the references' disagreement")
     failed = [row for row in rows if row["outcome"] != "ok"]

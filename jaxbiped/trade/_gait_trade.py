@@ -75,10 +75,12 @@ class GaitTrade(NamedTuple):
 
     def find(self, way: Way) -> Gait:
         """The gait by one way: with its derivatives, but without the spectral radius's."""
+        # Arrays, for one compiled program to serve every tolerance.
+        rtol, tangent_rtol = np.asarray(way.rtol), np.asarray(TANGENT_SHARE * way.rtol)
         return find_gait(
             self.scene,
             parameters=self.parameters,
-            accuracy=Precision(way.rtol, TANGENT_SHARE * way.rtol),
+            accuracy=Precision(rtol, tangent_rtol),
             max_evaluations=_MOST_EVALUATIONS,  # and no stages beyond the first
             radius_sensitivities=False,
             solver=way.solver,

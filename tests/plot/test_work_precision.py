@@ -32,6 +32,8 @@ def test_ways_are_lines_and_failures_a_band():
     best = max(x for way in ("ours", "peer") for x, _ in points_of(ax, way)[0])
     assert all(best < line.get_xdata()[0] < ax.get_xlim()[1] for line in crosses)
     assert crosses[0].get_ydata()[0] == 0.5
+    shaded = ax.patches[0]  # no error is known below the floor
+    assert shaded.get_x() + shaded.get_width() == pytest.approx(1e-7)
     assert [text.get_text() for text in ax.texts] == ["failed"]
 
 
