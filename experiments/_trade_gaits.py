@@ -47,6 +47,9 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
             yield Case("gait", way.name, way.setting, _measuring(trade, way, store, quick))
     if quick:
         return
+    for name, accuracy in jb.ACCURACIES.items():
+        way = Way("rodas4", "lanes", name, accuracy.gait.rtol)
+        yield Case("named gait", way.name, name, _measuring(trade, way, store, quick))
     seed = jb.seed_scene()
     rigid = GaitTrade(jb.RigidScene(walker=seed.walker, ground=seed.ground), repeats=5)
 

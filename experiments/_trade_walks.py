@@ -59,6 +59,9 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
     walk = walk_of(seed, quick)
     for solver in LANES[: 2 if quick else None]:
         yield from _ours(walk, "walk", solver, "lanes", tolerances(quick), truth)
+    for name, accuracy in jb.ACCURACIES.items():
+        way = Way("rodas4", "lanes", name, accuracy.walk)
+        yield Case("named walk", way.name, name, lambda way=way: walk.row(way, truth()))
     for name in PEERS[:1] if quick else PEERS:
         for rtol in tolerances(quick, last=-9):
             how = functools.partial(_peer, walk, name, rtol, truth)
