@@ -1,5 +1,6 @@
 """Cases of a trade study: 4096 walks of two seconds at once."""
 
+import functools
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -31,14 +32,18 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
     count, checked = (QUICK_LANES, QUICK_CHECKED) if quick else (LANES, CHECKED)
     walk, scene = walk_of(jb.seed_scene(), quick), jb.seed_scene()
 
-    def solver_of(solver: str, engine: str, rtol: float) -> Callable[[np.ndarray], Any]:
-        def one(*start: Any) -> Any:
+    @functools.cache
+    def program_of(solver: str, engine: str) -> Callable[..., Any]:
+        def one(rtol: Any, *start: Any) -> Any:
             how: dict[str, Any] = dict(solver=solver, rtol=rtol, save="end", engine=engine)
             end = jb.simulate(scene, jb.State(*start), duration=walk.duration, **how)
             return end.final, end.ending, end.accepted, end.rejected
 
-        many = jax.vmap(one) if engine == "lanes" else jax.jit(jax.vmap(one))
-        return lambda starts: many(*map(jnp.asarray, starts.T))
+        return jax.jit(jax.vmap(one, in_axes=(None, *[0] * 8)))
+
+    def solver_of(solver: str, engine: str, rtol: float) -> Callable[[np.ndarray], Any]:
+        program = program_of(solver, engine)
+        return lambda starts: program(jnp.asarray(rtol), *map(jnp.asarray, starts.T))
 
     def states(found: Any) -> np.ndarray:
         return np.stack(found[0], axis=1)[:checked] / walk.units()

@@ -65,10 +65,17 @@ def by_jacobian(
     solver: str, engine: str, duration: float, rtol: float
 ) -> Callable[[], np.ndarray]:
     """Forward derivatives (8, 3) of a walk: by lanes with steps that heed them."""
+    slopes, zeros = jacobian_of(solver, engine, duration), [jnp.asarray(0.0)] * 3
+    return lambda: np.stack(slopes(zeros, jnp.asarray(rtol)), axis=1)
+
+
+@functools.cache
+def jacobian_of(solver: str, engine: str, duration: float) -> Callable[..., Any]:
+    """The compiled derivative by the logarithms of K, c and ξ, at any tolerance."""
     scene, state = jb.seed_scene(), jb.seed_state()
     leaves = (scene.normal.K, scene.normal.c, scene.friction.xi)
 
-    def final(logs: Any) -> Any:
+    def final(logs: Any, rtol: Any) -> Any:
         moved = [leaf * jnp.exp(log) for leaf, log in zip(leaves, logs, strict=True)]
         new = eqx.tree_at(lambda s: (s.normal.K, s.normal.c, s.friction.xi), scene, moved)
         how: dict[str, Any] = dict(solver=solver, rtol=rtol, save="end", engine=engine)
@@ -76,9 +83,7 @@ def by_jacobian(
             how["adjoint"] = diffrax.ForwardMode()
         return jnp.stack(jb.simulate(new, state, duration=duration, **how).final)
 
-    slopes = jax.jit(jax.jacfwd(final))
-    zeros = [jnp.asarray(0.0)] * 3
-    return lambda: np.stack(slopes(zeros), axis=1)
+    return jax.jit(jax.jacfwd(final))
 
 
 def by_casadi(duration: float, rtol: float) -> Callable[[], np.ndarray]:
