@@ -5,13 +5,15 @@ CPU time and steps. Rows lie in trade.jsonl as they come: a run that was cut off
 fail stay, in a band of their own.
 """
 
+import dataclasses
 from typing import Any
 
 import _trade_batches
 import _trade_gaits
 import _trade_slopes
 import _trade_walks
-from _options import Options, parse
+import tyro
+from _options import Options
 from _trade_pictures import draw
 from _trade_store import Store
 from tqdm import tqdm
@@ -23,18 +25,28 @@ CASES = (
     _trade_slopes.cases,
     _trade_gaits.cases,
     _trade_batches.cases,
-    _trade_walks.cases_through_xla,
     _trade_gaits.stepping_cases,
+    _trade_gaits.cases_through_xla,
+    _trade_walks.cases_through_xla,
 )
 ERRORS = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 """At which ways are compared, never at equal tolerance."""
 
 
+@dataclasses.dataclass(frozen=True)
+class TradeOptions(Options):
+    """Options of the study."""
+
+    stored: bool = False
+    """Report what the store has, and measure nothing more."""
+
+
 def main() -> None:
-    options = parse(__doc__ or "")
+    options = tyro.cli(TradeOptions, description=__doc__)
     store = Store(options.path("trade_quick.jsonl" if options.quick else "trade.jsonl"))
     cases = [case for group in CASES for case in group(store, options.quick)]
-    for case in tqdm([case for case in cases if not store.measured(case)], unit="cases"):
+    left = [] if options.stored else [case for case in cases if not store.measured(case)]
+    for case in tqdm(left, unit="cases"):
         store.measure(case)
     rows = {group: store.rows(group) for group in dict.fromkeys(case.group for case in cases)}
     floors = {name: truth.floor for name, truth in store.truths().items()}
@@ -44,6 +56,7 @@ def main() -> None:
         {
             "floors": floors,
             "counts": {
+                "cases": len(cases),
                 "rows": sum(map(len, rows.values())),
                 "failed": sum(row.outcome != "ok" for found in rows.values() for row in found),
             },

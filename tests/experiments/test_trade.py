@@ -35,7 +35,7 @@ def test_failures_are_rows(made):
     assert all(row["outcome"] == "ok" for row in slopes if row["way"].startswith("rodas"))
     rows = [row for found in numbers["rows"].values() for row in found]
     failed = sum(row["outcome"] != "ok" for row in rows)
-    assert numbers["counts"] == {"rows": len(rows), "failed": failed}
+    assert numbers["counts"] == {"cases": len(rows), "rows": len(rows), "failed": failed}
 
 
 def test_a_second_run_goes_on_from_the_store(made):
