@@ -1,4 +1,4 @@
-"""The seed's gait by the independent equations: footsteps by SciPy's Radau, derivatives by differences.
+"""The seed's gait by the independent equations and SciPy's Radau, its derivatives by differences.
 
 Nothing of `jaxbiped` is used: a footstep ends where the leg that comes to stand passes the slope's
 normal, Newton's method finds the footstep that repeats itself, and derivatives are central
@@ -65,7 +65,7 @@ def jacobian(x: np.ndarray, rtol: float) -> np.ndarray:
 def converged(x: np.ndarray, slopes: np.ndarray, rtol: float, laws: tuple[float, ...]):
     """The footstep that repeats itself near x, by Newton's method with a kept derivative."""
     for _ in range(12):
-        reached, period = footstep(x, rtol, laws)
+        reached, _ = footstep(x, rtol, laws)
         change = np.linalg.solve(slopes - np.eye(6), (reached - x)[FREE])
         x = x.copy()
         x[FREE] -= change

@@ -46,13 +46,9 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
     for solver, engine in ours[: 1 if quick else None]:
         name = f"{solver} by {engine}" + (", steps for the state alone" if engine == "xla" else "")
         for rtol in tolerances(quick, -3, -8):
-            yield case(
-                name, rtol, functools.partial(by_jacobian, solver, engine, duration, rtol)
-            )
+            yield case(name, rtol, functools.partial(by_jacobian, solver, engine, duration, rtol))
     for rtol in tolerances(quick, -5, -10):
-        yield case(
-            "SciPy LSODA, differences", rtol, functools.partial(differences, duration, rtol)
-        )
+        yield case("SciPy LSODA, differences", rtol, functools.partial(differences, duration, rtol))
     if not _casadi.is_installed():
         missing = functools.partial(failed_row, "CasADi CVODES", "rtol=1e-6", "not installed")
         yield Case("slopes", "CasADi CVODES", "rtol=1e-6", missing)
@@ -61,9 +57,7 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
         yield case("CasADi CVODES", rtol, functools.partial(by_casadi, duration, rtol))
 
 
-def by_jacobian(
-    solver: str, engine: str, duration: float, rtol: float
-) -> Callable[[], np.ndarray]:
+def by_jacobian(solver: str, engine: str, duration: float, rtol: float) -> Callable[[], np.ndarray]:
     """Forward derivatives (8, 3) of a walk: by lanes with steps that heed them."""
     slopes, zeros = jacobian_of(solver, engine, duration), [jnp.asarray(0.0)] * 3
     return lambda: np.stack(slopes(zeros, jnp.asarray(rtol)), axis=1)
@@ -123,7 +117,5 @@ def _moved(method: str, duration: float, rtol: float, k: int, step: float) -> np
     laws[k] *= math.exp(step)
     how: dict[str, Any] = dict(method=method, rtol=rtol, atol=1e-2 * rtol, args=(tuple(laws),))
     with np.errstate(over="ignore"):
-        found = solve_ivp(
-            _independent.right_hand_side, (0.0, duration), _independent.START, **how
-        )
+        found = solve_ivp(_independent.right_hand_side, (0.0, duration), _independent.START, **how)
     return found.y[:, -1]

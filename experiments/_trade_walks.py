@@ -183,9 +183,7 @@ def _semi_implicit(walk: WalkTrade, dt: float, truth: Callable[[], Truth]) -> Ro
     program = jax.jit(functools.partial(_equal_steps, walk.scene, dt, steps))
     found, work = work_of(lambda: program(walk.start), walk.repeats)
     values = {"state": np.array([float(x) for x in found]) / walk.units()}
-    return row_of(
-        "semi-implicit Euler", f"dt={dt:g}", "ok", truth(), values, work, attempted=steps
-    )
+    return row_of("semi-implicit Euler", f"dt={dt:g}", "ok", truth(), values, work, attempted=steps)
 
 
 def _equal_steps(scene: jb.Scene, dt: float, steps: int, start: jb.State) -> jb.State:

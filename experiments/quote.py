@@ -18,8 +18,8 @@ RESULTS = Path(__file__).parent / "results"
 PICTURES = {"picture", "pictures"}
 TIMINGS = {
     "batch_ratio", "batch_us", "compile_s", "first_compile_s", "first_result_s", "gaits_s",
-    "cheapest_by_cpu", "cold_cpu_s", "cold_wall_s", "cpu_s", "seconds", "single_us", "wall_ms", "wall_s", "wall_s_run",
-    "warm_cpu_s", "warm_wall_s",
+    "cheapest_by_cpu", "cold_cpu_s", "cold_wall_s", "cpu_s", "seconds", "single_us", "wall_ms",
+    "wall_s", "wall_s_run", "warm_cpu_s", "warm_wall_s",
 }  # fmt: skip
 """Keys of what an idle machine must measure."""
 UNKNOWN = "…"

@@ -58,8 +58,8 @@ def work_precision(
     for k, way in enumerate(ways):
         mine = [row for row in rows if row["way"] == way and _is_shown(row, axis, cost)]
         ax.plot(
-            [_error(row, axis) for row in mine],
-            [row[cost] for row in mine],
+            np.array([_error(row, axis) for row in mine], dtype=float),
+            np.array([row[cost] for row in mine], dtype=float),
             marker=_MARKERS[k // len(_COLOURS) % len(_MARKERS)],
             color=_COLOURS[k % len(_COLOURS)],
             linestyle="-" if k < len(_COLOURS) else "--",

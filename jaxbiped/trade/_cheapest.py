@@ -1,5 +1,6 @@
 """Cost at an equal error, and the setting that has it cheapest."""
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
@@ -47,7 +48,7 @@ def cost_at(rows: Sequence[Row], axis: str, error: float, cost: Cost) -> float |
         return None
     aim = np.log(error)
     found = [points[0][1]] if points[0][0] <= aim else []
-    for (e0, c0), (e1, c1) in zip(points, points[1:], strict=False):
+    for (e0, c0), (e1, c1) in itertools.pairwise(points):
         if e1 <= aim < e0:
             found.append(c0 + (c1 - c0) * (e0 - aim) / (e0 - e1))
     return float(np.exp(min(found))) if found else None

@@ -107,11 +107,9 @@ class WalkTrade(NamedTuple):
 
     def _request(self, way: Way, save: str) -> Simulation:
         how: dict[str, Any] = dict(solver=way.solver, rtol=way.rtol, engine=way.engine)
-        # XLA makes room beforehand for every step that is saved.
-        most = {} if way.engine == "xla" else {"max_solver_steps": _MOST_STEPS}
-        return Simulation.prepare(
-            self.scene, self.start, duration=self.duration, save=save, **how, **most
-        )
+        if way.engine != "xla":  # which makes room beforehand for every step that is saved
+            how["max_solver_steps"] = _MOST_STEPS
+        return Simulation.prepare(self.scene, self.start, duration=self.duration, save=save, **how)
 
 
 def _compiled_once(request: Simulation) -> Callable[[], Trajectory]:
