@@ -36,7 +36,7 @@ def work_precision(
 
     Args:
         rows: as `jaxbiped trade --json` writes them: `way`, `setting`, `outcome`, `errors`, and
-            the costs. Those without the axis are left out, unless they failed.
+            the costs. Rows that have other axes only are left out.
         axis: name of the error axis, such as "state".
         cost: "cpu_s", "seconds" or "attempted".
         floor: error by which the references disagree, in the axis's units.
@@ -71,7 +71,11 @@ def work_precision(
         ax.set_xlim(left=min(ax.get_xlim()[0], 0.3 * floor))
         ax.axvspan(ax.get_xlim()[0], floor, color="#F3F3F3", zorder=0)
         ax.axvline(floor, color=GROUND_COLOUR, linestyle=":", label="the references' disagreement")
-    failed = [row for row in rows if row["outcome"] != "ok"]
+    failed = [
+        row
+        for row in rows
+        if row["outcome"] != "ok" and (axis in row["errors"] or not row["errors"])
+    ]
     if failed:
         _draw_failures(ax, failed, cost, ways)
     dress(ax, "", f"error of {axis.replace('_', ' ')}, relative", COSTS[cost])
