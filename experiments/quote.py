@@ -243,7 +243,7 @@ def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
             times = table.get("cpu_s", {}).get(way, [UNKNOWN] * len(steps))
             if any(each is not None for each in times):
                 yield row(way, *(_milliseconds(times[k]) for k in _COMPARED))
-    for found in numbers["rows"]["stepping"]:
+    for found in numbers["rows"].get("stepping", ()):
         if found["setting"] == "rtol=1e-06":
             yield row(
                 found["way"], str(found["attempted"]),

@@ -52,7 +52,7 @@ def main() -> None:
     floors = {name: truth.floor for name, truth in store.truths().items()}
     compared = {group: comparison(found) for group, found in rows.items()}
     report(options, rows, floors, compared)
-    options.finish(
+    numbers = rounded(
         {
             "floors": floors,
             "counts": {
@@ -62,9 +62,18 @@ def main() -> None:
             },
             "rows": {group: [row.numbers() for row in found] for group, found in rows.items()},
             "at_equal_error": compared,
-            "picture": draw(options, rows, floors),
         }
     )
+    options.finish(numbers | {"picture": draw(options, rows, floors)})
+
+
+def rounded(tree: Any) -> Any:
+    """The same numbers to four digits, more than any of them is worth."""
+    if isinstance(tree, dict):
+        return {key: rounded(value) for key, value in tree.items()}
+    if isinstance(tree, list):
+        return [rounded(value) for value in tree]
+    return float(f"{tree:.4g}") if isinstance(tree, float) else tree
 
 
 def comparison(rows: list[Row]) -> dict[str, Any]:
