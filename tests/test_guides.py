@@ -114,7 +114,7 @@ def test_flags_of_the_command_line_exist(capsys):
     from jaxbiped.cli import main
 
     helps = ""
-    commands = ("walk", "gait", "continue", "fit", "optimise", "basin", "models", "constraints")
+    commands = "walk gait continue fit optimise basin models constraints trade".split()
     for command in commands:
         with pytest.raises(SystemExit):
             main([command, "--help"])
