@@ -177,13 +177,20 @@ def find_gait(
         if staged:
             found, origin = search_along(*searching, origin)
         else:
-            found = search(*searching)
+            found = _walks_only(search(*searching))
         return summarise_gait(spec, scene, start, found, *describing, origin)
     _compile_once(searching, describing, origin)
     found = _search(*searching)
-    if staged and not _is_stable(found):
+    if not staged:
+        found = _walks_only(found)
+    elif not _is_stable(found):
         found, origin = _search_on(searching, modelled, found, engine)
     return summarise_gait(spec, scene, start, found, *describing, origin)
+
+
+def _walks_only(found: Found) -> Found:
+    no_walk = (found.ending == int(Search.FOUND)) & ~found.sound
+    return found._replace(ending=jnp.where(no_walk, int(Search.NO_WALK), found.ending))
 
 
 def _is_stable(found: Found) -> bool:

@@ -39,8 +39,8 @@ class Search(enum.IntEnum):
     - found: the orbit returns to within the residual asked for.
     - no return: the first return already ended in a failure (its `Ending` tells which).
     - not converged: no step reduced the residual any more, or the evaluations allowed were used up.
-    - no walk: an orbit returns, but with a foot deep underground or a step uphill, and no other
-      was found. A search from a guess does not tell.
+    - no walk: an orbit returns, but with a foot deep underground, a step uphill or hardly any
+      time between crossings of the section, and no other was found.
     """
 
     FOUND = 0

@@ -83,7 +83,8 @@ class Gait(eqx.Module):
         evaluations: evaluations of the return map that the search took.
         history: residual of each of them, NaN beyond the last.
         solver_steps: solver steps attempted in the last cycle.
-        sound: whether the orbit is a walk: no foot deep underground, and a step downhill (boolean).
+        sound: whether the orbit is a walk: no foot deep underground, a step downhill,
+            and more than a fraction of a swing between crossings (boolean).
         origin: how the search came to it, which other gaits it saw, and where the seed's gait
             ended on the way to this scene; see `found_by` and `others`.
         orbit: times [s] and states at the ends of the last cycle's solver steps, NaN beyond.

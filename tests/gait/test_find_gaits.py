@@ -18,8 +18,12 @@ def test_many_starts_find_a_stable_and_an_unstable_gait():
     stable = np.asarray(found.gaits.stable)
     assert period[stable] == pytest.approx([0.4408349], abs=1e-6)
     assert period[~stable] == pytest.approx([0.3910974], abs=1e-6)
-    # One start leads to an orbit whose feet swing 9 mm underground.
-    assert np.sum(np.asarray(found.ending) == int(jb.gait.Search.NO_WALK)) == 1
+    # One start leads to an orbit whose feet swing 9 mm underground; a search from it says so, too.
+    underground = np.asarray(found.ending) == int(jb.gait.Search.NO_WALK)
+    assert np.sum(underground) == 1
+    guess = jax.tree.map(lambda leaf: leaf[np.flatnonzero(underground)[0]], starts)
+    alone = jb.find_gait(scene, guess, parameters=(), radius_sensitivities=False)
+    assert str(alone.outcome) == "no walk"
     assert int(np.sum(found.reached)) == int(np.sum(np.asarray(found.which) >= 0))
     assert np.all((np.asarray(found.ending) == 0) == (np.asarray(found.which) >= 0))
     assert np.all(np.diff(np.asarray(found.reached)) <= 0)

@@ -264,7 +264,7 @@ def _states(*shapes):
     [
         (lambda it: jb.labelling(it.scene, footsteps=0), "footsteps = 0 .* whole number"),
         (lambda it: jb.labelling(it.scene, footsteps=2.5), "footsteps = 2.5 .* whole number"),
-        (lambda it: jb.labelling(it.scene, accuracy="best"), "accuracy = 'best' .* fast"),
+        (lambda it: jb.labelling(it.scene, accuracy="best"), "accuracy = 'best' .* draft"),
         (lambda it: jb.labelling(it.scene, rtol=-1.0), "rtol = -1 .* above 0"),
         (lambda it: jb.labelling(it.scene, engine="gpu"), "engine = 'gpu'"),
         (lambda it: jb.labelling(it.scene, solver="kvaerno3"), "rodas3p to rodas5p"),
