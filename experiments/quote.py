@@ -113,6 +113,26 @@ def of_gradient_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
         )
 
 
+def of_bifurcation_elasticities(numbers: dict[str, Any]) -> Iterator[str]:
+    """How the critical slopes move with the contact's stiffness and the feet's radius."""
+    for name, found in numbers["cases"].items():
+        cells = [f"{found['slope_rad']:.6f}"]
+        for parameter in ("K", "c", "J", "d", "r"):
+            known = found["parameters"].get(parameter)
+            cells.append("–" if known is None else f"{known['elasticity']:.4f}")
+        yield row(name, *cells)
+
+
+def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
+    """Errors of state and gradient of each way and setting, and what it says of them."""
+    for each in numbers["rows"]:
+        if each["outcome"] == "answered":
+            said = "nothing" if each["said"] is None else small(each["said"])
+            setting = f"{each['setting']} = {small(each['value'], 0)}"
+            errors = small(each["state_error"]), small(each["gradient_error"])
+            yield row(each["problem"], each["way"], setting, *errors, said)
+
+
 def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
     """In how many fits the intervals hold the truth."""
     inside = {name: each["inside_95"] for name, each in numbers["parameters"].items()}
@@ -282,8 +302,10 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "accuracy_coverage": of_accuracy_coverage,
     "basin_seed": of_basin_seed,
     "basin_simplest": of_basin_simplest,
+    "bifurcation_elasticities": of_bifurcation_elasticities,
     "force_models": of_force_models,
     "gradient_accuracy": of_gradient_accuracy,
+    "gradient_truth": of_gradient_truth,
     "identify": of_identify,
     "ladder": of_ladder,
     "level_ground": of_level_ground,
