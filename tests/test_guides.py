@@ -114,8 +114,8 @@ def test_flags_of_the_command_line_exist(capsys):
     from jaxbiped.cli import main
 
     helps = ""
-    commands = ("walk", "gait", "continue", "fit", "optimise", "basin", "models", "constraints")
-    for command in commands:
+    own = ("walk", "gait", "continue", "fit", "optimise", "basin", "models", "constraints", "trade")
+    for command in own:
         with pytest.raises(SystemExit):
             main([command, "--help"])
         helps += "".join(capsys.readouterr())
