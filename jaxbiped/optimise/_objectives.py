@@ -9,7 +9,9 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
+from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._bifurcation_distance import bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
 from jaxbiped.optimise._jacobian_functionals import (
     JACOBIAN_FUNCTIONALS,
@@ -74,6 +76,8 @@ OBJECTIVES = {
     "slip_distance": Objective(Quantity("slip distance", "$s$", "m"), _of_slip),
     "motor_work": Objective(Quantity("work of the motors", "$W$", "J"), _of_driven),
     "foot_clearance": Objective(Quantity("foot clearance", "$h$", "m"), _of_swing),
+    "fold_distance": Objective(Quantity("distance to the fold in slope", "$D_f$", "rad")),
+    "doubling_distance": Objective(Quantity("distance to the doubling in slope", "$D_d$", "rad")),
 }
 """By name. Those of a cycle: losses and slip are sums over its footsteps.
 
@@ -87,8 +91,14 @@ OBJECTIVES = {
 - radius bound: never below the spectral radius, and smooth also where multipliers meet or have
   equal moduli, where that has corners; see `jacobian_functionals`.
 - sensitivity norm: see `jacobian_functionals`.
+- fold distance, doubling distance: to the nearest in slope, see `bifurcation_distance`; a design
+  that meets none counts as one without a gait.
 """
 _OF_THE_GAIT = ("speed", "step_length", "period", "peak_normal")
+_DISTANCES = {
+    "fold_distance": BranchEvent.FOLD,
+    "doubling_distance": BranchEvent.PERIOD_DOUBLING,
+}
 CLUSTER = JACOBIAN_FUNCTIONALS[:LEADING]
 """What is evaluated for the spectral radius: it, and the next moduli."""
 
@@ -126,7 +136,7 @@ def functionals_for(wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
     of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in wanted)
     if "spectral_radius" in wanted:
         of_jacobian = (*CLUSTER, *(name for name in of_jacobian if name not in CLUSTER))
-    return of_jacobian, bool(set(wanted) - set(of_jacobian) - set(_OF_THE_GAIT))
+    return of_jacobian, bool(set(wanted) - set(of_jacobian) - set(_OF_THE_GAIT) - set(_DISTANCES))
 
 
 def evaluate(
@@ -161,6 +171,9 @@ def evaluate(
         )
         rows |= dict(zip(integral_names(scene), _rows_of(second), strict=True))
         rows["cost_of_transport"] = _cost_of_transport(scene, rows)
+    for name in (name for name in wanted if name in _DISTANCES):
+        told = bifurcation_distance(scene, gait, _DISTANCES[name], accuracy=accuracy)
+        rows[name] = _Row(told.distance, told.error, told.slopes, told.slope_errors)
     kept = {name: rows[name] for name in dict.fromkeys((*wanted, *of_jacobian, *_OF_THE_GAIT))}
     slopes = gait.sensitivities.state
     return Evaluation(
