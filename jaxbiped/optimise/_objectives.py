@@ -70,6 +70,7 @@ OBJECTIVES = {
     "spectral_radius": Objective(Quantity("spectral radius", "$\\rho$")),
     "radius_bound": Objective(Quantity("smooth bound of the spectral radius", "$\\rho_q$")),
     "sensitivity_norm": Objective(Quantity("gait sensitivity norm", "$\\|G\\|$")),
+    "floor_sensitivity": Objective(Quantity("gait sensitivity norm to steps", "$\\|G_h\\|$")),
     "cost_of_transport": Objective(Quantity("cost of transport", "$C$")),
     "impact_loss": Objective(Quantity("energy lost in impacts", "$E_i$", "J")),
     "friction_loss": Objective(Quantity("energy lost to friction", "$E_f$", "J"), _of_friction),
@@ -90,7 +91,7 @@ OBJECTIVES = {
 - foot clearance: least height of the swinging foot, negative where it passes underground.
 - radius bound: never below the spectral radius, and smooth also where multipliers meet or have
   equal moduli, where that has corners; see `jacobian_functionals`.
-- sensitivity norm: see `jacobian_functionals`.
+- sensitivity norm, floor sensitivity: see `jacobian_functionals`.
 - fold distance, doubling distance: to the nearest in slope, see `bifurcation_distance`; a design
   that meets none counts as one without a gait.
 """
