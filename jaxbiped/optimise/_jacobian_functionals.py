@@ -47,6 +47,7 @@ JACOBIAN_FUNCTIONALS = (
     "radius_bound",
     "sensitivity_norm",
     "floor_sensitivity",
+    "strike_divergence",
 )
 SQUARINGS = 6
 """Of the return map's Jacobian P for its bound ‖P⁶⁴‖^(1/64)."""
@@ -80,6 +81,11 @@ def jacobian_functionals(
     Robotics 23 (2007) 1213, with this push as the disturbance. The floor sensitivity is the same
     for each unit of a step in the ground, in leg lengths: from the next footstep on the ground lies
     lower by so much, along the slope's normal.
+
+    The divergence of the foot strike is ln |λ₁ λ₂ …|, by which a footstep changes volumes of phase
+    space about the orbit. A passive rigid walker's swing changes none in canonical coordinates, by
+    Liouville's theorem, so that all of it is the strike's, whatever the coordinates. After Jin,
+    Kistemaker, van Dieën, Daffertshofer and Bruijn, Royal Society Open Science 8 (2021) 201122.
 
     Args:
         scene: the walker.
@@ -232,6 +238,16 @@ def _modulus(k: int, rows: Scalar, length: Scalar, leading: Scalar) -> _Weighed:
     return _Weighed(value, _by_entries(eigen, shares), 2, jnp.zeros_like(length))
 
 
+def _divergence(rows: Scalar, length: Scalar) -> _Weighed:
+    """Without the zeros of the push and of the section."""
+    eigen = _eigen(rows[2:])
+    order = jnp.argsort(-jnp.abs(eigen.values))[:-2]
+    leading = eigen.values[order]
+    shares = jnp.zeros_like(eigen.values).at[order].set(1.0 / leading)
+    value = jnp.sum(jnp.log(jnp.abs(leading)))
+    return _Weighed(value, _by_entries(eigen, shares), len(order), jnp.zeros_like(length))
+
+
 def _radius_bound(sizes: Scalar, rows: Scalar, length: Scalar) -> _Weighed:
     def bound(rows: Scalar) -> Scalar:
         # Without the push, which has no response of its own.
@@ -272,4 +288,6 @@ def _weighed(name: str, y: PyTree, rows: Scalar, length: Scalar, leading: Scalar
         return _radius_bound(sizes, rows, length)
     if name in ("sensitivity_norm", "floor_sensitivity"):
         return _sensitivity_norm(rows, length)
+    if name == "strike_divergence":
+        return _divergence(rows, length)
     return _modulus(JACOBIAN_FUNCTIONALS.index(name), rows, length, leading)

@@ -42,6 +42,14 @@ def _of_friction(scene: Scene | RigidScene) -> str | None:
     return _of_slip(scene)
 
 
+def _of_strike(scene: Scene | RigidScene) -> str | None:
+    if isinstance(scene, Scene):
+        return "its feet press into the ground for a while instead of striking at once"
+    if scene.actuation is not None:
+        return "what drives it changes volumes of phase space, too"
+    return None
+
+
 def _of_swing(scene: Scene | RigidScene) -> str | None:
     if isinstance(scene, Scene) and not isinstance(
         scene.clearance.admits(1, jnp.ones(())), jax.Array
@@ -71,6 +79,9 @@ OBJECTIVES = {
     "radius_bound": Objective(Quantity("smooth bound of the spectral radius", "$\\rho_q$")),
     "sensitivity_norm": Objective(Quantity("gait sensitivity norm", "$\\|G\\|$")),
     "floor_sensitivity": Objective(Quantity("gait sensitivity norm to steps", "$\\|G_h\\|$")),
+    "strike_divergence": Objective(
+        Quantity("divergence of foot strike", "$\\ln|\\det S|$"), _of_strike
+    ),
     "cost_of_transport": Objective(Quantity("cost of transport", "$C$")),
     "impact_loss": Objective(Quantity("energy lost in impacts", "$E_i$", "J")),
     "friction_loss": Objective(Quantity("energy lost to friction", "$E_f$", "J"), _of_friction),
@@ -91,7 +102,7 @@ OBJECTIVES = {
 - foot clearance: least height of the swinging foot, negative where it passes underground.
 - radius bound: never below the spectral radius, and smooth also where multipliers meet or have
   equal moduli, where that has corners; see `jacobian_functionals`.
-- sensitivity norm, floor sensitivity: see `jacobian_functionals`.
+- sensitivity norm, floor sensitivity, strike divergence: see `jacobian_functionals`.
 - fold distance, doubling distance: to the nearest in slope, see `bifurcation_distance`; a design
   that meets none counts as one without a gait.
 """
