@@ -100,9 +100,7 @@ def bifurcation_distance(
     bounds = (own / FACTOR, own * FACTOR) if own != 0.0 else (-STEEPEST, STEEPEST)
     axis = axis_of(scene, along, bounds, None)
     steps = int(gait.orbit[0].shape[0])
-    setup = continuation_setup(
-        scene, axis, footsteps=steps, accuracy=accuracy, engine=gait.engine
-    )
+    setup = continuation_setup(scene, axis, footsteps=steps, accuracy=accuracy, engine=gait.engine)
     event = _nearest(setup, gait, BranchEvent(kind))
     located = None if event is None else _located(setup, event)
     if located is None:
@@ -122,9 +120,7 @@ def bifurcation_distance(
     )
 
 
-def _nearest(
-    setup: ContinuationSetup, gait: Gait, kind: BranchEvent
-) -> BifurcationPoint | None:
+def _nearest(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> BifurcationPoint | None:
     """Of the first bifurcations of a kind in both ways the nearer."""
     own = start_of(setup.scene, setup.axis)
     begin = setup.at_value(setup.recurring(gait.measures.state), own).found

@@ -100,7 +100,9 @@ def jacobian_functionals(
     """
     on = section_of(scene, None)
     groups = {
-        _disturbance(name): tuple(each for each in names if _disturbance(each) == _disturbance(name))
+        _disturbance(name): tuple(
+            each for each in names if _disturbance(each) == _disturbance(name)
+        )
         for name in names
     }
     told = {}

@@ -107,6 +107,11 @@ OBJECTIVES = {
   that meets none counts as one without a gait.
 """
 _OF_THE_GAIT = ("speed", "step_length", "period", "peak_normal")
+_SEARCHED = {
+    "fatal_push": "it is the nearest point of a basin's boundary, found by a search that has no "
+    "derivatives; jb.basins.minimal_fatal_shock tells it of a gait that was found",
+}
+"""What a gait has that is none of a smooth function's values."""
 _DISTANCES = {
     "fold_distance": BranchEvent.FOLD,
     "doubling_distance": BranchEvent.PERIOD_DOUBLING,
@@ -137,6 +142,8 @@ class Evaluation(NamedTuple):
 
 def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective") -> None:
     """Raises `ArgumentError` for an unknown objective, or one that the scene lacks."""
+    if name in _SEARCHED:
+        raise ArgumentError(f"{what} = {name!r} is not allowed: {_SEARCHED[name]}.")
     check_choice(what, name, OBJECTIVES)
     lacks = OBJECTIVES[name].lacks(scene)
     if lacks is not None:

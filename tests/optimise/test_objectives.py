@@ -253,5 +253,7 @@ def test_an_objective_that_a_scene_lacks_is_refused_in_a_sentence():
         check_objective("strike_divergence", scene)
     with pytest.raises(jb.ArgumentError, match=r"strike_divergence.*drives"):
         check_objective("strike_divergence", DRIVEN["push-off"])
+    with pytest.raises(jb.ArgumentError, match=r"fatal_push.*minimal_fatal_shock"):
+        check_objective("fatal_push", scene)
     with pytest.raises(jb.ArgumentError, match="objective = 'beauty'"):
         check_objective("beauty", scene)

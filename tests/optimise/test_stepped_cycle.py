@@ -33,7 +33,9 @@ def norm_of_response(scene, gait, first, drop):
 
 def norm(scene, gait):
     names = ("floor_sensitivity",)
-    return float(jacobian_functionals(scene, gait.measures.state, names, accuracy="tight").values[0])
+    return float(
+        jacobian_functionals(scene, gait.measures.state, names, accuracy="tight").values[0]
+    )
 
 
 def tight_gait(scene):
