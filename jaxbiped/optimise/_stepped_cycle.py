@@ -86,7 +86,7 @@ class SteppedSection(AbstractSection):
 
 
 def _stepped(scene: AbstractScene, y: PyTree) -> AbstractScene:
-    """The scene with the step in front of the swinging leg; a rigid walker has it in its section."""
+    """The scene with the step before the swinging leg; a rigid walker's section has it."""
     if not scene.compliant:
         return scene
     ground = SteppedGround(scene.ground.slope, scene.ground.g, y.drop * scene.walker.l)

@@ -23,5 +23,5 @@ class SteppedGround(eqx.Module):
 
 
 def drop_under(ground: object, leg: int) -> Scalar | None:
-    """How much lower than the slope the ground under a leg's foot lies [m]; None where it is even."""
+    """How much lower the ground under a leg's foot lies than the slope [m]; None for even."""
     return ground.drop if isinstance(ground, SteppedGround) and leg == 1 else None
