@@ -2,8 +2,7 @@
 
 Writes level_ground.png. Left the simplest walker (Kuo 2002), driven by push-off on level ground or
 by gravity on the slope where its steps are as long. Right the seed's walker, each way to drive it
-along its own strength, and the cheapest rigid designs at some speeds. Every first gait is found
-without a guess.
+along its own strength, and the cheapest rigid designs. Every first gait is found without a guess.
 """
 
 from typing import Any, NamedTuple

@@ -13,6 +13,7 @@ from jaxtyping import PyTree
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._fixed_point_search import LOOSER
 from jaxbiped.gait._orbit import slopes_of
 from jaxbiped.gait._poincare_map import (
@@ -38,7 +39,7 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import Precision, precision_of
 from jaxbiped.variational._adjoint_solve import COUNT
-from jaxbiped.variational._hybrid_system import section_of
+from jaxbiped.variational._hybrid_system import AbstractSystem, section_of
 
 LEADING = 3
 """Moduli that are told apart: of a pair of conjugate multipliers once."""
@@ -105,21 +106,24 @@ def jacobian_functionals(
         )
         for name in names
     }
-    told = {}
+    systems: dict[str, tuple[PyTree, AbstractSystem, AbstractSection]] = {
+        "step": (unstepped(state), stepped(scene), SteppedSection(on)),
+        "push": (undisturbed(state), disturbed(scene), MotionSection(on)),
+    }
+    told = []
     for disturbance, group in groups.items():
-        if disturbance == "step":
-            y, system, section = unstepped(state), stepped(scene), SteppedSection(on)
-        else:
-            y, system, section = undisturbed(state), disturbed(scene), MotionSection(on)
+        y, system, section = systems[disturbance]
         spec = cycle_spec(scene, system, section, footsteps, accuracy, engine)
-        told[disturbance] = _functionals(spec, scene, y, group, accuracy)
+        told.append(_functionals(spec, scene, y, group, accuracy))
     if len(told) == 1:
-        return next(iter(told.values()))
+        return told[0]
     every = [name for group in groups.values() for name in group]
     order = jnp.asarray([every.index(name) for name in names])
-    parts = zip(*(each[:4] for each in told.values()), strict=True)
-    rows = [jnp.concatenate(part)[order] for part in parts]
-    return Functionals(*rows, jnp.max(jnp.stack([each.code for each in told.values()])))
+    values, errors, slopes, slope_errors = (
+        jnp.concatenate([each[k] for each in told])[order] for k in range(4)
+    )
+    code = jnp.max(jnp.stack([each.code for each in told]))
+    return Functionals(values, errors, slopes, slope_errors, code)
 
 
 def _disturbance(name: str) -> str:
