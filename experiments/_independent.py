@@ -18,6 +18,8 @@ START = np.array([0.0, 0.395, -0.2479, 0.1655, 0.49797, 0.05853, -0.0052, -1.256
 MASS, INERTIA, LENGTH, CENTRE, RADIUS = 1.0, 0.0096, 0.40, 0.10, 0.08
 STIFFNESS, DAMPING = 1e6, 1e7
 STATIC, KINETIC, PEAK_SPEED, DECAY = 0.50, 0.40, 1e-4, 1000.0
+LAWS = (STIFFNESS, DAMPING, DECAY)
+"""K, c and ξ, which derivatives are taken by."""
 PULL_X, PULL_Z = 9.8 * math.sin(0.02), -9.8 * math.cos(0.02)
 
 try:
@@ -31,31 +33,32 @@ compiled: Callable[..., Any] = (
 
 
 @compiled
-def contact(hip_z, vx, vz, sine, cosine, rate):
+def contact(hip_z, vx, vz, sine, cosine, rate, laws=LAWS):
     """Force on one foot along the slope and along its normal [N]."""
+    stiffness, damping, decay = laws
     arm = LENGTH - RADIUS
     depth = RADIUS - (hip_z - arm * cosine)
     if depth <= 0.0 or rate >= 0.0:
         return 0.0, 0.0
     sinking = -(vz + arm * sine * rate)
-    normal = max(0.0, STIFFNESS * depth * math.sqrt(depth) + DAMPING * depth * sinking)
+    normal = max(0.0, stiffness * depth * math.sqrt(depth) + damping * depth * sinking)
     slip = vx + arm * cosine * rate + RADIUS * rate
     speed = abs(slip)
     if speed < PEAK_SPEED:
         size = STATIC * normal * (1.0 - ((speed - PEAK_SPEED) / PEAK_SPEED) ** 2)
     else:
-        decay = math.exp(-DECAY * (speed - PEAK_SPEED))
-        size = normal * (KINETIC + (STATIC - KINETIC) * decay)
+        left = math.exp(-decay * (speed - PEAK_SPEED))
+        size = normal * (KINETIC + (STATIC - KINETIC) * left)
     return -math.copysign(size, slip), normal
 
 
 @compiled
-def rates(y):
+def rates(y, laws=LAWS):
     """Time derivative of the eight numbers of the state."""
     _, hip_z, angle_1, angle_2, vx, vz, rate_1, rate_2 = y
     s_1, c_1, s_2, c_2 = math.sin(angle_1), math.cos(angle_1), math.sin(angle_2), math.cos(angle_2)
-    along_1, normal_1 = contact(hip_z, vx, vz, s_1, c_1, rate_1)
-    along_2, normal_2 = contact(hip_z, vx, vz, s_2, c_2, rate_2)
+    along_1, normal_1 = contact(hip_z, vx, vz, s_1, c_1, rate_1, laws)
+    along_2, normal_2 = contact(hip_z, vx, vz, s_2, c_2, rate_2, laws)
     arm, moment, total = LENGTH - RADIUS, MASS * CENTRE, 2.0 * MASS
     spin_1, spin_2 = moment * rate_1 * rate_1, moment * rate_2 * rate_2
     push_x = total * PULL_X + along_1 + along_2 + s_1 * spin_1 + s_2 * spin_2
@@ -79,9 +82,9 @@ def rates(y):
 
 
 @compiled
-def right_hand_side(t, y):
+def right_hand_side(t, y, laws=LAWS):
     """What `scipy.integrate.solve_ivp` calls."""
-    return np.array(rates((y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7])))
+    return np.array(rates((y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7]), laws))
 
 
 def solved(

@@ -18,8 +18,8 @@ RESULTS = Path(__file__).parent / "results"
 PICTURES = {"picture", "pictures"}
 TIMINGS = {
     "batch_ratio", "batch_us", "compile_s", "first_compile_s", "first_result_s", "gaits_s",
-    "cold_cpu_s", "cold_wall_s", "seconds", "single_us", "wall_ms", "wall_s", "wall_s_run",
-    "warm_cpu_s", "warm_wall_s",
+    "cheapest_by_cpu", "cold_cpu_s", "cold_wall_s", "cpu_s", "seconds", "single_us", "wall_ms",
+    "wall_s", "wall_s_run", "warm_cpu_s", "warm_wall_s",
 }  # fmt: skip
 """Keys of what an idle machine must measure."""
 UNKNOWN = "…"
@@ -111,6 +111,26 @@ def of_gradient_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
             str(both["steps"]),
             small(both["unit_multiplier"]),
         )
+
+
+def of_bifurcation_elasticities(numbers: dict[str, Any]) -> Iterator[str]:
+    """How the critical slopes move with the contact's stiffness and the feet's radius."""
+    for name, found in numbers["cases"].items():
+        cells = [f"{found['slope_rad']:.6f}"]
+        for parameter in ("K", "c", "J", "d", "r"):
+            known = found["parameters"].get(parameter)
+            cells.append("–" if known is None else f"{known['elasticity']:.4f}")
+        yield row(name, *cells)
+
+
+def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
+    """Errors of state and gradient of each way and setting, and what it says of them."""
+    for each in numbers["rows"]:
+        if each["outcome"] == "answered":
+            said = "nothing" if each["said"] is None else small(each["said"])
+            setting = f"{each['setting']} = {small(each['value'], 0)}"
+            errors = small(each["state_error"]), small(each["gradient_error"])
+            yield row(each["problem"], each["way"], setting, *errors, said)
 
 
 def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
@@ -229,18 +249,72 @@ def of_accuracy_coverage(numbers: dict[str, Any]) -> Iterator[str]:
         yield row(name, *(str(found[each]) for each in counts), ratio)
 
 
+def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
+    """Floors, errors of the named accuracies, and what ways cost at equal errors."""
+    floors, counts = numbers["floors"], numbers["counts"]
+    yield f"{counts['rows']} rows, {counts['failed']} of them failures"
+    for group, axis in (
+        ("walk", "state"), ("walk", "step_time"), ("walk", "energy"), ("slopes", "slopes"),
+        ("gait", "period"), ("gait", "multiplier"), ("gait", "gradient"),
+    ):  # fmt: skip
+        yield row(f"{UNKNOWN}", small(floors[group][axis]), *_named(numbers, group, axis))
+    for group, axis in (
+        ("walk", "state"), ("batch", "state"), ("slopes", "slopes"), ("gait", "multiplier"),
+        ("gait", "gradient"),
+    ):  # fmt: skip
+        table = numbers["at_equal_error"][group][axis]
+        for way, steps in table["steps"].items():
+            times = table.get("cpu_s", {}).get(way, [UNKNOWN] * len(steps))
+            if any(each is not None for each in times):
+                yield row(way, *(_milliseconds(times[k]) for k in _COMPARED))
+    for found in numbers["rows"].get("stepping", ()):
+        if found["setting"] == "rtol=1e-06":
+            yield row(
+                found["way"], str(found["attempted"]),
+                *(small(found["errors"][axis]) for axis in ("period", "gradient")),
+            )  # fmt: skip
+    for name in ("smoothed laws", "v0 ten times wider"):
+        (found,) = (each for each in numbers["rows"][name] if each["setting"] == "rtol=1e-06")
+        yield row(name, str(found["attempted"]), small(found["errors"]["state"]))
+
+
+_COMPARED = (1, 2, 3, 4, 5)
+"""Which of the errors at which ways are compared are quoted: 1e-3 to 1e-7."""
+
+
+def _milliseconds(seconds: float | str | None) -> str:
+    if seconds is None:
+        return "–"
+    if isinstance(seconds, str):
+        return UNKNOWN
+    return f"{1e3 * seconds:.{0 if seconds >= 1e-2 else 1}f}"
+
+
+def _named(numbers: dict[str, Any], group: str, axis: str) -> list[str]:
+    """Errors by the named accuracies, or by three tolerances where there are none."""
+    rows = numbers["rows"].get(f"named {group}")
+    if rows is None:
+        settings = ("rtol=1e-05", "rtol=1e-06", "rtol=1e-08")
+        ours = [each for each in numbers["rows"][group] if each["way"] == "rodas4 by lanes"]
+        rows = [each for name in settings for each in ours if each["setting"] == name]
+    return [small(each["errors"][axis]) for each in rows]
+
+
 QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "accuracy_coverage": of_accuracy_coverage,
     "basin_seed": of_basin_seed,
     "basin_simplest": of_basin_simplest,
+    "bifurcation_elasticities": of_bifurcation_elasticities,
     "force_models": of_force_models,
     "gradient_accuracy": of_gradient_accuracy,
+    "gradient_truth": of_gradient_truth,
     "identify": of_identify,
     "ladder": of_ladder,
     "level_ground": of_level_ground,
     "period_doubling": of_period_doubling,
     "search_robustness": of_search_robustness,
     "slope_branch": of_slope_branch,
+    "trade": of_trade,
 }
 """Of each experiment: the phrases and rows that the pages quote."""
 

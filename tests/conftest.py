@@ -39,6 +39,12 @@ def _few_programs_are_kept():
         gc.collect()
 
 
+def pytest_collection_finish():
+    """What imports made stays: no collection has to look at it again."""
+    gc.collect()
+    gc.freeze()
+
+
 def pytest_collection_modifyitems(items):
     """Files with slow tests begin first, so that no worker is left alone with one at the end."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}

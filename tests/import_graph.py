@@ -22,6 +22,7 @@ LAYERS = [
     "basins",
     "sweep",
     "optimise",
+    "trade",
     "plot",
     "cli",
 ]

@@ -19,6 +19,7 @@ from jaxbiped.cli._models import Models
 from jaxbiped.cli._optimise import Optimise
 from jaxbiped.cli._refusal import one_sentence
 from jaxbiped.cli._report import Report as Report
+from jaxbiped.cli._trade import Trade
 from jaxbiped.cli._walk import Walk
 
 _Command = (
@@ -30,6 +31,7 @@ _Command = (
     | Annotated[Basin, subcommand("basin")]
     | Annotated[Models, subcommand("models")]
     | Annotated[Constraints, subcommand("constraints")]
+    | Annotated[Trade, subcommand("trade")]
     | Annotated[None, subcommand("version")]
 )
 

@@ -6,10 +6,9 @@ import math
 import time
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
 from jaxbiped._checks import ArgumentError, check_count
@@ -18,6 +17,7 @@ from jaxbiped._types import JsonObject
 from jaxbiped.basins._fractions import fractions as fractions_of
 from jaxbiped.basins._label import label_names
 from jaxbiped.cli._basin_options import StartsOptions
+from jaxbiped.cli._option_fields import Engine, Group, group
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions
 from jaxbiped.dynamics._rigid_state import RigidState
@@ -49,8 +49,7 @@ class SweepOptions:
     """After which a start that is not certain yet is unresolved."""
     accuracy: str = "draft"
     """How accurately to solve: draft, balanced or tight."""
-    engine: str = "auto"
-    """What computes: xla, lanes, or auto for the faster one that can."""
+    engine: Engine = "auto"
     store: Path | None = None
     """Zarr store for the results; a run that was killed continues there."""
     any_version: bool = False
@@ -76,18 +75,10 @@ class SweepOptions:
 class Basin:
     """Label many starts: which walk on and in which gait, and how the others end."""
 
-    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=SceneOptions
-    )
-    starts: Annotated[StartsOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=StartsOptions
-    )
-    sweep: Annotated[SweepOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=SweepOptions
-    )
-    output: Annotated[OutputOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=OutputOptions
-    )
+    scene: Group[SceneOptions] = group(SceneOptions)
+    starts: Group[StartsOptions] = group(StartsOptions)
+    sweep: Group[SweepOptions] = group(SweepOptions)
+    output: Group[OutputOptions] = group(OutputOptions)
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""

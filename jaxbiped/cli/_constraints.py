@@ -3,13 +3,11 @@
 import dataclasses
 import math
 from pathlib import Path
-from typing import Annotated
-
-from tyro.conf import OmitArgPrefixes
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._constraint_comparison import ConstraintRun, Integrator, compare_constraints
+from jaxbiped.cli._option_fields import Group, group
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.constraints._constraint_methods import CONSTRAINT_METHODS
@@ -23,12 +21,8 @@ class Constraints:
     """Compare the seven ways to hold the hip together: violation, error against the minimal
     formulation, and time."""
 
-    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=SceneOptions
-    )
-    start: Annotated[StartOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=StartOptions
-    )
+    scene: Group[SceneOptions] = group(SceneOptions)
+    start: Group[StartOptions] = group(StartOptions)
     methods: tuple[str, ...] = tuple(CONSTRAINT_METHODS)
     """Names of the methods to compare."""
     integrators: tuple[str, ...] = ("rodas4:1e-6", "euler:dt=1e-6", "runge2:dt=1e-6")

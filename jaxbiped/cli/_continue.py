@@ -5,10 +5,11 @@ import time
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import OmitArgPrefixes, arg
+from tyro.conf import arg
 
 from jaxbiped import _clock
 from jaxbiped._types import JsonObject
+from jaxbiped.cli._option_fields import Engine, GaitAccuracy, Group, group
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
@@ -24,15 +25,9 @@ _STABLE = {True: "yes", False: "no", None: "undecided"}
 class ContinueGait:
     """Follow the periodic gait along a parameter; print its stability and its bifurcations."""
 
-    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=SceneOptions
-    )
-    start: Annotated[StartOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=StartOptions
-    )
-    output: Annotated[OutputOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=OutputOptions
-    )
+    scene: Group[SceneOptions] = group(SceneOptions)
+    start: Group[StartOptions] = group(StartOptions)
+    output: Group[OutputOptions] = group(OutputOptions)
     along: str = "slope"
     """The parameter, by its name."""
     first: Annotated[float, arg(name="from")] = 0.005
@@ -47,10 +42,8 @@ class ContinueGait:
     """Largest arclength of a step, in which the range counts 1."""
     max_points: int = 200
     """Points followed in each direction at most."""
-    accuracy: str = "balanced"
-    """How accurately to solve: balanced or tight."""
-    engine: str = "auto"
-    """What computes: xla, lanes, or auto for the faster one that can."""
+    accuracy: GaitAccuracy = "balanced"
+    engine: Engine = "auto"
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""

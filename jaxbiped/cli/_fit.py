@@ -3,12 +3,12 @@
 import dataclasses
 import math
 from pathlib import Path
-from typing import Annotated
 
-from tyro.conf import OmitArgPrefixes, Positional
+from tyro.conf import Positional
 
 from jaxbiped._checks import ArgumentError, check_writable_file
 from jaxbiped._types import JsonObject
+from jaxbiped.cli._option_fields import Engine, GaitAccuracy, Group, group
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import SceneOptions
 from jaxbiped.identify._fit_gait import fit_gait
@@ -26,13 +26,9 @@ class Fit:
     """JSON file of measured gaits (see jaxbiped.identify.read_measured)."""
     vary: str
     """Names of the parameters to fit, with commas between: K,c,mu_kinetic."""
-    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=SceneOptions
-    )
-    accuracy: str = "balanced"
-    """How accurately to solve: balanced or tight."""
-    engine: str = "auto"
-    """What computes: xla, lanes, or auto for the faster one that can."""
+    scene: Group[SceneOptions] = group(SceneOptions)
+    accuracy: GaitAccuracy = "balanced"
+    engine: Engine = "auto"
     max_evaluations: int = 50
     """Scenes tried, at most."""
     json: Path | None = None

@@ -6,15 +6,15 @@ import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
 from jaxbiped._checks import check_choice, check_count
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._driven import cost_sentence, gait_cost
+from jaxbiped.cli._option_fields import Engine, Group, group
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.dynamics._rigid_checks import rigid_checks
@@ -48,23 +48,16 @@ _MOST_ROWS = 64
 class FindGait:
     """Find the periodic gait near a start; print its multipliers and its elasticities."""
 
-    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=SceneOptions
-    )
-    start: Annotated[StartOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=StartOptions
-    )
-    output: Annotated[OutputOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=OutputOptions
-    )
+    scene: Group[SceneOptions] = group(SceneOptions)
+    start: Group[StartOptions] = group(StartOptions)
+    output: Group[OutputOptions] = group(OutputOptions)
     accuracy: str = "balanced"
     """How accurately to solve: draft, balanced or tight; or a relative error, such as 1e-4."""
     footsteps: int = 1
     """Footsteps in a cycle."""
     section: str | None = None
     """Where a cycle begins: mid-stance (the usual one) or heel-strike (a rigid walker's)."""
-    engine: str = "auto"
-    """What computes: xla, lanes, or auto for the faster one that can."""
+    engine: Engine = "auto"
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""

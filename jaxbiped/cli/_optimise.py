@@ -4,14 +4,13 @@ import dataclasses
 import math
 import sys
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-from tyro.conf import OmitArgPrefixes
 
 from jaxbiped._checks import ArgumentError, check_choice, check_not_negative, check_writable_file
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._gait import finite, parts
+from jaxbiped.cli._option_fields import Engine, GaitAccuracy, Group, group
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import SceneOptions
 from jaxbiped.continuation._nearest_bifurcation import NearestBifurcation
@@ -36,9 +35,7 @@ class Optimise:
 
     vary: str
     """Parameters that vary, d,r,J (half to double their values) or with bounds d=0.05:0.2,r,J."""
-    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=SceneOptions
-    )
+    scene: Group[SceneOptions] = group(SceneOptions)
     maximise: str | None = None
     """Measure of the gait to maximise, such as speed."""
     minimise: str | None = None
@@ -53,10 +50,8 @@ class Optimise:
     """Further runs, from the best of scattered designs."""
     seed: int = 0
     """Seed of these designs."""
-    accuracy: str = "balanced"
-    """How accurately to solve: balanced or tight."""
-    engine: str = "auto"
-    """What computes: xla, lanes, or auto for the faster one that can."""
+    accuracy: GaitAccuracy = "balanced"
+    engine: Engine = "auto"
     basin: int = 1024
     """Starts about the gait that are labelled for the certificate's basin; 0 for none."""
     footsteps: int = 200

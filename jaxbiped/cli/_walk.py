@@ -5,11 +5,10 @@ import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import jax.tree_util as jtu
 import numpy as np
-from tyro.conf import OmitArgPrefixes
 
 from jaxbiped import _clock
 from jaxbiped._ending import Ending
@@ -17,6 +16,7 @@ from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._driven import cost_sentence, walk_cost
 from jaxbiped.cli._held import constraint_numbers, constraint_sentence
+from jaxbiped.cli._option_fields import Group, group
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._rigid_walk import run_rigid_walk
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, SolveOptions, StartOptions
@@ -47,18 +47,10 @@ _SHOWN = 60.0
 class Walk:
     """Simulate the seed's walker from a start; print its footsteps and how it ended."""
 
-    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=SceneOptions
-    )
-    start: Annotated[StartOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=StartOptions
-    )
-    solve: Annotated[SolveOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=SolveOptions
-    )
-    output: Annotated[OutputOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=OutputOptions
-    )
+    scene: Group[SceneOptions] = group(SceneOptions)
+    start: Group[StartOptions] = group(StartOptions)
+    solve: Group[SolveOptions] = group(SolveOptions)
+    output: Group[OutputOptions] = group(OutputOptions)
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""

@@ -4,9 +4,7 @@ import dataclasses
 from collections.abc import Iterable
 from inspect import signature
 from pathlib import Path
-from typing import Annotated, Any
-
-from tyro.conf import OmitArgPrefixes
+from typing import Any
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -20,6 +18,7 @@ from jaxbiped._checks import (
 from jaxbiped._types import as_float
 from jaxbiped.cli._actuation_options import ActuationOptions
 from jaxbiped.cli._default_start import default_start
+from jaxbiped.cli._option_fields import Engine, Group, group
 from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.scene._ground import Ground
@@ -101,9 +100,7 @@ class SceneOptions:
     xi: float = _SEED["xi"]
     """Stribeck rate [s/m]."""
 
-    driven: Annotated[ActuationOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=ActuationOptions
-    )
+    driven: Group[ActuationOptions] = group(ActuationOptions)
 
     def scene(self) -> Scene | RigidScene | RedundantScene:
         """The scene that these options describe; raises `ArgumentError`."""
@@ -255,8 +252,7 @@ class SolveOptions:
     """Steps of this size [s], in place of tolerances; what --solver euler needs."""
     max_solver_steps: int | None = None
     """Cap on the solver's steps: unless given 65536 for each ten seconds, at most 1048576."""
-    engine: str = "auto"
-    """What computes: xla, lanes, or auto for the faster one that can."""
+    engine: Engine = "auto"
 
     def wanted(self) -> float | None:
         """The relative error asked for; None where tolerances decide. Raises `ArgumentError`."""

@@ -3,6 +3,12 @@
 from jaxbiped.continuation._axis import Axis as Axis
 from jaxbiped.continuation._bifurcation_curve import BifurcationCurve as BifurcationCurve
 from jaxbiped.continuation._bifurcation_curve import bifurcation_curve as bifurcation_curve
+from jaxbiped.continuation._bifurcation_sensitivities import (
+    BifurcationSensitivities as BifurcationSensitivities,
+)
+from jaxbiped.continuation._bifurcation_sensitivities import (
+    bifurcation_sensitivities as bifurcation_sensitivities,
+)
 from jaxbiped.continuation._bifurcations import BifurcationPoint as BifurcationPoint
 from jaxbiped.continuation._bifurcations import BranchEvent as BranchEvent
 from jaxbiped.continuation._branch import Branch as Branch

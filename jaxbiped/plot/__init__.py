@@ -29,3 +29,4 @@ from jaxbiped.plot._refined_basin import refined_basin as refined_basin
 from jaxbiped.plot._rigid_leg_angle import rigid_leg_angles as rigid_leg_angles
 from jaxbiped.plot._strobe import gait_strobe as gait_strobe
 from jaxbiped.plot._tornado import elasticities as elasticities
+from jaxbiped.plot._work_precision import work_precision as work_precision

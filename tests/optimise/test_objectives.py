@@ -54,9 +54,15 @@ def objectives_of(scene):
             yield name
 
 
-def evaluation(scene, names, guess=None, accuracy="balanced"):
+def usual_gait(scene, guess=None, accuracy="balanced"):
+    """One kind of search for all tests here, compiled once for each scene."""
     gait = jb.find_gait(scene, guess, radius_sensitivities=False, accuracy=accuracy, engine="lanes")
     assert gait.outcome is jb.gait.Search.FOUND
+    return gait
+
+
+def evaluation(scene, names, guess=None, accuracy="balanced"):
+    gait = usual_gait(scene, guess, accuracy)
     return evaluate(scene, gait, names, accuracy), gait.measures.state
 
 
@@ -151,7 +157,7 @@ def test_losses_are_those_of_the_energy_ledger():
 
 def test_the_rigid_clearance_is_that_of_the_rigid_checks():
     scene = SCENES["rigid"]
-    gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
+    gait = usual_gait(scene)
     found = cycle_functionals(scene, gait.measures.state)
     clearance = float(found.values[integral_names(scene).index("foot_clearance")])
     lowest = float(jb.dynamics.rigid_checks(scene, gait.orbit[1]).clearance.min())
@@ -162,10 +168,9 @@ def test_the_rigid_clearance_is_that_of_the_rigid_checks():
 def test_the_bound_is_above_the_radius_and_the_moduli_are_the_multipliers():
     for which in ("rigid", "stribeck"):
         scene = SCENES[which]
-        gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
-        names = JACOBIAN_FUNCTIONALS[:4]
-        found = jacobian_functionals(scene, gait.measures.state, names)
-        values = dict(zip(names, np.asarray(found.values), strict=True))
+        gait = usual_gait(scene)
+        found = jacobian_functionals(scene, gait.measures.state)
+        values = dict(zip(JACOBIAN_FUNCTIONALS, np.asarray(found.values), strict=True))
         upper = np.asarray(gait.multipliers)
         upper = np.sort(np.abs(upper[upper.imag >= 0.0]))[::-1]
         assert values["spectral_radius"] == pytest.approx(upper[0], rel=1e-4)
@@ -176,7 +181,7 @@ def test_the_bound_is_above_the_radius_and_the_moduli_are_the_multipliers():
 def test_the_sensitivity_norm_is_the_response_of_footsteps():
     """Footsteps after a lean of the ground for the first one, followed by the return map itself."""
     scene = SCENES["rigid"]
-    gait = jb.find_gait(scene, accuracy="tight", parameters=(), radius_sensitivities=False)
+    gait = usual_gait(scene, accuracy="tight")
     push = 1e-4
     told = []
     for sign in (1.0, -1.0):
@@ -191,11 +196,8 @@ def test_the_sensitivity_norm_is_the_response_of_footsteps():
         told.append(np.asarray(rows))
     size = np.asarray([float(gait.measures.step_length), float(gait.measures.period)])
     response = (told[0] - told[1]) / (2.0 * push) / size
-    norm = float(
-        jacobian_functionals(
-            scene, gait.measures.state, ("sensitivity_norm",), accuracy="tight"
-        ).values[0]
-    )
+    found = jacobian_functionals(scene, gait.measures.state, accuracy="tight")
+    norm = float(found.values[JACOBIAN_FUNCTIONALS.index("sensitivity_norm")])
     assert norm == pytest.approx(np.sqrt(np.sum(response**2)), rel=1e-5)
 
 

@@ -56,13 +56,12 @@ def test_random_scenes_and_starts_end_alike(noise, slope, factor):
             assert float(a) == pytest.approx(float(b), abs=2e-6)
 
 
-@pytest.mark.parametrize(
-    ("name", "solver"),
-    [("seed", name) for name in ("rodas3p", "rodas4p", "rodas5p")] + [("frictionless", "rodas4")],
-)
-def test_every_solver_and_law_agrees(name, solver):
+@pytest.mark.parametrize("solver", ["rodas3p", "rodas4", "rodas4p", "rodas5p"])
+def test_every_solver_agrees(solver):
+    """On the scene that XLA compiles soonest; random scenes above are of the seed's laws."""
     options = dict(duration=0.2, solver=solver, rtol=1e-8, watch=())
-    ends = [_end(jb.seed_state(), e, SCENES[name], **options) for e in ("lanes", "xla")]
+    scene = SCENES["frictionless"]
+    ends = [_end(jb.seed_state(), e, scene, **options) for e in ("lanes", "xla")]
     assert ends[0].engine == "lanes"
     assert ends[1].engine == "xla"
     for a, b in zip(ends[0].final, ends[1].final, strict=True):

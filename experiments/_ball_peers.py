@@ -1,0 +1,139 @@
+"""Simulators of others on the bouncing ball, where they are installed: MuJoCo MJX and Warp.
+
+MuJoCo's soft constraints cancel the share `IMPEDANCE` of all other forces while they act: its ball
+has a truth of its own, in the same closed form.
+"""
+
+import dataclasses
+import importlib.util
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from _ball_closed_form import Problem
+from _ball_ways import TIME_STEPS, Answer, Run, Way, differentiate
+
+IMPEDANCE = 0.9999
+"""The largest that MuJoCo allows."""
+RADIUS = 0.05
+_MODEL = """
+<mujoco>
+  <option timestep="{dt}" gravity="0 0 -9.81" solver="Newton" iterations="20"/>
+  <default>
+    <geom solref="-1 -1" solimp="{d} {d} 0.001 0.5 2" condim="1"/>
+  </default>
+  <worldbody>
+    <geom type="plane" size="1 1 0.1"/>
+    <body>
+      <joint type="slide" axis="0 0 1"/>
+      <geom type="sphere" size="{radius}" mass="1"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def mujoco_law(problem: Problem) -> Problem | None:
+    """The ball as MuJoCo's constraint has it, or None where the two differ by more than numbers.
+
+    Under damping the constraint lets go elsewhere, where the ball would fall freely anyway.
+    """
+    if problem.c != 0.0:
+        return None
+    return dataclasses.replace(problem, weight_in_contact=1.0 - IMPEDANCE)
+
+
+def by_mjx(problem: Problem, dt: float) -> Run:
+    """MJX's step, its gravity and its solref differentiated forwards."""
+    import mujoco
+    from mujoco import mjx
+
+    text = _MODEL.format(dt=dt, d=IMPEDANCE, radius=RADIUS)
+    model = mjx.put_model(mujoco.MjModel.from_xml_string(text))
+    data = mjx.make_data(model)
+
+    def final(problem: Problem, values: dict[str, Any]) -> jax.Array:
+        zero = jnp.zeros(())
+        own = model.tree_replace(
+            {
+                "opt.gravity": jnp.stack([zero, zero, -values["g"]]),
+                "geom_solref": jnp.broadcast_to(jnp.stack([-values["K"], zero]), (2, 2)),
+            }
+        )
+        begin = data.replace(qpos=values["height"][None] + RADIUS)
+        steps = round(problem.duration / dt)
+        end = jax.lax.fori_loop(0, steps, lambda _, each: mjx.step(own, each), begin)
+        return jnp.stack([end.qpos[0] - RADIUS, end.qvel[0]])
+
+    return differentiate(final, problem)
+
+
+def by_warp(problem: Problem, dt: float) -> Run:
+    """Semi-implicit Euler as a Warp kernel, differentiated backwards through its tape."""
+    import warp as wp
+
+    wp.config.quiet = True
+    kernel, steps = _warp_kernel(wp), round(problem.duration / dt)
+    values = {name: getattr(problem, name) for name in ("height", "g", "K", "c")}
+
+    def zeros(count: int) -> Any:
+        return wp.zeros(count, dtype=wp.float64, requires_grad=True, device="cpu")
+
+    def row(index: int) -> tuple[list[float], list[float]]:
+        held = {name: zeros(1) for name in values}
+        for name, value in values.items():
+            held[name].fill_(value)
+        path = zeros(steps + 1), zeros(steps + 1)
+        with wp.Tape() as tape:
+            for step in range(-1, steps):
+                inputs = [step, wp.float64(dt), *held.values(), *path]
+                wp.launch(kernel, dim=1, inputs=inputs, device="cpu")
+        seed = np.zeros(steps + 1)
+        seed[-1] = 1.0
+        tape.backward(grads={path[index]: wp.array(seed, dtype=wp.float64, device="cpu")})
+        slopes = [values[name] * held[name].grad.numpy()[0] for name in problem.parameters]
+        return [each.numpy()[-1] for each in path], slopes
+
+    def run() -> Answer:
+        (state, first), (_, second) = row(0), row(1)
+        return Answer(state, [first, second])
+
+    return run
+
+
+def _warp_kernel(wp: Any) -> Any:
+    @wp.kernel
+    def step_ball(
+        i: int,
+        dt: wp.float64,
+        height: wp.array(dtype=wp.float64),
+        g: wp.array(dtype=wp.float64),
+        stiffness: wp.array(dtype=wp.float64),
+        damping: wp.array(dtype=wp.float64),
+        z: wp.array(dtype=wp.float64),
+        v: wp.array(dtype=wp.float64),
+    ):
+        if i < 0:
+            z[0] = height[0]
+        else:
+            push = wp.float64(0.0)
+            if z[i] < wp.float64(0.0):
+                push = wp.max(wp.float64(0.0), -stiffness[0] * z[i] - damping[0] * v[i])
+            speed = v[i] + dt * (push - g[0])
+            v[i + 1] = speed
+            z[i + 1] = z[i] + dt * speed
+
+    return step_ball
+
+
+def is_installed(name: str) -> bool:
+    """Whether a simulator is there."""
+    return importlib.util.find_spec(name) is not None
+
+
+PEERS = {
+    "mujoco": Way("MuJoCo MJX", "dt", TIME_STEPS, by_mjx, mujoco_law),
+    "warp": Way("Warp", "dt", TIME_STEPS, by_warp),
+}
+"""By the name of the module that they need."""

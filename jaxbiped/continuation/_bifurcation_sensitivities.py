@@ -1,0 +1,141 @@
+"""Sensitivities of a bifurcation: how the parameter's critical value moves with the others.
+
+At a fold the Jacobian of x − P(x, s, q) has a left null vector w, so first derivatives are enough:
+ds/dq = −(w · ∂P/∂q) / (w · ∂P/∂s). Where a multiplier leaves the unit circle elsewhere the gait
+itself is regular, and its critical modulus ρ, at 1, is held: ds/dq = −(dρ/dq) / (dρ/ds). Source:
+Kuznetsov, Elements of Applied Bifurcation Theory (2004), sections 10.2.1 and 10.3.1.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_choice, check_type
+from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
+from jaxbiped.continuation._branch import Branch
+from jaxbiped.continuation._continuation_setup import continuation_setup
+from jaxbiped.gait._find_gait import find_gait
+from jaxbiped.scene._parameters import parameter_values, select_parameters
+from jaxbiped.solve._accuracy import GAIT_ACCURACIES
+
+_CRITICAL = 1e-3
+"""Distance of the largest multiplier's modulus from 1 up to which it is the critical one."""
+
+
+class BifurcationSensitivities(NamedTuple):
+    """How a bifurcation's value moves with p parameters.
+
+    Attributes:
+        along: name of the parameter whose critical value it is.
+        value: that value, SI units.
+        parameters: names of the others.
+        slopes: derivatives of the value, SI units, shape (p,).
+        errors: their estimated errors, from a ten times looser solve, shape (p,).
+        elasticities: relative change of the value over relative change of the parameter, (p,).
+    """
+
+    along: str
+    value: float
+    parameters: tuple[str, ...]
+    slopes: np.ndarray
+    errors: np.ndarray
+    elasticities: np.ndarray
+
+
+def bifurcation_sensitivities(
+    branch: Branch,
+    bifurcation: BifurcationPoint,
+    parameters: tuple[str, ...] | None = None,
+    *,
+    accuracy: str = "tight",
+) -> BifurcationSensitivities:
+    """Derivatives of a bifurcation's value with respect to the scene's other parameters.
+
+    Args:
+        branch: from `continue_gait`.
+        bifurcation: one of its folds, period doublings or Neimark–Sacker points.
+        parameters: names (see `parameter_names`); all but the branch's own unless given.
+        accuracy: "draft", "balanced" or "tight".
+
+    Returns:
+        The derivatives, with their errors.
+
+    Raises:
+        ArgumentError: an argument that is not allowed; a limit; a doubling or Neimark–Sacker point
+            beyond which another multiplier had left the unit circle already.
+    """
+    check_type("branch", branch, Branch)
+    check_type("bifurcation", bifurcation, BifurcationPoint)
+    check_choice("accuracy", accuracy, GAIT_ACCURACIES)
+    if bifurcation.kind in (BranchEvent.LIMIT, BranchEvent.BRANCH_POINT):
+        raise ArgumentError(
+            f"bifurcation is not allowed: a {bifurcation.kind} has no derivative; choose a fold, a "
+            "period doubling or a Neimark–Sacker point."
+        )
+    scene, along = branch.scene_at(bifurcation), branch.along
+    if parameters is None:
+        names, _ = select_parameters(scene, None)
+        parameters = tuple(name for name in names if name != along)
+    names, _ = select_parameters(scene, (*parameters, along))
+    by = _of_fold if bifurcation.kind is BranchEvent.FOLD else _of_modulus
+    fine, loose = (-row[:-1] / row[-1] for row in by(branch, bifurcation, names, accuracy))
+    values = np.array([float(parameter_values(scene)[name]) for name in names[:-1]])
+    return BifurcationSensitivities(
+        along=along,
+        value=bifurcation.value,
+        parameters=names[:-1],
+        slopes=fine,
+        errors=np.abs(fine - loose),
+        elasticities=fine * values / bifurcation.value,
+    )
+
+
+def _of_fold(
+    branch: Branch, fold: BifurcationPoint, names: tuple[str, ...], accuracy: str
+) -> list[np.ndarray]:
+    """w · ∂P/∂(parameters) of the fine and of the looser solve, each of shape (p + 1,)."""
+    setup = continuation_setup(
+        branch.scene,
+        branch.axis,
+        footsteps=branch.footsteps,
+        accuracy=accuracy,
+        engine=branch.engine,
+    )
+    scene, recurring = branch.scene_at(fold), fold.point.recurring
+    _, leaves = select_parameters(scene, names)
+    known = parameter_values(scene)
+    values = [float(known[name]) for name in names]
+    seen = setup.problem.cycle(recurring, leaves, values, branch.footsteps)
+    if int(seen.code[0]) != 0:
+        raise ArgumentError(
+            f"bifurcation at {branch.along} = {fold.value:.6g} is not allowed: its gait is not "
+            f"found again at accuracy {accuracy!r}."
+        )
+    m = len(recurring)
+    rows = []
+    for jacobian in seen.jacobian:
+        left, _, _ = np.linalg.svd(np.eye(m) - jacobian[:, :m])
+        rows.append(left[:, -1] @ jacobian[:, m:])
+    return rows
+
+
+def _of_modulus(
+    branch: Branch, point: BifurcationPoint, names: tuple[str, ...], accuracy: str
+) -> list[np.ndarray]:
+    """Derivatives of the critical modulus, and the same changed by their errors."""
+    gait = find_gait(
+        branch.scene_at(point),
+        branch.state(point),
+        footsteps=branch.footsteps,
+        accuracy=accuracy,
+        parameters=names,
+        engine=branch.engine,
+    )
+    radius = float(gait.measures.spectral_radius)
+    if not abs(radius - 1.0) < _CRITICAL:
+        raise ArgumentError(
+            f"bifurcation at {branch.along} = {point.value:.6g} is not allowed: its critical "
+            f"multiplier is not the gait's largest, whose modulus is {radius:.6g}."
+        )
+    slopes = np.asarray(gait.sensitivities.spectral_radius)
+    return [slopes, slopes + np.asarray(gait.sensitivity_errors.spectral_radius)]
