@@ -2,12 +2,13 @@
 
 Writes level_ground.png. Left the simplest walker (Kuo 2002), driven by push-off on level ground or
 by gravity on the slope where its steps are as long. Right the seed's walker, each way to drive it
-along its own strength. Every first gait of a curve is found without a guess.
+along its own strength, and the cheapest rigid designs. Every first gait is found without a guess.
 """
 
 from typing import Any, NamedTuple
 
 import numpy as np
+from _level_designs import QUICK_SPEEDS, SPEEDS, Design, cheapest, draw_designs, say_designs
 from _options import Options, parse
 from matplotlib.axes import Axes
 
@@ -79,13 +80,16 @@ def main() -> None:
         name: along(scene, parameter, values)
         for name, (scene, parameter, values) in seeds(options.quick).items()
     }
+    designs = [cheapest(speed) for speed in (QUICK_SPEEDS if options.quick else SPEEDS)]
     say(options, pairs, lost, curves)
+    say_designs(options, designs)
     options.finish(
         {
             "simplest": [pair._asdict() for pair in pairs],
             "simplest_without_gait": lost,
             "seed": {name: [p._asdict() for p in curve] for name, curve in curves.items()},
-            "picture": draw(options, pairs, curves),
+            "designs": [design._asdict() for design in designs],
+            "picture": draw(options, pairs, curves, designs),
         }
     )
 
@@ -249,7 +253,9 @@ def say(
             )
 
 
-def draw(options: Options, pairs: list[Pair], curves: dict[str, list[Point]]) -> str:
+def draw(
+    options: Options, pairs: list[Pair], curves: dict[str, list[Point]], designs: list[Design]
+) -> str:
     figure = new_figure(9.6, 4.6)
     left, right = figure.subplots(1, 2)
     draw_simplest(left, pairs)
@@ -264,6 +270,7 @@ def draw(options: Options, pairs: list[Pair], curves: dict[str, list[Point]]) ->
                 speed[rows], cost[rows], MARKERS[k], color=COLOURS[k], markerfacecolor=fill,
                 markersize=4,
             )  # fmt: skip
+    draw_designs(right, designs)
     dress(right, "Seed's walker; hollow: unstable", "speed (m/s)", "cost of transport (–)")
     right.set_yscale("log")
     legend_below(right, columns=3)

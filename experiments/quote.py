@@ -192,6 +192,10 @@ def of_level_ground(numbers: dict[str, Any]) -> Iterator[str]:
         ends = [pick(stable, key=lambda point: point["speed_m_s"]) for pick in (min, max)]
         speeds = [f"{end['speed_m_s']:.3f}" for end in ends]
         yield row(name, *speeds, *[small(end["cost_of_transport"], 2) for end in ends])
+    for each in numbers["designs"]:
+        costs = [f"{each[key]:.6f}" for key in ("seed_cost", "cost_of_transport")]
+        variables = [f"{each['variables'][name]:.4f}" for name in ("impulse", "d", "J")]
+        yield row(f"{each['speed_m_s']:.2f}", *costs, *variables)
 
 
 def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:

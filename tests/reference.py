@@ -79,6 +79,8 @@ def contact(y, leg, p):
     """Rate of penetration, slip, and forces normal and along the ground, of a leg's foot."""
     length, a, w = p["l"] - p["r"], float(y[2 + leg]), float(y[6 + leg])
     depth = p["r"] - (float(y[1]) - length * math.cos(a))
+    if leg == 0:
+        depth -= p.get("drop", 0.0)
     rate = -(float(y[5]) + length * math.sin(a) * w)
     slip = float(y[4]) + (length * math.cos(a) + p["r"]) * w
     normal = normal_force(depth, rate, p) if w < 0.0 else 0.0

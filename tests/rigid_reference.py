@@ -56,12 +56,20 @@ def impact_solution(scene, theta, rates):
     return np.linalg.solve(system, np.concatenate([matrix @ rates, np.zeros(2)]))
 
 
-def footstep(scene, state):
-    """Angles and rates of swing and stance leg after the next impact, and when it comes."""
-    solved = _until_strike(scene, state)
+def footstep(scene, state, drop=0.0):
+    """Angles and rates of swing and stance leg after the next impact, and when it comes.
+
+    The ground lies lower by `drop` where the foot comes down.
+    """
+    solved = _until_strike(scene, state, drop)
     y, time = solved.y_events[0][0], solved.t_events[0][0]
     after = impact_solution(scene, y[:2], y[[4, 5, 2, 3]])
     return np.array([y[1], y[0], after[3], after[2]]), time
+
+
+def before_strike(scene, state):
+    """Angles of swing and stance leg and their rates just before the next impact, shape (4,)."""
+    return _until_strike(scene, state).y_events[0][0][:4]
 
 
 def needed_friction(scene, state):
@@ -73,11 +81,13 @@ def needed_friction(scene, state):
     return np.max(np.abs(along) / normal)
 
 
-def _until_strike(scene, state):
+def _until_strike(scene, state, drop=0.0):
     _, theta, rates = coordinates(scene, state)
+    reach = float(scene.walker.hip_to_foot)
 
     def strikes(t, y):
-        return y[0] + y[1] if y[0] > y[1] else 1.0
+        height = reach * (np.cos(y[1]) - np.cos(y[0])) + drop
+        return height if y[0] > y[1] + 0.05 else 1.0
 
     strikes.terminal, strikes.direction = True, -1
     # Angles, their rates, and the hip's velocity.

@@ -135,15 +135,11 @@ def bifurcation_curve(
 
 def _extended_curve(setup: ContinuationSetup, second: Axis, kind: BranchEvent) -> Curve:
     """Gaits at the bifurcation: unknown are their components and the first parameter's s."""
-    first, problem = setup.axis, setup.problem
     sizes = np.append(setup.curve.sizes, 1.0)
     m = len(sizes) - 2
 
     def gait(place: np.ndarray) -> Change:
-        values = [first.value(float(place[m])), second.value(float(place[m + 1]))]
-        point = place[:m] * sizes[:m]
-        seen = problem.cycle(point, (first.leaf, second.leaf), values, setup.footsteps)
-        return change_of(seen, point, first.slope(float(place[m])))
+        return _gait_at(setup, second, place)
 
     def change(point: np.ndarray, s: float) -> Change:
         place = np.append(point, s) / sizes
@@ -168,6 +164,15 @@ def _extended_curve(setup: ContinuationSetup, second: Axis, kind: BranchEvent) -
         )
 
     return Curve(change, sizes, _CONVERGED)
+
+
+def _gait_at(setup: ContinuationSetup, second: Axis, place: np.ndarray) -> Change:
+    """What a cycle changes at a place of the extended curve."""
+    *scaled, s, t = place
+    first, point = setup.axis, np.array(scaled) * setup.curve.sizes[:-1]
+    values = [first.value(float(s)), second.value(float(t))]
+    seen = setup.problem.cycle(point, (first.leaf, second.leaf), values, setup.footsteps)
+    return change_of(seen, point, first.slope(float(s)))
 
 
 def _follow(
@@ -199,9 +204,14 @@ def _told(
     stops: tuple[BranchStop, BranchStop],
 ) -> BifurcationCurve:
     inner = setup.curve
-    points = tuple(
-        branch_point(inner, setup.axis, each._replace(place=each.place[:-1])) for each in found
-    )
+    points = []
+    for each in found:
+        # A corrector's own evaluation is that before its last correction, and multipliers may
+        # change a hundred times as fast as places.
+        seen = _gait_at(setup, second, each.place)
+        change = each.change if seen.code else seen
+        there = each._replace(place=each.place[:-1], change=change)
+        points.append(branch_point(inner, setup.axis, there))
     critical = [critical_multiplier(kind, point) for point in points]
     seconds = [second.value(float(each.place[-1])) for each in found]
     first_stop, last_stop = (stop._replace(value=second.value(stop.value)) for stop in stops)
@@ -211,7 +221,7 @@ def _told(
         along=(setup.axis.name, second.name),
         units=(quantities[setup.axis.name].unit, quantities[second.name].unit),
         values=np.array([(p.value, b) for p, b in zip(points, seconds, strict=True)]),
-        points=points,
+        points=tuple(points),
         multipliers=np.array([value for value, _, _ in critical]),
         errors=np.array([error for _, error, _ in critical]),
         stops=(first_stop, last_stop),

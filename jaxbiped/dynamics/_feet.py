@@ -9,6 +9,7 @@ from jaxbiped.dynamics._actuation import preload
 from jaxbiped.dynamics._redundant_state import CompliantState, Leg, legs_of
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._redundant_scene import CompliantScene
+from jaxbiped.scene._stepped_ground import drop_under
 
 
 class Foot(NamedTuple):
@@ -77,6 +78,9 @@ def _foot(scene: CompliantScene, number: int, leg: Leg) -> Foot:
     vx = leg.hip_vx + length * cosine * leg.rate
     vz = leg.hip_vz + length * sine * leg.rate
     depth, depth_rate = radius - z, -vz
+    drop = drop_under(scene.ground, number)
+    if drop is not None:
+        depth = depth - drop
     moved = preload(scene, leg.angle, leg.rate)
     if moved is not None:
         depth, depth_rate = depth + moved[0], depth_rate + moved[1]

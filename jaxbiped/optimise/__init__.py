@@ -1,5 +1,9 @@
 """Optimisation of gaits: objectives, optimisers, certificates of an optimum."""
 
+from jaxbiped.optimise._bifurcation_distance import (
+    BifurcationDistance as BifurcationDistance,
+)
+from jaxbiped.optimise._bifurcation_distance import bifurcation_distance as bifurcation_distance
 from jaxbiped.optimise._certificate import Certificate as Certificate
 from jaxbiped.optimise._certificate import certify as certify
 from jaxbiped.optimise._objectives import OBJECTIVES as OBJECTIVES

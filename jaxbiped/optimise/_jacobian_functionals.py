@@ -13,6 +13,7 @@ from jaxtyping import PyTree
 from jaxbiped._caches import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._fixed_point_search import LOOSER
 from jaxbiped.gait._orbit import slopes_of
 from jaxbiped.gait._poincare_map import (
@@ -32,12 +33,13 @@ from jaxbiped.optimise._cycle_functionals import (
     with_errors,
 )
 from jaxbiped.optimise._disturbed_cycle import disturbed, undisturbed
+from jaxbiped.optimise._stepped_cycle import SteppedSection, stepped, unstepped
 from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import Precision, precision_of
 from jaxbiped.variational._adjoint_solve import COUNT
-from jaxbiped.variational._hybrid_system import section_of
+from jaxbiped.variational._hybrid_system import AbstractSystem, section_of
 
 LEADING = 3
 """Moduli that are told apart: of a pair of conjugate multipliers once."""
@@ -45,6 +47,8 @@ JACOBIAN_FUNCTIONALS = (
     *("spectral_radius", "modulus_2", "modulus_3")[:LEADING],
     "radius_bound",
     "sensitivity_norm",
+    "floor_sensitivity",
+    "strike_divergence",
 )
 SQUARINGS = 6
 """Of the return map's Jacobian P for its bound ‖P⁶⁴‖^(1/64)."""
@@ -75,7 +79,14 @@ def jacobian_functionals(
     The norm is √Σ |g_n|² over all footsteps n, where g are the relative changes of step length
     and of step time for each unit of a push: of a force along the slope in units of the weight that
     acts for one cycle. It is infinite where the gait is not stable. Hobbelen and Wisse, IEEE Trans.
-    Robotics 23 (2007) 1213, with this push as the disturbance.
+    Robotics 23 (2007) 1213, with this push as the disturbance. The floor sensitivity is the same
+    for each unit of a step in the ground, in leg lengths: from the next footstep on the ground lies
+    lower by so much, along the slope's normal.
+
+    The divergence of the foot strike is ln |λ₁ λ₂ …|, by which a footstep changes volumes of phase
+    space about the orbit. A passive rigid walker's swing changes none in canonical coordinates, by
+    Liouville's theorem, so that all of it is the strike's, whatever the coordinates. After Jin,
+    Kistemaker, van Dieën, Daffertshofer and Bruijn, Royal Society Open Science 8 (2021) 201122.
 
     Args:
         scene: the walker.
@@ -88,20 +99,46 @@ def jacobian_functionals(
     Returns:
         Those, with respect to all parameters in the order of `parameter_names`.
     """
-    section = MotionSection(section_of(scene, None))
-    spec = cycle_spec(scene, disturbed(scene), section, footsteps, accuracy, engine)
-    return _functionals(spec, scene, state, names, accuracy)
+    on = section_of(scene, None)
+    groups = {
+        _disturbance(name): tuple(
+            each for each in names if _disturbance(each) == _disturbance(name)
+        )
+        for name in names
+    }
+    systems: dict[str, tuple[PyTree, AbstractSystem, AbstractSection]] = {
+        "step": (unstepped(state), stepped(scene), SteppedSection(on)),
+        "push": (undisturbed(state), disturbed(scene), MotionSection(on)),
+    }
+    told = []
+    for disturbance, group in groups.items():
+        y, system, section = systems[disturbance]
+        spec = cycle_spec(scene, system, section, footsteps, accuracy, engine)
+        told.append(_functionals(spec, scene, y, group, accuracy))
+    if len(told) == 1:
+        return told[0]
+    every = [name for group in groups.values() for name in group]
+    order = jnp.asarray([every.index(name) for name in names])
+    values, errors, slopes, slope_errors = (
+        jnp.concatenate([each[k] for each in told])[order] for k in range(4)
+    )
+    code = jnp.max(jnp.stack([each.code for each in told]))
+    return Functionals(values, errors, slopes, slope_errors, code)
+
+
+def _disturbance(name: str) -> str:
+    """What a functional's cycle is disturbed by."""
+    return "step" if name == "floor_sensitivity" else "push"
 
 
 @cached_jit
 def _functionals(
     spec: ReturnMapSpec,
     scene: Scene | RigidScene,
-    state: WalkerState,
+    y: PyTree,
     names: tuple[str, ...],
     accuracy: str,
 ) -> Functionals:
-    y = undisturbed(state)
     m = len(recurring_components(spec.system, y))
     _, active = select_parameters(scene, None)
     seeds, sizes = seed_directions(scene, active, m)
@@ -117,7 +154,7 @@ def _functionals(
 
     def at(once: LinearisedReturn) -> tuple[Scalar, Scalar]:
         first = slopes_of(once)
-        # The Jacobian's rows, as components lie: hip_x, the clock and what must return.
+        # The Jacobian's rows, as components lie: hip_x, the clock, a fall, and what must return.
         rows = jnp.concatenate([once.advance_rows, once.jacobian])[:, :m]
         length = jnp.stack([once.advance[0], once.period])
         told = [_weighed(name, y, rows, length, leading) for name in names]
@@ -144,7 +181,8 @@ class _Weighed(NamedTuple):
 
     Attributes:
         value: the function.
-        by_rows: its derivatives with respect to the rows, shape (2 + m, m), of this `rank`.
+        by_rows: its derivatives with respect to the rows, shape (d + m, m), of this `rank`: those
+            of d cyclic coordinates come first.
         by_length: with respect to step length and period, shape (2,).
     """
 
@@ -155,7 +193,7 @@ class _Weighed(NamedTuple):
 
 
 def _in_pairs(weights: Scalar, rank: int) -> tuple[Scalar, Scalar]:
-    """Directions (k, 2, m) and weights (k, 2, 2 + m) whose products sum to a matrix."""
+    """Directions (k, 2, m) and weights (k, 2, d + m) whose products sum to a matrix."""
     left, values, right = singular_pairs(weights)
     count = -(-rank // COUNT)
     spare = ((0, max(COUNT * count - len(values), 0)), (0, 0))
@@ -206,6 +244,16 @@ def _modulus(k: int, rows: Scalar, length: Scalar, leading: Scalar) -> _Weighed:
     return _Weighed(value, _by_entries(eigen, shares), 2, jnp.zeros_like(length))
 
 
+def _divergence(rows: Scalar, length: Scalar) -> _Weighed:
+    """Without the zeros of the push and of the section."""
+    eigen = _eigen(rows[2:])
+    order = jnp.argsort(-jnp.abs(eigen.values))[:-2]
+    leading = eigen.values[order]
+    shares = jnp.zeros_like(eigen.values).at[order].set(1.0 / leading)
+    value = jnp.sum(jnp.log(jnp.abs(leading)))
+    return _Weighed(value, _by_entries(eigen, shares), len(order), jnp.zeros_like(length))
+
+
 def _radius_bound(sizes: Scalar, rows: Scalar, length: Scalar) -> _Weighed:
     def bound(rows: Scalar) -> Scalar:
         # Without the push, which has no response of its own.
@@ -222,17 +270,18 @@ def _radius_bound(sizes: Scalar, rows: Scalar, length: Scalar) -> _Weighed:
 
 
 def _sensitivity_norm(rows: Scalar, length: Scalar) -> _Weighed:
-    jacobian = jnp.where(jnp.isfinite(rows[2:]), rows[2:], 0.0)
+    own = rows[-rows.shape[1] :]
+    jacobian = jnp.where(jnp.isfinite(own), own, 0.0)
     stable = jnp.max(jnp.abs(eigenpairs(jacobian)[0])) < 1.0
     value, (weights, by_length) = jax.value_and_grad(_norm, argnums=(0, 1))(
-        jnp.where(stable, rows, 0.0).at[:2].set(rows[:2]), length
+        jnp.where(stable, rows, jnp.zeros_like(rows).at[:2].set(rows[:2])), length
     )
     return _Weighed(jnp.where(stable, value, jnp.inf), weights, rows.shape[1], by_length)
 
 
 def _norm(rows: Scalar, length: Scalar) -> Scalar:
     """√(Q₀₀), where Q = Σ (Aⁿ)ᵀ CᵀC Aⁿ solves Q = CᵀC + Aᵀ Q A, by doubling."""
-    power, told = rows[2:], rows[:2] / length[:, None]
+    power, told = rows[-rows.shape[1] :], rows[:2] / length[:, None]
     total = told.T @ told
     for _ in range(_DOUBLINGS):
         total, power = total + power.T @ total @ power, power @ power
@@ -243,6 +292,8 @@ def _weighed(name: str, y: PyTree, rows: Scalar, length: Scalar, leading: Scalar
     if name == "radius_bound":
         sizes = jnp.asarray([_SIZES.get(field, 1.0) for field in y._fields[3:]])
         return _radius_bound(sizes, rows, length)
-    if name == "sensitivity_norm":
+    if name in ("sensitivity_norm", "floor_sensitivity"):
         return _sensitivity_norm(rows, length)
+    if name == "strike_divergence":
+        return _divergence(rows, length)
     return _modulus(JACOBIAN_FUNCTIONALS.index(name), rows, length, leading)

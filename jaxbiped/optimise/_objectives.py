@@ -9,7 +9,9 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
+from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.gait._gait import Gait
+from jaxbiped.optimise._bifurcation_distance import bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
 from jaxbiped.optimise._jacobian_functionals import (
     JACOBIAN_FUNCTIONALS,
@@ -40,6 +42,14 @@ def _of_friction(scene: Scene | RigidScene) -> str | None:
     return _of_slip(scene)
 
 
+def _of_strike(scene: Scene | RigidScene) -> str | None:
+    if isinstance(scene, Scene):
+        return "its feet press into the ground for a while instead of striking at once"
+    if scene.actuation is not None:
+        return "what drives it changes volumes of phase space, too"
+    return None
+
+
 def _of_swing(scene: Scene | RigidScene) -> str | None:
     if isinstance(scene, Scene) and not isinstance(
         scene.clearance.admits(1, jnp.ones(())), jax.Array
@@ -68,12 +78,18 @@ OBJECTIVES = {
     "spectral_radius": Objective(Quantity("spectral radius", "$\\rho$")),
     "radius_bound": Objective(Quantity("smooth bound of the spectral radius", "$\\rho_q$")),
     "sensitivity_norm": Objective(Quantity("gait sensitivity norm", "$\\|G\\|$")),
+    "floor_sensitivity": Objective(Quantity("gait sensitivity norm to steps", "$\\|G_h\\|$")),
+    "strike_divergence": Objective(
+        Quantity("divergence of foot strike", "$\\ln|\\det S|$"), _of_strike
+    ),
     "cost_of_transport": Objective(Quantity("cost of transport", "$C$")),
     "impact_loss": Objective(Quantity("energy lost in impacts", "$E_i$", "J")),
     "friction_loss": Objective(Quantity("energy lost to friction", "$E_f$", "J"), _of_friction),
     "slip_distance": Objective(Quantity("slip distance", "$s$", "m"), _of_slip),
     "motor_work": Objective(Quantity("work of the motors", "$W$", "J"), _of_driven),
     "foot_clearance": Objective(Quantity("foot clearance", "$h$", "m"), _of_swing),
+    "fold_distance": Objective(Quantity("distance to the fold in slope", "$D_f$", "rad")),
+    "doubling_distance": Objective(Quantity("distance to the doubling in slope", "$D_d$", "rad")),
 }
 """By name. Those of a cycle: losses and slip are sums over its footsteps.
 
@@ -86,9 +102,20 @@ OBJECTIVES = {
 - foot clearance: least height of the swinging foot, negative where it passes underground.
 - radius bound: never below the spectral radius, and smooth also where multipliers meet or have
   equal moduli, where that has corners; see `jacobian_functionals`.
-- sensitivity norm: see `jacobian_functionals`.
+- sensitivity norm, floor sensitivity, strike divergence: see `jacobian_functionals`.
+- fold distance, doubling distance: to the nearest in slope, see `bifurcation_distance`; a design
+  that meets none counts as one without a gait.
 """
 _OF_THE_GAIT = ("speed", "step_length", "period", "peak_normal")
+_SEARCHED = {
+    "fatal_push": "it is the nearest point of a basin's boundary, found by a search that has no "
+    "derivatives; jb.basins.minimal_fatal_shock tells it of a gait that was found",
+}
+"""What a gait has that is none of a smooth function's values."""
+_DISTANCES = {
+    "fold_distance": BranchEvent.FOLD,
+    "doubling_distance": BranchEvent.PERIOD_DOUBLING,
+}
 CLUSTER = JACOBIAN_FUNCTIONALS[:LEADING]
 """What is evaluated for the spectral radius: it, and the next moduli."""
 
@@ -115,6 +142,8 @@ class Evaluation(NamedTuple):
 
 def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective") -> None:
     """Raises `ArgumentError` for an unknown objective, or one that the scene lacks."""
+    if name in _SEARCHED:
+        raise ArgumentError(f"{what} = {name!r} is not allowed: {_SEARCHED[name]}.")
     check_choice(what, name, OBJECTIVES)
     lacks = OBJECTIVES[name].lacks(scene)
     if lacks is not None:
@@ -126,7 +155,7 @@ def functionals_for(wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
     of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in wanted)
     if "spectral_radius" in wanted:
         of_jacobian = (*CLUSTER, *(name for name in of_jacobian if name not in CLUSTER))
-    return of_jacobian, bool(set(wanted) - set(of_jacobian) - set(_OF_THE_GAIT))
+    return of_jacobian, bool(set(wanted) - set(of_jacobian) - set(_OF_THE_GAIT) - set(_DISTANCES))
 
 
 def evaluate(
@@ -161,6 +190,9 @@ def evaluate(
         )
         rows |= dict(zip(integral_names(scene), _rows_of(second), strict=True))
         rows["cost_of_transport"] = _cost_of_transport(scene, rows)
+    for name in (name for name in wanted if name in _DISTANCES):
+        told = bifurcation_distance(scene, gait, _DISTANCES[name], accuracy=accuracy)
+        rows[name] = _Row(told.distance, told.error, told.slopes, told.slope_errors)
     kept = {name: rows[name] for name in dict.fromkeys((*wanted, *of_jacobian, *_OF_THE_GAIT))}
     slopes = gait.sensitivities.state
     return Evaluation(

@@ -201,7 +201,7 @@ def test_a_dataset_says_what_is_in_it(rigid):
 
 def test_a_curve_of_doublings_passes_through_that_of_another_scene(rigid):
     curve = bifurcation_curve(rigid, rigid.bifurcations[0], "r", bounds=(0.06, 0.09))
-    assert np.all(np.abs(curve.multipliers + 1.0) < 1e-6)
+    assert np.all(np.abs(curve.multipliers + 1.0) < 1e-8)
     assert curve.units == ("rad", "m")
     k = int(np.argmin(np.abs(curve.values[:, 1] - 0.065)))
     slope, radius = curve.values[k]

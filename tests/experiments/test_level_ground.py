@@ -29,3 +29,9 @@ def test_costs_on_level_ground(tmp_path):
         assert speeds == sorted(speeds)
         drawn = points_of(figure.axes[1], name)[0]
         np.testing.assert_array_equal(drawn[:, 0], speeds)
+    (design,) = numbers["designs"]
+    assert design["outcome"] == "converged"
+    assert design["speed_m_s"] == pytest.approx(0.28, rel=1e-6)
+    assert design["cost_of_transport"] < design["seed_cost"]
+    star = points_of(figure.axes[1], "push-off, optimised")[0]
+    assert star[:, 1].tolist() == [design["cost_of_transport"]]

@@ -2,13 +2,19 @@
 
 import dataclasses
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.dynamics._impact import impact
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._rolling import inertia_of, rolling_field, support_of
 from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
 from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
 from jaxbiped.optimise._objectives import check_objective, evaluate
+from tests import rigid_reference
 
 pytestmark = pytest.mark.slow
 SCENES = jb.ladder() | {"heavy hip": jb.seed_scene(hip_mass=0.5, slope=0.025, r=0.1)}
@@ -31,15 +37,20 @@ USUAL = (1e-3, 1e-5)
 NOISY = {
     "spectral_radius": (3e-3, 3e-5),
     "radius_bound": (1e-3, 1e-4),
+    "floor_sensitivity": (1e-3, 5e-5),
     "slip_distance": (1e-2, 1e-5),
     "friction_loss": (1e-3, 1e-5),
 }
 """The same for what the balanced accuracy tells to its error bars alone, by the tight one."""
 
 
+FOLLOWED = ("fold_distance", "doubling_distance")
+"""For which branches are followed: see `test_bifurcation_distance`."""
+
+
 def objectives_of(scene):
     for name in jb.optimise.OBJECTIVES:
-        if jb.optimise.OBJECTIVES[name].lacks(scene) is None:
+        if name not in FOLLOWED and jb.optimise.OBJECTIVES[name].lacks(scene) is None:
             yield name
 
 
@@ -190,6 +201,35 @@ def test_the_sensitivity_norm_is_the_response_of_footsteps():
     assert norm == pytest.approx(np.sqrt(np.sum(response**2)), rel=1e-5)
 
 
+def test_the_divergence_of_the_foot_strike_is_that_of_its_saltation_matrix():
+    """The determinant of one impact, in angles and momenta."""
+    scene = SCENES["rigid"]
+    gait = jb.find_gait(scene, accuracy="tight", parameters=(), radius_sensitivities=False)
+    before = rigid_reference.before_strike(scene, gait.measures.state)
+
+    def struck(y):
+        return jnp.stack(impact(scene, RigidState(jnp.zeros(()), *y)).state[1:])
+
+    def rates(y):
+        return jnp.stack(rolling_field(0.0, RigidState(jnp.zeros(()), *y), scene)[1:])
+
+    def volume(y):
+        """Of momenta for each of rates: the determinant of the mass matrix."""
+        support = support_of(scene.walker, y[1])
+        own = inertia_of(scene.walker, support, jnp.sin(y[0]), jnp.cos(y[0]))
+        return own.stance * own.swing - own.coupling**2
+
+    after, by_state = struck(before), jax.jacfwd(struck)(before)
+    coming, leaving = rates(before), rates(after)
+    normal = jnp.asarray([1.0, 1.0, 0.0, 0.0])
+    saltation = by_state + jnp.outer(leaving - by_state @ coming, normal) / (normal @ coming)
+    change = jnp.linalg.det(saltation) * volume(after) / volume(before)
+    names = ("strike_divergence",)
+    told = jacobian_functionals(scene, gait.measures.state, names, accuracy="tight")
+    assert float(told.values[0]) == pytest.approx(float(jnp.log(jnp.abs(change))), rel=1e-7)
+    assert float(told.values[0]) < 0.0
+
+
 def test_error_bars_of_values_hold_against_a_tight_solve():
     scene = SCENES["stribeck"]
     names = tuple(objectives_of(scene))
@@ -212,5 +252,11 @@ def test_an_objective_that_a_scene_lacks_is_refused_in_a_sentence():
         check_objective("foot_clearance", scuffs)
     with pytest.raises(jb.ArgumentError, match=r"motor_work.*no actuators"):
         check_objective("motor_work", rigid)
+    with pytest.raises(jb.ArgumentError, match=r"strike_divergence.*striking at once"):
+        check_objective("strike_divergence", scene)
+    with pytest.raises(jb.ArgumentError, match=r"strike_divergence.*drives"):
+        check_objective("strike_divergence", DRIVEN["push-off"])
+    with pytest.raises(jb.ArgumentError, match=r"fatal_push.*minimal_fatal_shock"):
+        check_objective("fatal_push", scene)
     with pytest.raises(jb.ArgumentError, match="objective = 'beauty'"):
         check_objective("beauty", scene)

@@ -1,0 +1,223 @@
+"""Distance of a gait to its nearest fold or period doubling in a parameter, differentiable.
+
+At a fold P(x, s, q) − x vanishes, and w (I − P_x) with it for a row w, so that the fold's s obeys
+ds/dq = −(w P_q)/(w P_s): first derivatives at the fold suffice. At a doubling a modulus ρ is 1, and
+ds/dq = −ρ_q/ρ_s with the gait's own change in both. Kuznetsov, Elements of Applied Bifurcation
+Theory (2004), section 10.3.1.
+"""
+
+from typing import NamedTuple
+
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._types import as_float
+from jaxbiped.continuation._axis import Axis, axis_of, start_of
+from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
+from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
+from jaxbiped.continuation._nearest_bifurcation import FACTOR, STEEPEST
+from jaxbiped.continuation._trace import trace
+from jaxbiped.gait._fixed_point_search import LOOSER
+from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, correct, locate
+from jaxbiped.optimise._jacobian_functionals import (
+    JACOBIAN_FUNCTIONALS,
+    LEADING,
+    jacobian_functionals,
+)
+from jaxbiped.scene._parameters import (
+    parameter_names,
+    parameter_values,
+    select_parameters,
+    with_parameters,
+)
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
+
+KINDS = (BranchEvent.FOLD, BranchEvent.PERIOD_DOUBLING)
+"""Bifurcations whose distance is told."""
+_LARGEST_STEP, _MOST_POINTS = 0.02, 200
+_BESIDE = 1e-3
+"""Arclength to both sides of a fold between which it is located anew."""
+
+
+class BifurcationDistance(NamedTuple):
+    """A gait's distance to a bifurcation in a parameter, p parameters in all.
+
+    Attributes:
+        along: name of that parameter.
+        value: of the parameter at the bifurcation, SI units; NaN, as all else, where none was met.
+        distance: of that from the gait's own value, never negative; of both ways the smaller.
+        error: estimated, of both.
+        value_slopes: derivatives of `value` with respect to the parameters, shape (p,).
+        slopes: of `distance`, shape (p,).
+        slope_errors: estimated, of both, shape (p,).
+    """
+
+    along: str
+    value: float
+    distance: float
+    error: float
+    value_slopes: np.ndarray
+    slopes: np.ndarray
+    slope_errors: np.ndarray
+
+
+def bifurcation_distance(
+    scene: Scene | RigidScene,
+    gait: Gait,
+    kind: BranchEvent | str = BranchEvent.FOLD,
+    along: str = "slope",
+    *,
+    accuracy: str = "balanced",
+) -> BifurcationDistance:
+    """Follows a gait both ways to its first fold or doubling, and differentiates where that lies.
+
+    Args:
+        scene: the gait's.
+        gait: where to begin.
+        kind: "fold" or "period-doubling".
+        along: the parameter's name (see `parameter_names`). It is followed from an eighth to eight
+            times its own value, the slope of level ground by 0.1 rad to both sides.
+        accuracy: "balanced" or "tight".
+
+    Returns:
+        The distance to the nearer of both, with respect to all parameters in the order of
+        `parameter_names`; errors are what ten times looser solves change.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled; a parameter
+            other than the slope that is zero, which no factor changes.
+    """
+    check_choice("kind", kind, KINDS)
+    check_choice("along", along, parameter_names(scene))
+    check_choice("accuracy", accuracy, GAIT_ACCURACIES)
+    own = float(parameter_values(scene)[along])
+    if own == 0.0 and along != "slope":
+        raise ArgumentError(f"along = {along!r} is not allowed where {along} is 0: no factor fits.")
+    bounds = (own / FACTOR, own * FACTOR) if own != 0.0 else (-STEEPEST, STEEPEST)
+    axis = axis_of(scene, along, bounds, None)
+    steps = int(gait.orbit[0].shape[0])
+    setup = continuation_setup(scene, axis, footsteps=steps, accuracy=accuracy, engine=gait.engine)
+    event = _nearest(setup, gait, BranchEvent(kind))
+    located = None if event is None else _located(setup, event)
+    if located is None:
+        none = np.full(len(parameter_names(scene)), np.nan)
+        return BifurcationDistance(along, np.nan, np.nan, np.nan, none, none, none)
+    way = 1.0 if located.value > own else -1.0
+    slopes = way * located.slopes
+    slopes[parameter_names(scene).index(along)] -= way
+    return BifurcationDistance(
+        along=along,
+        value=located.value,
+        distance=abs(located.value - own),
+        error=located.error,
+        value_slopes=located.slopes,
+        slopes=slopes,
+        slope_errors=located.slope_errors,
+    )
+
+
+def _nearest(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> BifurcationPoint | None:
+    """Of the first bifurcations of a kind in both ways the nearer."""
+    own = start_of(setup.scene, setup.axis)
+    begin = setup.at_value(setup.recurring(gait.measures.state), own).found
+    if begin is None:
+        return None
+    found = []
+    for way in (-1.0, 1.0):
+        part = trace(
+            setup.curve,
+            setup.axis,
+            begin._replace(tangent=way * begin.tangent),
+            largest_step=_LARGEST_STEP,
+            max_points=_MOST_POINTS,
+            until=kind,
+        )
+        found += [each for each in part.bifurcations if each.kind is kind]
+    return min(found, key=lambda each: abs(each.value - own), default=None)
+
+
+class _Located(NamedTuple):
+    """Where a bifurcation lies: value, derivatives (p,), and their errors."""
+
+    value: float
+    error: float
+    slopes: np.ndarray
+    slope_errors: np.ndarray
+
+
+def _located(setup: ContinuationSetup, event: BifurcationPoint) -> _Located | None:
+    return (_located_fold if event.kind is BranchEvent.FOLD else _located_doubling)(setup, event)
+
+
+def _located_fold(setup: ContinuationSetup, event: BifurcationPoint) -> _Located | None:
+    """By the return map itself, and by a looser one."""
+    told = []
+    problem = setup.problem
+    for factor in (1.0, LOOSER):
+        precision = Precision(*(factor * each for each in problem.precision))
+        other = setup._replace(problem=problem._replace(precision=precision))
+        fold = _fold_near(other.curve, event)
+        if fold is None:
+            return None
+        told.append(_fold_slopes(other, fold))
+    (value, slopes), (loose_value, loose_slopes) = told
+    return _Located(value, abs(value - loose_value), slopes, np.abs(slopes - loose_slopes))
+
+
+def _fold_near(curve: Curve, event: BifurcationPoint) -> CurvePoint | None:
+    """The fold of a curve, between two points to both sides of where it was seen."""
+    place, tangent = event.point.place, event.point.tangent
+    here, there = (
+        correct(curve, place + way * _BESIDE * tangent, tangent, tangent).found
+        for way in (-1.0, 1.0)
+    )
+    if here is None or there is None or here.tangent[-1] * there.tangent[-1] >= 0.0:
+        return None
+    return locate(curve, here, there, lambda found: float(found.tangent[-1]))
+
+
+def _fold_slopes(setup: ContinuationSetup, fold: CurvePoint) -> tuple[float, np.ndarray]:
+    """Value of the parameter at a fold, and its derivatives with respect to all, shape (p,)."""
+    axis, point = setup.axis, fold.place[:-1] * setup.curve.sizes[:-1]
+    m, value = len(point), axis.value(float(fold.place[-1]))
+    names, active = select_parameters(setup.scene, None)
+    there = _with(setup.scene, axis, value)
+    values = [float(each) for each in parameter_values(there).values()]
+    seen = setup.problem.cycle(point, active, values, setup.footsteps)
+    jacobian, sizes = np.asarray(seen.jacobian[0]), setup.curve.sizes[:-1]
+    left, _, _ = np.linalg.svd((jacobian[:, :m] - np.eye(m)) * sizes / sizes[:, None])
+    forced = (left[:, -1] / sizes) @ jacobian[:, m:]
+    slopes = -forced / forced[names.index(axis.name)]
+    slopes[names.index(axis.name)] = 0.0
+    return value, slopes
+
+
+def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> _Located | None:
+    """By the modulus that is 1 there."""
+    scene, axis = _with(setup.scene, setup.axis, event.value), setup.axis
+    told = jacobian_functionals(
+        scene,
+        setup.state_of(event.point.recurring),
+        JACOBIAN_FUNCTIONALS[:LEADING],
+        footsteps=setup.footsteps,
+        accuracy=setup.accuracy,
+        engine=setup.problem.spec.engine,
+    )
+    values, errors, slopes, slope_errors = (np.asarray(each) for each in told[:4])
+    which = int(np.nanargmin(np.abs(values - 1.0)))
+    place = parameter_names(scene).index(axis.name)
+    rate, rate_error = slopes[which][place], slope_errors[which][place]
+    by_all = -slopes[which] / rate
+    off = (slope_errors[which] + np.abs(by_all) * rate_error) / abs(rate)
+    by_all[place] = off[place] = 0.0
+    value = event.value - (values[which] - 1.0) / rate
+    return _Located(float(value), float(errors[which] / abs(rate)), by_all, off)
+
+
+def _with(scene: Scene | RigidScene, axis: Axis, value: float) -> Scene | RigidScene:
+    found: Scene | RigidScene = jtu.tree_map(as_float, with_parameters(scene, {axis.name: value}))
+    return found
