@@ -13,9 +13,9 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._continuation_setup import continuation_setup
+from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
 from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.scene._parameters import parameter_values, select_parameters
+from jaxbiped.scene._parameters import parameter_values, select_parameters, with_parameters
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 _CRITICAL = 1e-3
@@ -93,7 +93,7 @@ def bifurcation_sensitivities(
 def _of_fold(
     branch: Branch, fold: BifurcationPoint, names: tuple[str, ...], accuracy: str
 ) -> list[np.ndarray]:
-    """w · ∂P/∂(parameters) of the fine and of the looser solve, each of shape (p + 1,)."""
+    """Of the fine and of the looser solve, each of shape (p + 1,)."""
     setup = continuation_setup(
         branch.scene,
         branch.axis,
@@ -101,22 +101,42 @@ def _of_fold(
         accuracy=accuracy,
         engine=branch.engine,
     )
-    scene, recurring = branch.scene_at(fold), fold.point.recurring
-    _, leaves = select_parameters(scene, names)
-    known = parameter_values(scene)
-    values = [float(known[name]) for name in names]
-    seen = setup.problem.cycle(recurring, leaves, values, branch.footsteps)
-    if int(seen.code[0]) != 0:
+    rows = fold_forcing(setup, fold.point.recurring, fold.value, names)
+    if rows is None:
         raise ArgumentError(
             f"bifurcation at {branch.along} = {fold.value:.6g} is not allowed: its gait is not "
             f"found again at accuracy {accuracy!r}."
         )
-    m = len(recurring)
+    return list(rows)
+
+
+def fold_forcing(
+    setup: ContinuationSetup, recurring: np.ndarray, value: float, names: tuple[str, ...]
+) -> np.ndarray | None:
+    """How parameters push the return map out of a fold: w · ∂P/∂q, up to a common factor.
+
+    Args:
+        setup: of the continuation.
+        recurring: components of the fold's state, shape (m,).
+        value: of the continued parameter there.
+        names: of p parameters.
+
+    Returns:
+        Of the cycle and of a ten times looser one, shape (2, p); None where it does not return.
+    """
+    scene = with_parameters(setup.scene, {setup.axis.name: value})
+    known = parameter_values(scene)
+    _, leaves = select_parameters(scene, names)
+    values = [float(known[name]) for name in names]
+    seen = setup.problem.cycle(recurring, leaves, values, setup.footsteps)
+    if int(seen.code[0]) != 0:
+        return None
+    m, sizes = len(recurring), setup.curve.sizes[:-1]
     rows = []
     for jacobian in seen.jacobian:
-        left, _, _ = np.linalg.svd(np.eye(m) - jacobian[:, :m])
-        rows.append(left[:, -1] @ jacobian[:, m:])
-    return rows
+        left, _, _ = np.linalg.svd((jacobian[:, :m] - np.eye(m)) * sizes / sizes[:, None])
+        rows.append((left[:, -1] / sizes) @ jacobian[:, m:])
+    return np.stack(rows)
 
 
 def _of_modulus(

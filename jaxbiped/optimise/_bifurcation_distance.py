@@ -1,9 +1,7 @@
 """Distance of a gait to its nearest fold or period doubling in a parameter, differentiable.
 
-At a fold P(x, s, q) − x vanishes, and w (I − P_x) with it for a row w, so that the fold's s obeys
-ds/dq = −(w P_q)/(w P_s): first derivatives at the fold suffice. At a doubling a modulus ρ is 1, and
-ds/dq = −ρ_q/ρ_s with the gait's own change in both. Kuznetsov, Elements of Applied Bifurcation
-Theory (2004), section 10.3.1.
+Its derivatives are those of the bifurcation's value, at a fold as `bifurcation_sensitivities` has
+them; at a doubling the modulus that is 1 is held, whichever it is among the leading ones.
 """
 
 from typing import NamedTuple
@@ -14,6 +12,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import as_float
 from jaxbiped.continuation._axis import Axis, axis_of, start_of
+from jaxbiped.continuation._bifurcation_sensitivities import fold_forcing
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
 from jaxbiped.continuation._nearest_bifurcation import FACTOR, STEEPEST
@@ -29,7 +28,6 @@ from jaxbiped.optimise._jacobian_functionals import (
 from jaxbiped.scene._parameters import (
     parameter_names,
     parameter_values,
-    select_parameters,
     with_parameters,
 )
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -161,9 +159,10 @@ def _located_fold(setup: ContinuationSetup, event: BifurcationPoint) -> _Located
         precision = Precision(*(factor * each for each in problem.precision))
         other = setup._replace(problem=problem._replace(precision=precision))
         fold = _fold_near(other.curve, event)
-        if fold is None:
+        slopes_there = None if fold is None else _fold_slopes(other, fold)
+        if slopes_there is None:
             return None
-        told.append(_fold_slopes(other, fold))
+        told.append(slopes_there)
     (value, slopes), (loose_value, loose_slopes) = told
     return _Located(value, abs(value - loose_value), slopes, np.abs(slopes - loose_slopes))
 
@@ -180,18 +179,14 @@ def _fold_near(curve: Curve, event: BifurcationPoint) -> CurvePoint | None:
     return locate(curve, here, there, lambda found: float(found.tangent[-1]))
 
 
-def _fold_slopes(setup: ContinuationSetup, fold: CurvePoint) -> tuple[float, np.ndarray]:
+def _fold_slopes(setup: ContinuationSetup, fold: CurvePoint) -> tuple[float, np.ndarray] | None:
     """Value of the parameter at a fold, and its derivatives with respect to all, shape (p,)."""
     axis, point = setup.axis, fold.place[:-1] * setup.curve.sizes[:-1]
-    m, value = len(point), axis.value(float(fold.place[-1]))
-    names, active = select_parameters(setup.scene, None)
-    there = _with(setup.scene, axis, value)
-    values = [float(each) for each in parameter_values(there).values()]
-    seen = setup.problem.cycle(point, active, values, setup.footsteps)
-    jacobian, sizes = np.asarray(seen.jacobian[0]), setup.curve.sizes[:-1]
-    left, _, _ = np.linalg.svd((jacobian[:, :m] - np.eye(m)) * sizes / sizes[:, None])
-    forced = (left[:, -1] / sizes) @ jacobian[:, m:]
-    slopes = -forced / forced[names.index(axis.name)]
+    value, names = axis.value(float(fold.place[-1])), parameter_names(setup.scene)
+    forced = fold_forcing(setup, point, value, names)
+    if forced is None:
+        return None
+    slopes = -forced[0] / forced[0][names.index(axis.name)]
     slopes[names.index(axis.name)] = 0.0
     return value, slopes
 
