@@ -171,3 +171,29 @@ def derivative(t, y, p):
     out[:4] = y[4:8]
     out[4:8] = np.linalg.solve(matrix, push)
     return out
+
+
+@compiled
+def jacobian(t, y, p):
+    """Derivatives of `derivative` with respect to y, shape (n, n), by differences.
+
+    Their steps resolve how deep feet stand and the slip speed over which friction builds up, which
+    those that LSODA takes by itself may not.
+    """
+    kind, slow = int(p[15]), 1.0
+    if kind == 2 or kind == 3 or kind == 4:
+        slow = p[17]
+    elif kind == 5:
+        slow = p[21]
+    elif kind == 6 or kind == 7 or kind == 9:
+        slow = p[18]
+    elif kind == 8:
+        slow = 1.0 / p[20]
+    base, out = derivative(t, y, p), np.zeros((y.size, y.size))
+    for k in range(y.size):
+        unit = p[2] if k < 2 else 1.0
+        step = 1e-10 * unit if k < 4 or k > 7 else min(1e-8, 1e-3 * slow)
+        moved = y.copy()
+        moved[k] += step
+        out[:, k] = (derivative(t, moved, p) - base) / (moved[k] - y[k])
+    return out

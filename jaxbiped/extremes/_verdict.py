@@ -18,6 +18,8 @@ GROSS = 1e-2
 """Relative error from which a result that names no number is wrong."""
 _SURE = 0.3
 """Share of the error allowed that the check's own doubt may have."""
+_AT_ONCE = 1e-3
+"""Share of the time within which a simulation ended at its start."""
 _UNTOLD = (Ending.OUT_OF_STEPS, Ending.SOLVER_FAILED, Ending.TIMED_OUT)
 
 
@@ -72,7 +74,7 @@ def judge(case: Case) -> Verdict:
     if not finite and not flag:
         return Verdict("silently_wrong", "not a number, and nothing says so", **known)
     reached = float(walk.t[-1])
-    if reached <= 0.0 or not finite:
+    if reached <= _AT_ONCE * case.time or not finite:
         return Verdict("flagged", flag or f"it ended at its start: {walk.outcome}", **known)
     p, begin = check_numbers(scene), check_start(scene, start)
     check = checked(begin, p, reached)
