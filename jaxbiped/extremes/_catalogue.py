@@ -177,7 +177,7 @@ def questions() -> Iterator[Case]:
         rtol = 10.0**-exponent
         for engine in ("lanes", "xla"):
             asked.append((f"rtol, {engine}", rtol, {"rtol": rtol, "engine": engine}))
-    for dt in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
+    for dt in (1e-1, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 3e-6, 1e-6):
         for solver in ("rodas4", "rodas5p", "kvaerno3", "euler"):
             more = {"dt": dt, "solver": solver, "max_solver_steps": 1 << 17}
             asked.append((f"dt [s], {solver}", dt, more))

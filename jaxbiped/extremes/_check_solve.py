@@ -72,6 +72,12 @@ def checked(start: np.ndarray, p: np.ndarray, duration: float) -> Checked:
     return Checked(first[-1], distance(first[-1], second[-1], units), lowest)
 
 
+def final_state(start: np.ndarray, p: np.ndarray, duration: float, rtol: float) -> np.ndarray:
+    """The state after a time, shape (8,) or (10,); not a number where the solve fails."""
+    states = _solved(start, p, duration, rtol, scales(p, start.size), points=40)
+    return np.full(start.size, np.nan) if states is None else states[-1]
+
+
 def scales(p: np.ndarray, size: int) -> np.ndarray:
     """Units of a state: l, √(g l), radians, √(g/l), and 1 for bristles."""
     length, gravity = p[2], p[6] if p[6] > 0.0 else 1.0

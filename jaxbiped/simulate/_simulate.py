@@ -10,6 +10,7 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._accurate_walk import accurate_walk, check_accurate_walk
+from jaxbiped.simulate._fixed_steps import warn_of_long_steps
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._ending import WATCHES
 from jaxbiped.solve._trajectory import Trajectory
@@ -62,7 +63,9 @@ def simulate(
         dt: steps of this size [s], in place of tolerances; explicit methods fail on stiff contact
             unless it is about 1e-6, and their derivatives unless it is half of that: friction's
             rate, up to 5e6 1/s, makes a longer Euler step unstable, which the state survives
-            because friction saturates, and derivatives do not.
+            because friction saturates, and derivatives do not. Outside of `jit`, `vmap` and
+            derivatives the walk is solved a second time, by steps twice as long (where there are
+            few, half as long), and a `RuntimeWarning` tells where that leads elsewhere.
         save: "steps" for every step and the continuous solution, "end" for the final state, an
             array of increasing times [s], shape (n,), at which to save, or a section (by lanes
             only), whose `arrivals` to save beside the final state: `HeelStrike()` saves the
@@ -112,4 +115,9 @@ def simulate(
         adjoint=adjoint,
         engine=engine,
     )
-    return run() if wanted is None else accurate_walk(run, wanted)
+    if wanted is not None:
+        return accurate_walk(run, wanted)
+    walk = run()
+    if dt is not None:
+        warn_of_long_steps(run, walk)
+    return walk
