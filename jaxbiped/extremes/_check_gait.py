@@ -13,7 +13,7 @@ from jaxbiped.extremes._check_equations import derivative
 from jaxbiped.extremes._check_solve import final_state, scales
 
 _EXCHANGED = [0, 1, 3, 2, 4, 5, 7, 6]
-_FINE = 1e-13
+_FINE = 1e-12
 _CHANGE = 1e-5
 """Relative change of a parameter."""
 _THIRD = 1.0 / 3.0

@@ -74,8 +74,15 @@ def checked(start: np.ndarray, p: np.ndarray, duration: float) -> Checked:
 
 def final_state(start: np.ndarray, p: np.ndarray, duration: float, rtol: float) -> np.ndarray:
     """The state after a time, shape (8,) or (10,); not a number where the solve fails."""
-    states = _solved(start, p, duration, rtol, scales(p, start.size), points=40)
-    return np.full(start.size, np.nan) if states is None else states[-1]
+    return states_of(start, p, duration, rtol, points=40)[-1]
+
+
+def states_of(
+    start: np.ndarray, p: np.ndarray, duration: float, rtol: float, *, points: int
+) -> np.ndarray:
+    """States at equal moments, shape (points + 1, n); not numbers where the solve fails."""
+    states = _solved(start, p, duration, rtol, scales(p, start.size), points=points)
+    return np.full((points + 1, start.size), np.nan) if states is None else states
 
 
 def scales(p: np.ndarray, size: int) -> np.ndarray:

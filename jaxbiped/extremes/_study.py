@@ -15,13 +15,18 @@ from jaxbiped._types import JsonObject
 
 
 def study(
-    cases: Sequence[Any], judge: Callable[[Any], Any], *, store: Path | None = None
+    cases: Sequence[Any],
+    judge: Callable[[Any], Any],
+    *,
+    store: Path | None = None,
+    follow: Callable[[JsonObject], None] | None = None,
 ) -> list[JsonObject]:
     """Verdicts of cases, in their order; those that the store holds are not run again.
 
     Args:
         cases: dataclasses with a `key` and a `group`.
         judge: gives the verdict on a case, a dataclass.
+        follow: is shown the verdicts that the store holds, for a judge that remembers.
         store: file of JSON lines to read and to add to; None keeps nothing.
 
     Returns:
@@ -39,6 +44,8 @@ def study(
                     with store.open("a") as lines:
                         lines.write(json.dumps(held[case.key]) + "\n")
                 bar.update()
+            elif follow is not None:
+                follow(held[case.key])
             rows.append(held[case.key])
     return rows
 

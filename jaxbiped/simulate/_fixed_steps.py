@@ -7,6 +7,7 @@ import dataclasses
 import warnings
 
 import jax
+import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
@@ -32,7 +33,7 @@ def warn_of_long_steps(run: Simulation, walk: Trajectory) -> None:
     if walk.outcome in (Ending.SOLVER_FAILED, Ending.OUT_OF_STEPS):
         return
     many = float(run.duration) >= _MANY * float(run.dt) or run.max_solver_steps < 2 * _MANY
-    dt = run.dt * (2.0 if many else 0.5)
+    dt = 2.0 * run.dt if many else 0.5 * jnp.minimum(run.dt, run.duration)
     other = dataclasses.replace(run, dt=dt)()
     if int(other.ending) != int(walk.ending):
         found = f"it ends as {other.outcome} instead of {walk.outcome}"

@@ -12,6 +12,7 @@ from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._accurate_walk import accurate_walk, check_accurate_walk
 from jaxbiped.simulate._fixed_steps import warn_of_long_steps
 from jaxbiped.simulate._simulation import Simulation
+from jaxbiped.solve._accuracy import warn_of_unresolved_slip
 from jaxbiped.solve._ending import WATCHES
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -57,7 +58,8 @@ def simulate(
             times of √(l/g), angles of 1 rad. The walk is then solved at a looser tolerance and
             by a second method as well, and again more tightly until its error bars meet the
             number; its `error` has them. A `RuntimeWarning` tells where they cannot.
-        rtol: relative tolerance, in place of the accuracy's.
+        rtol: relative tolerance, in place of the accuracy's; a `RuntimeWarning` tells where it is
+            a thousand times coarser than what resolves how friction builds up.
         atol: absolute tolerance (SI), in place of a hundredth of the relative one: for the seed's
             leg length and gravity in SI, for a walker of another size in proportion to that.
         dt: steps of this size [s], in place of tolerances; explicit methods fail on stiff contact
@@ -117,6 +119,8 @@ def simulate(
     )
     if wanted is not None:
         return accurate_walk(run, wanted)
+    if rtol is not None and dt is None:
+        warn_of_unresolved_slip(rtol, scene.minimal)
     walk = run()
     if dt is not None:
         warn_of_long_steps(run, walk)
