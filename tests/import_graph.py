@@ -22,6 +22,7 @@ LAYERS = [
     "basins",
     "sweep",
     "optimise",
+    "extremes",
     "plot",
     "cli",
 ]
