@@ -32,9 +32,7 @@ def main() -> None:
     numbers = {
         **extremes.counts(rows, extremes.VERDICTS),
         "groups": _merged(extremes.by_group(rows, extremes.VERDICTS)),
-        "reasons": {
-            verdict: extremes.reasons(rows, verdict) for verdict in extremes.VERDICTS[1:]
-        },
+        "reasons": {verdict: extremes.reasons(rows, verdict) for verdict in extremes.VERDICTS[1:]},
         "errors": {
             "told": len(told),
             "within_told": sum(row["error"] <= row["told"] for row in told),
@@ -53,8 +51,7 @@ def main() -> None:
                 for name in ("multipliers", "elasticities")
             },
             "largest_error": {
-                name: max(row[name] for row in compared)
-                for name in ("multipliers", "elasticities")
+                name: max(row[name] for row in compared) for name in ("multipliers", "elasticities")
             },
         },
         "grazing": [_grazed(each) for each in extremes.grazing(each=4 if options.quick else 20)],

@@ -103,9 +103,7 @@ class Case:
             values = {
                 name: getattr(friction, name) for name in ("mu_static", "mu_kinetic", "v0", "xi")
             }
-            scene = dataclasses.replace(
-                scene, friction=friction_law_like(self.friction, **values)
-            )
+            scene = dataclasses.replace(scene, friction=friction_law_like(self.friction, **values))
         return scene
 
     def state(self) -> dict[str, float]:
@@ -150,7 +148,10 @@ def check_numbers(scene: Scene) -> np.ndarray:
     told = (walker.m, walker.J, walker.l, walker.d, walker.r, walker.hip_mass, ground.g)
     p[:7] = [float(value) for value in told]
     p[7], p[8] = float(ground.slope), isinstance(scene.clearance, StanceRotation)
-    for at, names, law in ((NORMAL_AT, NORMAL, scene.normal), (FRICTION_AT, FRICTION, scene.friction)):
+    for at, names, law in (
+        (NORMAL_AT, NORMAL, scene.normal),
+        (FRICTION_AT, FRICTION, scene.friction),
+    ):
         assert isinstance(law, eqx.Module)
         name = law.name
         values = [value for value in vars(law).values() if value is not None]

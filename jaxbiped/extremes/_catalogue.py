@@ -140,7 +140,10 @@ def starts() -> Iterator[Case]:
         for legs in (("omega_1",), ("omega_2",), ("omega_1", "omega_2")):
             changed = {leg: sign * rate for leg in legs}
             yield Case(
-                "leg rate [rad/s]", {"leg rate [rad/s]": rate}, start=start, changed=changed,
+                "leg rate [rad/s]",
+                {"leg rate [rad/s]": rate},
+                start=start,
+                changed=changed,
                 duration=0.02,
             )
     for speed, field in itertools.product((1e-6, 1.0, 10.0, 100.0), ("hip_vx", "hip_vz")):
@@ -185,9 +188,7 @@ def questions() -> Iterator[Case]:
         asked.append(("float32", str(accuracy), {"accuracy": accuracy, "dtype": "float32"}))
     for kind, value, how in asked:
         for parameters, start in itertools.product(_SCENES, ("standing", "striking")):
-            yield Case(
-                kind, {kind: value}, dict(parameters), start=start, duration=0.03, asked=how
-            )
+            yield Case(kind, {kind: value}, dict(parameters), start=start, duration=0.03, asked=how)
 
 
 def by_xla() -> Iterator[Case]:

@@ -1,4 +1,4 @@
-"""Grazing: derivatives of a flight whose foot all but touches the ground, or touches it by a hair."""
+"""Grazing: derivatives of a flight whose foot all but touches the ground, or barely does."""
 
 import dataclasses
 from typing import NamedTuple
@@ -69,7 +69,9 @@ def _swept(name: str, heights: np.ndarray) -> Grazing:
 
     found = jax.vmap(jax.jacfwd(end))(jnp.asarray(starts))
     derivatives = np.stack([np.asarray(leaf) for leaf in found], axis=1) * p[2] / units
-    differences = [_difference(z, h, p) * p[2] / units for z, h in zip(starts, heights, strict=True)]
+    differences = [
+        _difference(z, h, p) * p[2] / units for z, h in zip(starts, heights, strict=True)
+    ]
     return Grazing(name, heights, derivatives, np.array(differences))
 
 

@@ -60,7 +60,7 @@ def test_a_start_underground_is_refused_in_a_sentence():
 
 
 def test_a_fallen_start_is_flagged():
-    changed = {"theta_2": 1.5, "height": 1e-3}
+    changed = {"theta_1": 1.5, "theta_2": -1.5, "height": 1e-3}
     found = judge(Case("angles [rad]", {"angles [rad]": 1.5}, changed=changed, duration=0.02))
     assert found.verdict == "flagged"
     assert "ended at its start" in found.reason
