@@ -1,7 +1,7 @@
 """Extremes: simulations, gaits and derivatives at the ends of every range, against a check.
 
-Writes extremes.png, and beside it the verdicts, one case a line, from which a later run goes on. The
-check are equations of motion written anew, solved by SciPy's LSODA at two tolerances.
+Writes extremes.png, and beside it the verdicts, one case a line, from which a later run goes on.
+The check are equations of motion written anew, solved by SciPy's LSODA at two tolerances.
 """
 
 from collections.abc import Sequence
@@ -30,6 +30,7 @@ def main() -> None:
     compared = [row for row in found if row["multipliers"] is not None]
     told = [row for row in rows if row["told"] is not None and row["verdict"] == "accurate"]
     numbers = {
+        "catalogue": len(cases),
         **extremes.counts(rows, extremes.VERDICTS),
         "groups": _merged(extremes.by_group(rows, extremes.VERDICTS)),
         "reasons": {verdict: extremes.reasons(rows, verdict) for verdict in extremes.VERDICTS[1:]},

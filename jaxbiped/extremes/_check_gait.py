@@ -4,6 +4,7 @@ By central differences of the flow over one period from a state of the gait, wit
 differences. No section is needed: the flow's own direction has the multiplier 1.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -67,7 +68,15 @@ def checked_gait(
     )
 
 
-def _linearised(start, end, p, varied, flow, share, period):
+def _linearised(
+    start: np.ndarray,
+    end: np.ndarray,
+    p: np.ndarray,
+    varied: tuple[int, ...],
+    flow: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    share: float,
+    period: float,
+) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers and elasticities by differences of that share of their full size."""
     slow = p[18]
     depth = max(p[4] - start[1] + (p[2] - p[4]) * np.cos(start[2:4]).max(), 1e-9)

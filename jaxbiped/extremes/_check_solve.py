@@ -4,6 +4,7 @@ import contextlib
 import io
 import os
 import warnings
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +18,8 @@ where rounding stands in the way of the finer."""
 _NUDGE = 1e-14
 """Relative change of the second solve's start: what a chaotic motion makes of it counts."""
 _SHORT = 3e-4
-"""Share of the time left out, and made up for by the last rates, where no motion goes on at the end:
-under the paper's clearance rule a leg that turns back in the ground may have none."""
+"""Share of the time left out, and made up for by the last rates, where no motion goes on at the
+end: under the paper's clearance rule a leg that turns back in the ground may have none."""
 _POINTS, _MOST = 120, 20000
 """Moments at which a solve is looked at, and its most steps between two of them."""
 
@@ -131,7 +132,7 @@ def _solved(
 
 
 @contextlib.contextmanager
-def _silent():
+def _silent() -> Iterator[None]:
     """LSODA prints from C: what goes to standard output meanwhile is lost."""
     kept = os.dup(1)
     nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -6,6 +6,7 @@ import json
 import time
 import warnings
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -125,7 +126,7 @@ class GaitJudge:
 
 def _judged(case: GaitCase, near: tuple[float, ...]) -> GaitVerdict:
     begun = time.perf_counter()
-    guess = State(0.0, *near) if near else None
+    guess = State(*map(np.asarray, (0.0, *near))) if near else None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the error estimate tells it, too
         try:
@@ -142,7 +143,7 @@ def _judged(case: GaitCase, near: tuple[float, ...]) -> GaitVerdict:
             return GaitVerdict("refused", str(error))
     seconds = time.perf_counter() - begun
     assert gait.error is not None
-    known = dict(outcome=str(gait.outcome), seconds=seconds)
+    known: dict[str, Any] = dict(outcome=str(gait.outcome), seconds=seconds)
     if gait.outcome is not Search.FOUND:
         return GaitVerdict("flagged", f"the search ended as {gait.outcome}", **known)
     state = tuple(float(leaf) for leaf in gait.measures.state if leaf is not None)[-7:]

@@ -3,6 +3,7 @@
 import dataclasses
 import time
 import warnings
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,9 @@ def judge(case: Case) -> Verdict:
     seconds = time.perf_counter() - begun
     warned = [str(w.message) for w in caught if issubclass(w.category, RuntimeWarning)]
     told = None if walk.error is None else float(walk.error.relative)
-    known = dict(outcome=str(walk.outcome), wanted=wanted, told=told, seconds=seconds)
+    known: dict[str, Any] = dict(
+        outcome=str(walk.outcome), wanted=wanted, told=told, seconds=seconds
+    )
     flag = _flag(walk, warned)
     finite = bool(np.all(np.isfinite(end)))
     if not finite and not flag:
