@@ -88,7 +88,8 @@ class Case:
         scene = seed_scene(**self.parameters)
         clearance = StanceRotation() if self.clears else AlwaysTouching()
         scene = dataclasses.replace(scene, clearance=clearance)
-        normal, friction = scene.normal, scene.friction
+        normal: Any = scene.normal
+        friction = scene.friction
         if self.normal != "ristow-schafer":
             law = normal_law_like(
                 self.normal,
@@ -134,9 +135,9 @@ class Case:
 
 def start_of(scene: Scene, start: dict[str, float], dtype: str = "float64") -> Any:
     """The start as `simulate` takes it."""
-    cast = {name: np.asarray(value, dtype) for name, value in start.items()}
+    cast: dict[str, Any] = {name: np.asarray(value, dtype) for name, value in start.items()}
     if scene.has_bristles:
-        zero = np.zeros((), dtype)
+        zero: Any = np.zeros((), dtype)
         return BristleState(**cast, bristle_1=zero, bristle_2=zero)
     return State(**cast)
 

@@ -78,7 +78,7 @@ def pairs(*, each: int, seed: int = 23) -> Iterator[Case]:
             )
 
 
-_HARD = (
+_HARD: tuple[dict[str, float], ...] = (
     {},
     {"K": 1e10},
     {"c": 0.0},
@@ -137,8 +137,8 @@ def starts() -> Iterator[Case]:
         )
     rates = (1e-12, 1e-6, 1.0, 10.0, 30.0, 100.0, 300.0, 1e3)
     for rate, sign, start in itertools.product(rates, (1.0, -1.0), ("standing", "striking")):
-        for legs in (("omega_1",), ("omega_2",), ("omega_1", "omega_2")):
-            changed = {leg: sign * rate for leg in legs}
+        for moved in (("omega_1",), ("omega_2",), ("omega_1", "omega_2")):
+            changed = {leg: sign * rate for leg in moved}
             yield Case(
                 "leg rate [rad/s]",
                 {"leg rate [rad/s]": rate},

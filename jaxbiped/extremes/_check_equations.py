@@ -11,14 +11,17 @@ from typing import Any
 
 import numpy as np
 
+compiled: Callable[..., Any]
 try:
     import numba
-except ImportError:
-    numba = None
 
-compiled: Callable[..., Any] = (
-    (lambda function: function) if numba is None else numba.njit(error_model="numpy")
-)
+    compiled = numba.njit(error_model="numpy")
+except ImportError:
+
+    def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+        """The function itself."""
+        return function
+
 
 NORMAL = (
     "hertz",
@@ -50,7 +53,7 @@ the ground; then where the laws begin, each its number and its parameters; and h
 
 
 @compiled
-def ramp(x, width):
+def ramp(x: float, width: float) -> float:
     """Zero up to 0, x from `width` on, and twice continuously differentiable in between."""
     if x <= 0.0:
         return 0.0
@@ -61,7 +64,7 @@ def ramp(x, width):
 
 
 @compiled
-def normal_force(depth, rate, law):
+def normal_force(depth: float, rate: float, law: np.ndarray) -> float:
     """Force along the ground's normal [N]; `law` its number and its parameters."""
     if depth <= 0.0:
         return 0.0
@@ -85,13 +88,13 @@ def normal_force(depth, rate, law):
 
 
 @compiled
-def fallen(static, kinetic, speed, scale, exponent):
+def fallen(static: float, kinetic: float, speed: float, scale: float, exponent: float) -> float:
     """A coefficient that falls from static to kinetic over a scale of speed."""
     return kinetic + (static - kinetic) * math.exp(-((speed / scale) ** exponent))
 
 
 @compiled
-def friction_share(normal, slip, bent, law):
+def friction_share(normal: float, slip: float, bent: float, law: np.ndarray) -> tuple[float, float]:
     """Friction against the slip over the normal force, and the rate of a bristle in contact."""
     kind, a, b, c, d = int(law[0]), law[1], law[2], law[3], law[4]
     s = abs(slip)
@@ -129,7 +132,7 @@ def friction_share(normal, slip, bent, law):
 
 
 @compiled
-def derivative(t, y, p):
+def derivative(t: float, y: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Time derivative of x, z, θ1, θ2, their rates, and the bristles' shares where there are any.
 
     SI units; `p` are the numbers that `WALKER` and its like describe, shape (SIZE,).
@@ -174,7 +177,7 @@ def derivative(t, y, p):
 
 
 @compiled
-def jacobian(t, y, p):
+def jacobian(t: float, y: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Derivatives of `derivative` with respect to y, shape (n, n), by differences.
 
     Their steps resolve how deep feet stand and the slip speed over which friction builds up, which

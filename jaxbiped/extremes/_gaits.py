@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Iterator
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
@@ -126,7 +127,7 @@ class GaitJudge:
 
 def _judged(case: GaitCase, near: tuple[float, ...]) -> GaitVerdict:
     begun = time.perf_counter()
-    guess = State(*map(np.asarray, (0.0, *near))) if near else None
+    guess = State(*map(jnp.asarray, (0.0, *near))) if near else None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the error estimate tells it, too
         try:

@@ -77,8 +77,9 @@ def _swept(name: str, heights: np.ndarray) -> Grazing:
 
 def _end(scene: Scene, height: Parameter) -> State:
     state = State(*map(jnp.asarray, _START))._replace(hip_z=jnp.asarray(height))
-    how = dict(duration=_TIME, save="end", watch=(), engine="lanes", accuracy="tight")
-    return simulate(scene, state, **how).final
+    return simulate(
+        scene, state, duration=_TIME, save="end", watch=(), engine="lanes", accuracy="tight"
+    ).final
 
 
 def _lowest(p: np.ndarray) -> float:

@@ -81,13 +81,13 @@ def judge(case: Case) -> Verdict:
         return Verdict("flagged", flag or f"it ended at its start: {walk.outcome}", **known)
     p, begin = check_numbers(scene), check_start(scene, start)
     check = checked(begin, p, reached)
-    error = distance(end, check.state, scales(p, begin.size))
-    known |= dict(error=_number(error), doubt=_number(check.doubt))
+    apart = distance(end, check.state, scales(p, begin.size))
+    known |= dict(error=_number(apart), doubt=_number(check.doubt))
     if flag:
         return Verdict("flagged", flag, **known)
     if not check.doubt <= _SURE * wanted:
         return Verdict("unresolved", "the check's own solves part", **known)
-    if error > wanted:
+    if apart > wanted:
         return Verdict("silently_wrong", "the state is off", **known)
     wrong = _wrong_ending(walk.outcome, check, p)
     return Verdict("silently_wrong" if wrong else "accurate", wrong, **known)

@@ -39,7 +39,7 @@ def warn_of_long_steps(run: Simulation, walk: Trajectory) -> None:
         found = f"it ends as {other.outcome} instead of {walk.outcome}"
     else:
         apart = jtu.tree_map(lambda a, b: np.abs(np.asarray(a - b)), walk.final, other.final)
-        change = relative_to_scene(run.scene.minimal, 0.0, apart)
+        change = relative_to_scene(run.scene.minimal, np.zeros(()), apart)
         if change <= _LONG:
             return
         found = f"the relative change of its final state is {change:.2g}"

@@ -115,7 +115,7 @@ def resolve_slip_speed(rtol: float, scene: PyTree) -> RealScalarLike:
     return xp.where(_RESOLVED * slow < rtol * fast, finest, rtol)
 
 
-def warn_of_unresolved_slip(rtol: float, scene: PyTree) -> None:
+def warn_of_unresolved_slip(rtol: RealScalarLike, scene: PyTree) -> None:
     """Warns of a tolerance far coarser than what resolves how friction builds up, where known."""
     if isinstance(rtol, jax.core.Tracer):
         return
