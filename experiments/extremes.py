@@ -14,7 +14,7 @@ from _options import Options, parse
 from jaxbiped import extremes
 
 COLOURS = ("tab:green", "tab:blue", "tab:gray", "tab:red", "tab:orange")
-WITHIN = 1e-3
+WITHIN = 1e-2
 """Relative error of a derivative at a graze from which it is wrong."""
 
 

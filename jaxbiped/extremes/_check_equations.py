@@ -5,22 +5,22 @@ laws of contact from their sources. Nothing here is shared with the rest of the 
 results they are to be held against. Compiled where numba is installed.
 """
 
+import importlib
+import importlib.util
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-compiled: Callable[..., Any]
-try:
-    import numba
+Function = TypeVar("Function", bound=Callable[..., Any])
 
-    compiled = numba.njit(error_model="numpy")
-except ImportError:
 
-    def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-        """The function itself."""
+def compiled(function: Function) -> Function:
+    """The function, compiled where numba is installed."""
+    if importlib.util.find_spec("numba") is None:
         return function
+    return importlib.import_module("numba").njit(error_model="numpy")(function)
 
 
 NORMAL = (
