@@ -108,8 +108,8 @@ def _draw(options: Options, rows: list[dict[str, Any]]) -> Any:
             )
             ax.bar(range(len(values)), height, 1.0, bottom, color=colour, label=verdict)
             bottom = bottom + height
-        shown = range(0, len(values), max(1, (len(values) + 4) // 5))
-        ax.set_xticks(list(shown), [f"{values[k]:.3g}" for k in shown])
+        shown = range(0, len(values), max(1, (len(values) + 2) // 3))
+        ax.set_xticks(list(shown), [f"{values[k]:.2g}" for k in shown])
         ax.set_xlabel(f"{name} {UNITS[name]}")
         ax.set_ylabel("cases")
     for ax in axes.flat[len(names) :]:
