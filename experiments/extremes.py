@@ -29,6 +29,7 @@ def main() -> None:
     )
     compared = [row for row in found if row["multipliers"] is not None]
     told = [row for row in rows if row["told"] is not None and row["verdict"] == "accurate"]
+    swept = extremes.grazing(each=4, laws=1) if options.quick else extremes.grazing()
     numbers = {
         "catalogue": len(cases),
         **extremes.counts(rows, extremes.VERDICTS),
@@ -55,7 +56,7 @@ def main() -> None:
                 name: max(row[name] for row in compared) for name in ("multipliers", "elasticities")
             },
         },
-        "grazing": [_grazed(each) for each in extremes.grazing(each=4 if options.quick else 20)],
+        "grazing": [_grazed(each) for each in swept],
         "picture": str(_draw(options, rows)),
     }
     for about in (numbers, numbers["gaits"]):

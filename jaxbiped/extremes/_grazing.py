@@ -49,11 +49,11 @@ class Grazing(NamedTuple):
         return apart / np.maximum(1.0, np.max(np.abs(self.differences), axis=1))
 
 
-def grazing(*, each: int = 20) -> list[Grazing]:
-    """Sweeps through grazing, `each` heights above and below it, under three laws."""
+def grazing(*, each: int = 20, laws: int = len(_LAWS)) -> list[Grazing]:
+    """Sweeps through grazing, `each` heights above and below it, under up to three laws."""
     heights = np.geomspace(1e-7, 1e-3, each)
     heights = np.concatenate([-heights[::-1], heights])
-    return [_swept(name, heights) for name in _LAWS]
+    return [_swept(name, heights) for name in _LAWS[:laws]]
 
 
 def _swept(name: str, heights: np.ndarray) -> Grazing:
