@@ -42,7 +42,7 @@ def test_the_top_level_is_small():
 
 
 def _is_internal_package(name):
-    packages = {"cli", "compiler", "linalg", "scene", "solve", "variational"}
+    packages = {"cli", "compiler", "extremes", "linalg", "scene", "solve", "variational"}
     return name in packages
 
 
