@@ -302,11 +302,29 @@ def _named(numbers: dict[str, Any], group: str, axis: str) -> list[str]:
     return [small(each["errors"][axis]) for each in rows]
 
 
+def of_extremes(numbers: dict[str, Any]) -> Iterator[str]:
+    """How cases, gaits and derivatives about a graze came out."""
+    verdicts = ("run", "accurate", "flagged", "refused", "silently_wrong", "unresolved")
+    gaits = numbers["gaits"]
+    for name, found in (("walks", numbers), ("gaits", gaits)):
+        yield row(name, *(str(found[each]) for each in verdicts))
+    yield f"{numbers['run']} of the {numbers['catalogue']} cases"
+    errors = numbers["errors"]
+    yield f"{errors['within_told']} of {errors['told']} lie within"
+    yield f"at most {errors['most_beyond_told']:.1f} times"
+    for name, median in gaits["median_error"].items():
+        yield f"{name} {small(median)} (at most {small(gaits['largest_error'][name])})"
+    for swept in numbers["grazing"]:
+        counted = (str(swept["derivatives"]), str(swept["accurate"]))
+        yield row(swept["law"], *counted, small(swept["deepest_wrong_m"]))
+
+
 QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "accuracy_coverage": of_accuracy_coverage,
     "basin_seed": of_basin_seed,
     "basin_simplest": of_basin_simplest,
     "bifurcation_elasticities": of_bifurcation_elasticities,
+    "extremes": of_extremes,
     "force_models": of_force_models,
     "gradient_accuracy": of_gradient_accuracy,
     "gradient_truth": of_gradient_truth,

@@ -23,6 +23,7 @@ LAYERS = [
     "sweep",
     "optimise",
     "trade",
+    "extremes",
     "plot",
     "cli",
 ]

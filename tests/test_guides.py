@@ -114,7 +114,8 @@ def test_flags_of_the_command_line_exist(capsys):
     from jaxbiped.cli import main
 
     helps = ""
-    own = ("walk", "gait", "continue", "fit", "optimise", "basin", "models", "constraints", "trade")
+    studies = ("models", "constraints", "trade", "extremes")
+    own = ("walk", "gait", "continue", "fit", "optimise", "basin", *studies)
     for command in own:
         with pytest.raises(SystemExit):
             main([command, "--help"])

@@ -13,6 +13,7 @@ from jaxbiped._progress import tell_stages
 from jaxbiped.cli._basin import Basin
 from jaxbiped.cli._constraints import Constraints
 from jaxbiped.cli._continue import ContinueGait
+from jaxbiped.cli._extremes import Extremes
 from jaxbiped.cli._fit import Fit
 from jaxbiped.cli._gait import FindGait
 from jaxbiped.cli._models import Models
@@ -32,6 +33,7 @@ _Command = (
     | Annotated[Models, subcommand("models")]
     | Annotated[Constraints, subcommand("constraints")]
     | Annotated[Trade, subcommand("trade")]
+    | Annotated[Extremes, subcommand("extremes")]
     | Annotated[None, subcommand("version")]
 )
 

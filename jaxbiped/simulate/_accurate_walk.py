@@ -14,7 +14,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped.simulate._simulation import Simulation
-from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name
+from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER, Judged, check_wanted, refine
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
@@ -79,7 +79,9 @@ def accurate_walk(run: Simulation, wanted: float) -> Trajectory:
         return walk, judge_walk(run.scene.minimal, walk, witnesses)
 
     # What cannot be met is told with the error that can: not at once by the finest steps.
-    first = min(max(_FIRST * wanted, _FINEST_FIRST), float(run.rtol) * 10.0)
+    # Coarser than what resolves slip both witnesses may chatter alike.
+    resolved = float(resolve_slip_speed(1.0, run.scene.minimal))
+    first = min(max(_FIRST * wanted, _FINEST_FIRST), float(run.rtol) * 10.0, resolved)
     walk, error = refine(attempt, wanted, first=first, dtype=run.rtol.dtype)
     return dataclasses.replace(walk, error=error)
 

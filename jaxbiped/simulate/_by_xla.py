@@ -16,6 +16,7 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import ending_code, ending_events
 from jaxbiped.solve._projected_solver import with_projection
+from jaxbiped.solve._solvers import with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.controllers._extremes import Extremes
 from jaxbiped.solve.controllers._footstep_limit import PATIENCE, FootstepLimit
@@ -28,16 +29,17 @@ if TYPE_CHECKING:
 @cached_jit
 def by_xla(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`. A trajectory saved step by step keeps its full length."""
+    solver: diffrax.AbstractSolver[PyTree] = run.solver
     controller: PyTree = step_control(run.rtol, run.atol, rms_norm, run.units)
     if run.dt is not None:
         controller = diffrax.ConstantStepSize()
+        solver = with_root_tolerances(solver, run.rtol, run.atol)
     if run.footsteps is not None:
         controller = FootstepLimit(controller, run.footsteps)
     if run.extremes is not None:
         controller = Extremes(controller, run.extremes)
     events = ending_events(run.watch)
     zero = jnp.zeros_like(run.duration)
-    solver: diffrax.AbstractSolver[PyTree] = run.solver
     if isinstance(run.scene, RedundantScene):
         solver = with_projection(run.scene, solver, run.adjoint)
     solution = diffrax.diffeqsolve(

@@ -10,7 +10,9 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._accurate_walk import accurate_walk, check_accurate_walk
+from jaxbiped.simulate._fixed_steps import warn_of_long_steps
 from jaxbiped.simulate._simulation import Simulation
+from jaxbiped.solve._accuracy import warn_of_unresolved_slip
 from jaxbiped.solve._ending import WATCHES
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -56,13 +58,16 @@ def simulate(
             times of √(l/g), angles of 1 rad. The walk is then solved at a looser tolerance and
             by a second method as well, and again more tightly until its error bars meet the
             number; its `error` has them. A `RuntimeWarning` tells where they cannot.
-        rtol: relative tolerance, in place of the accuracy's.
+        rtol: relative tolerance, in place of the accuracy's; a `RuntimeWarning` tells where it is
+            a thousand times coarser than what resolves how friction builds up.
         atol: absolute tolerance (SI), in place of a hundredth of the relative one: for the seed's
             leg length and gravity in SI, for a walker of another size in proportion to that.
         dt: steps of this size [s], in place of tolerances; explicit methods fail on stiff contact
             unless it is about 1e-6, and their derivatives unless it is half of that: friction's
             rate, up to 5e6 1/s, makes a longer Euler step unstable, which the state survives
-            because friction saturates, and derivatives do not.
+            because friction saturates, and derivatives do not. Outside of `jit`, `vmap` and
+            derivatives the walk is solved a second time, by steps twice as long (where there are
+            few, half as long), and a `RuntimeWarning` tells where that leads elsewhere.
         save: "steps" for every step and the continuous solution, "end" for the final state, an
             array of increasing times [s], shape (n,), at which to save, or a section (by lanes
             only), whose `arrivals` to save beside the final state: `HeelStrike()` saves the
@@ -112,4 +117,11 @@ def simulate(
         adjoint=adjoint,
         engine=engine,
     )
-    return run() if wanted is None else accurate_walk(run, wanted)
+    if wanted is not None:
+        return accurate_walk(run, wanted)
+    if rtol is not None and dt is None:
+        warn_of_unresolved_slip(rtol, scene.minimal)
+    walk = run()
+    if dt is not None:
+        warn_of_long_steps(run, walk)
+    return walk

@@ -1,5 +1,6 @@
 """Accuracy: named tolerances, the norm that errors are measured in, and what float32 can bear."""
 
+import warnings
 from typing import Any, NamedTuple
 
 import jax
@@ -71,6 +72,9 @@ _RESOLVED = 0.5
 """Error of a walker's speed √(g l), in units of the slip speed over which friction builds up, from
 which steps may chatter about that."""
 
+_CHATTERS = 1000.0
+"""Times that a tolerance is coarser than what resolves slip from which errors were seen."""
+
 
 def tolerances(
     accuracy: str, rtol: float | None, atol: float | None, scene: PyTree = None
@@ -109,6 +113,22 @@ def resolve_slip_speed(rtol: float, scene: PyTree) -> RealScalarLike:
     fast = xp.sqrt(g * l)
     finest = _RESOLVED * slow / xp.where(fast > 0.0, fast, 1.0)
     return xp.where(_RESOLVED * slow < rtol * fast, finest, rtol)
+
+
+def warn_of_unresolved_slip(rtol: RealScalarLike, scene: PyTree) -> None:
+    """Warns of a tolerance far coarser than what resolves how friction builds up, where known."""
+    if isinstance(rtol, jax.core.Tracer):
+        return
+    finest = resolve_slip_speed(float(rtol), scene)
+    if not isinstance(finest, jax.core.Tracer) and float(rtol) > _CHATTERS * float(finest):
+        name = scene.friction.builds_up_over
+        warnings.warn(
+            f"rtol = {float(rtol):g} is too coarse for {name} = "
+            f"{float(getattr(scene.friction, name)):g} m/s: steps may chatter about that slip "
+            f"speed; {float(finest):.1g} resolves it.",
+            RuntimeWarning,
+            stacklevel=3,
+        )
 
 
 def rms_norm(error: PyTree) -> Scalar:

@@ -3,10 +3,13 @@
 from collections.abc import Callable
 
 import diffrax
+import equinox as eqx
 import optimistix
 from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice
+from jaxbiped._types import Numbers
+from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.rosenbrock._rodas3p import Rodas3P
 from jaxbiped.solve.rosenbrock._rodas4 import Rodas4
 from jaxbiped.solve.rosenbrock._rodas4p import Rodas4P
@@ -51,3 +54,22 @@ def solver_named(solver: str | diffrax.AbstractSolver[PyTree]) -> diffrax.Abstra
         return solver
     check_choice("solver", solver, SOLVERS)
     return SOLVERS[solver]()
+
+
+def with_root_tolerances(
+    solver: diffrax.AbstractSolver[PyTree], rtol: Numbers, atol: Numbers
+) -> diffrax.AbstractSolver[PyTree]:
+    """The solver, the equations of its stages solved to these tolerances if by none of their own.
+
+    An implicit solver of diffrax's has them from the control of its steps, which steps of one size
+    do without.
+    """
+    root_finder = getattr(solver, "root_finder", None)
+    if root_finder is None or eqx.is_inexact_array_like(root_finder.rtol):
+        return solver
+    return eqx.tree_at(
+        lambda each: (each.root_finder.rtol, each.root_finder.atol, each.root_finder.norm),
+        solver,
+        (rtol, atol, rms_norm),
+        is_leaf=lambda leaf: leaf is root_finder.rtol or leaf is root_finder.norm,
+    )

@@ -1,0 +1,146 @@
+"""Solve of the check's equations: final states by SciPy, and how well they are known."""
+
+import contextlib
+import io
+import os
+import warnings
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import odeint
+
+from jaxbiped.extremes._check_equations import derivative, jacobian
+
+_TOLERANCES = ((1e-13, 3e-12), (1e-11, 2e-10))
+"""Relative tolerances of a solve and of the second one that it is held against; the looser two
+where rounding stands in the way of the finer."""
+_NUDGE = 1e-14
+"""Relative change of the second solve's start: what a chaotic motion makes of it counts."""
+_SHORT = 3e-4
+"""Share of the time left out, and made up for by the last rates, where no motion goes on at the
+end: under the paper's clearance rule a leg that turns back in the ground may have none."""
+_POINTS, _MOST = 120, 20000
+"""Moments at which a solve is looked at, and its most steps between two of them."""
+
+
+class Checked(NamedTuple):
+    """What the check knows of a motion.
+
+    Attributes:
+        state: at the end, shape (8,) or (10,) with bristles [SI].
+        doubt: relative change of it by the second solve; infinite where either fails.
+        lowest: least height of the hip over the one at which it has fallen, in units of l, before
+            the last hundredth of the time.
+    """
+
+    state: np.ndarray
+    doubt: float
+    lowest: float
+
+
+def checked(start: np.ndarray, p: np.ndarray, duration: float) -> Checked:
+    """The motion from a start by the check's equations, with a second solve's doubt.
+
+    Args:
+        start: shape (8,), or (10,) with bristles, SI units.
+        p: the numbers of the scene, see `_check_equations`.
+        duration: simulated time [s].
+    """
+    units = scales(p, start.size)
+    nudge = _NUDGE * units * np.where(np.arange(start.size) % 2, 1.0, -1.0)
+
+    def both(time: float) -> tuple[np.ndarray, np.ndarray] | None:
+        for fine, coarse in _TOLERANCES:
+            first = _solved(start, p, time, fine, units, points=_POINTS)
+            if first is None:
+                continue
+            second = _solved(start + nudge, p, time, coarse, units, points=_POINTS - 19)
+            if second is not None:
+                return first, second
+        return None
+
+    found = both(duration)
+    if found is None and (found := both(duration * (1.0 - _SHORT))) is not None:
+        for states in found:
+            states[-1] += _SHORT * duration * derivative(0.0, states[-1], p)
+    if found is None:
+        return Checked(np.full(start.size, np.nan), np.inf, np.nan)
+    first, second = found
+    low = p[4] + (p[2] - p[4]) * np.cos(1.0)
+    before = first[: max(1, _POINTS * 99 // 100)]
+    lowest = float(np.min(before[:, 1] - low)) / p[2]
+    return Checked(first[-1], distance(first[-1], second[-1], units), lowest)
+
+
+def final_state(start: np.ndarray, p: np.ndarray, duration: float, rtol: float) -> np.ndarray:
+    """The state after a time, shape (8,) or (10,); not a number where the solve fails."""
+    return states_of(start, p, duration, rtol, points=40)[-1]
+
+
+def states_of(
+    start: np.ndarray, p: np.ndarray, duration: float, rtol: float, *, points: int
+) -> np.ndarray:
+    """States at equal moments, shape (points + 1, n); not numbers where the solve fails."""
+    states = _solved(start, p, duration, rtol, scales(p, start.size), points=points)
+    return np.full((points + 1, start.size), np.nan) if states is None else states
+
+
+def scales(p: np.ndarray, size: int) -> np.ndarray:
+    """Units of a state: l, √(g l), radians, √(g/l), and 1 for bristles."""
+    length, gravity = p[2], p[6] if p[6] > 0.0 else 1.0
+    time = np.sqrt(length / gravity)
+    unit = np.ones(size)
+    unit[:2], unit[4:6], unit[6:8] = length, length / time, 1.0 / time
+    return unit
+
+
+def distance(one: np.ndarray, other: np.ndarray, units: np.ndarray) -> float:
+    """The largest difference of two states in their units; infinite where one is no number."""
+    found = float(np.max(np.abs(one - other) / units))
+    return found if np.isfinite(found) else np.inf
+
+
+def _solved(
+    start: np.ndarray,
+    p: np.ndarray,
+    duration: float,
+    rtol: float,
+    units: np.ndarray,
+    *,
+    points: int,
+) -> np.ndarray | None:
+    """States at equal moments, shape (points + 1, n); None where the solve fails."""
+    times = np.linspace(0.0, duration, points + 1)
+    with warnings.catch_warnings(), _silent():
+        warnings.simplefilter("ignore")
+        states, told = odeint(
+            derivative,
+            start,
+            times,
+            args=(p,),
+            Dfun=jacobian,
+            tfirst=True,
+            rtol=rtol,
+            atol=1e-2 * rtol * units,
+            mxstep=_MOST,
+            hmax=duration / points,
+            full_output=True,
+        )
+    good = told["message"] == "Integration successful." and np.all(np.isfinite(states))
+    return states if good else None
+
+
+@contextlib.contextmanager
+def _silent() -> Iterator[None]:
+    """LSODA prints from C: what goes to standard output meanwhile is lost."""
+    kept = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)

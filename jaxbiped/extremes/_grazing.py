@@ -1,0 +1,101 @@
+"""Grazing: derivatives of a flight whose foot all but touches the ground, or barely does."""
+
+import dataclasses
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped._types import Parameter
+from jaxbiped.dynamics._state import State
+from jaxbiped.extremes._case import check_numbers
+from jaxbiped.extremes._check_solve import scales, states_of
+from jaxbiped.scene._clearance import AlwaysTouching
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene.laws._catalogue import normal_law_like
+from jaxbiped.simulate._simulate import simulate
+
+_START = np.array([0.0, 0.8, -0.5, -1.2, 0.3, 1.0, 10.0, 0.0])
+"""A walker in flight: leg 1 swings past the vertical, leg 2 is held high."""
+_TIME = 0.08
+_POINTS = 4000
+"""No step of the check is longer than that share of the time: shallow contacts are short."""
+_LAWS = ("ristow-schafer", "kelvin-voigt", "hertz")
+_FINE, _SHARE, _LARGEST = 1e-13, 0.2, 1e-6
+"""Tolerance of the check, and its differences: a share of the distance from grazing, at most."""
+
+
+class Grazing(NamedTuple):
+    """Derivatives of the final state with respect to the start's height, about grazing.
+
+    Attributes:
+        law: of the normal force.
+        heights: of the foot's lowest point had there been no ground [m], shape (n,).
+        derivatives, differences: by us and by the check, shape (n, 8), in units of the walker's
+            state over its leg length.
+    """
+
+    law: str
+    heights: np.ndarray
+    derivatives: np.ndarray
+    differences: np.ndarray
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Largest differences over the largest derivative of that height or 1, shape (n,)."""
+        apart = np.max(np.abs(self.derivatives - self.differences), axis=1)
+        return apart / np.maximum(1.0, np.max(np.abs(self.differences), axis=1))
+
+
+def grazing(*, each: int = 20, laws: int = len(_LAWS)) -> list[Grazing]:
+    """Sweeps through grazing, `each` heights above and below it, under up to three laws."""
+    heights = np.geomspace(1e-7, 1e-3, each)
+    heights = np.concatenate([-heights[::-1], heights])
+    return [_swept(name, heights) for name in _LAWS[:laws]]
+
+
+def _swept(name: str, heights: np.ndarray) -> Grazing:
+    scene = dataclasses.replace(seed_scene(), clearance=AlwaysTouching())
+    law = normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
+    scene = dataclasses.replace(scene, normal=law)
+    p = check_numbers(scene)
+    units, touching = scales(p, 8), _START[1] - _lowest(p)
+    starts = touching + heights
+
+    def end(height: Parameter) -> State:
+        return _end(scene, height)
+
+    found = jax.vmap(jax.jacfwd(end))(jnp.asarray(starts))
+    derivatives = np.stack([np.asarray(leaf) for leaf in found], axis=1) * p[2] / units
+    differences = [
+        _difference(z, h, p) * p[2] / units for z, h in zip(starts, heights, strict=True)
+    ]
+    return Grazing(name, heights, derivatives, np.array(differences))
+
+
+def _end(scene: Scene, height: Parameter) -> State:
+    state = State(*map(jnp.asarray, _START))._replace(hip_z=jnp.asarray(height))
+    return simulate(
+        scene, state, duration=_TIME, save="end", watch=(), engine="lanes", accuracy="tight"
+    ).final
+
+
+def _lowest(p: np.ndarray) -> float:
+    """Height of foot 1's lowest point on the flight from `_START`, which stays in the air [m]."""
+    states = states_of(_START, p, _TIME, _FINE, points=_POINTS)
+    height = states[:, 1] - (p[2] - p[4]) * np.cos(states[:, 2]) - p[4]
+    k = int(np.argmin(height))
+    a, b, _ = np.polyfit([-1.0, 0.0, 1.0], height[k - 1 : k + 2] - height[k], 2)
+    return float(height[k] - b * b / (4.0 * a))
+
+
+def _difference(height: float, above: float, p: np.ndarray) -> np.ndarray:
+    step = min(_LARGEST, _SHARE * abs(above))
+    ends = []
+    for sign in (1.0, -1.0):
+        start = _START.copy()
+        start[1] = height + sign * step
+        ends.append(states_of(start, p, _TIME, _FINE, points=_POINTS)[-1])
+    return (ends[0] - ends[1]) / (2.0 * step)

@@ -1,0 +1,122 @@
+"""Verdict on a case: accurate, flagged, refused or silently wrong, by the check's equations."""
+
+import dataclasses
+import time
+import warnings
+from typing import Any
+
+import numpy as np
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped._ending import Ending
+from jaxbiped.extremes._case import Case, check_numbers, check_start, start_of
+from jaxbiped.extremes._check_solve import Checked, checked, distance, scales
+from jaxbiped.simulate._simulate import simulate
+from jaxbiped.solve._trajectory import Trajectory
+
+VERDICTS = ("accurate", "flagged", "refused", "silently_wrong", "unresolved")
+GROSS = 1e-2
+"""Relative error from which a result that names no number is wrong."""
+_SURE = 0.3
+"""Share of the error allowed that the check's own doubt may have."""
+_AT_ONCE = 1e-3
+"""Share of the time within which a simulation ended at its start."""
+_UNTOLD = (Ending.OUT_OF_STEPS, Ending.SOLVER_FAILED, Ending.TIMED_OUT)
+
+
+@dataclasses.dataclass(frozen=True)
+class Verdict:
+    """How a case came out.
+
+    Attributes:
+        verdict: one of `VERDICTS`.
+        reason: the flag, the refusal, or what is wrong; "" where it is accurate.
+        outcome: how the simulation ended; "" where it was refused.
+        wanted: relative error allowed [–].
+        error: by the check [–]; None where it was not compared.
+        told: relative error that the result itself tells [–]; None where it tells none.
+        doubt: of the check itself [–]; None where it was not asked.
+        seconds: of the simulation.
+    """
+
+    verdict: str
+    reason: str = ""
+    outcome: str = ""
+    wanted: float | None = None
+    error: float | None = None
+    told: float | None = None
+    doubt: float | None = None
+    seconds: float = 0.0
+
+
+def judge(case: Case) -> Verdict:
+    """Simulates a case and holds the result against the check."""
+    accuracy = case.asked.get("accuracy")
+    wanted = float(accuracy) if isinstance(accuracy, float) else GROSS
+    begun = time.perf_counter()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RuntimeWarning)
+        try:
+            scene, start = case.scene(), case.state()
+            asked = dict(case.asked)
+            state = start_of(scene, start, asked.pop("dtype", "float64"))
+            walk = simulate(scene, state, duration=case.time, save="end", **asked)
+            end = np.array([float(leaf[-1]) for leaf in walk.state], float)
+        except ArgumentError as error:
+            return Verdict("refused", str(error))
+        except Exception as error:
+            return Verdict("silently_wrong", f"{type(error).__name__}: {error}"[:300])
+    seconds = time.perf_counter() - begun
+    warned = [str(w.message) for w in caught if issubclass(w.category, RuntimeWarning)]
+    told = None if walk.error is None else float(walk.error.relative)
+    known: dict[str, Any] = dict(
+        outcome=str(walk.outcome), wanted=wanted, told=told, seconds=seconds
+    )
+    flag = _flag(walk, warned)
+    finite = bool(np.all(np.isfinite(end)))
+    if not finite and not flag:
+        return Verdict("silently_wrong", "not a number, and nothing says so", **known)
+    reached = float(walk.t[-1])
+    if reached <= _AT_ONCE * case.time or not finite:
+        return Verdict("flagged", flag or f"it ended at its start: {walk.outcome}", **known)
+    p, begin = check_numbers(scene), check_start(scene, start)
+    check = checked(begin, p, reached)
+    apart = distance(end, check.state, scales(p, begin.size))
+    known |= dict(error=_number(apart), doubt=_number(check.doubt))
+    if flag:
+        return Verdict("flagged", flag, **known)
+    if not check.doubt <= _SURE * wanted:
+        return Verdict("unresolved", "the check's own solves part", **known)
+    if apart > wanted:
+        return Verdict("silently_wrong", "the state is off", **known)
+    wrong = _wrong_ending(walk.outcome, check, p)
+    return Verdict("silently_wrong" if wrong else "accurate", wrong, **known)
+
+
+def _flag(walk: Trajectory, warned: list[str]) -> str:
+    """What the result itself says against it, one sentence; "" for nothing."""
+    if walk.error is not None and not walk.error.met:
+        return f"accuracy not met: {walk.error.reason}"
+    if walk.outcome in _UNTOLD:
+        return f"it ended as {walk.outcome}"
+    return warned[0] if warned else ""
+
+
+def _wrong_ending(outcome: Ending, check: Checked, p: np.ndarray) -> str:
+    """What the check's motion has against how the simulation ended; "" for nothing."""
+    margin = 1e-3
+    if check.lowest < -margin:
+        return f"the hip had come down before it ended as {outcome}"
+    y = check.state
+    depth = p[4] - y[1] + (p[2] - p[4]) * np.cos(y[2:4])
+    if outcome == Ending.STOPPED:
+        slow = np.sqrt(p[6] / p[2]) * 0.11
+        if not np.any((depth > -margin * p[2]) & (np.abs(y[6:8]) < slow)):
+            return "no leg rests where it ended as stopped"
+    if outcome == Ending.STUMBLED and not np.any(depth > -margin * p[2]):
+        return "no foot is on the ground where it ended as stumbled"
+    return ""
+
+
+def _number(value: float) -> float | None:
+    return value if np.isfinite(value) else None

@@ -1,0 +1,51 @@
+"""Fixed steps: a walk by steps of one size is held against one by steps of another.
+
+Such steps control no error. Where they are too long the walk goes wrong without a sign of its own.
+"""
+
+import dataclasses
+import warnings
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._ending import Ending
+from jaxbiped.simulate._simulation import Simulation
+from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._units import relative_to_scene
+
+_LONG = 1e-2
+"""Relative change of the final state by other steps from which steps are too long."""
+_MANY = 8
+"""Steps from which the other ones are twice as long, and cost half; fewer are halved."""
+
+
+def warn_of_long_steps(run: Simulation, walk: Trajectory) -> None:
+    """Warns where other steps of one size lead elsewhere; nothing is known while tracing.
+
+    Compiles nothing: steps are an input of the program.
+    """
+    leaves = jtu.tree_leaves((run, walk))
+    if run.dt is None or any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+        return
+    if walk.outcome in (Ending.SOLVER_FAILED, Ending.OUT_OF_STEPS):
+        return
+    many = float(run.duration) >= _MANY * float(run.dt) or run.max_solver_steps < 2 * _MANY
+    dt = 2.0 * run.dt if many else 0.5 * jnp.minimum(run.dt, run.duration)
+    other = dataclasses.replace(run, dt=dt)()
+    if int(other.ending) != int(walk.ending):
+        found = f"it ends as {other.outcome} instead of {walk.outcome}"
+    else:
+        apart = jtu.tree_map(lambda a, b: np.abs(np.asarray(a - b)), walk.final, other.final)
+        change = relative_to_scene(run.scene.minimal, np.zeros(()), apart)
+        if change <= _LONG:
+            return
+        found = f"the relative change of its final state is {change:.2g}"
+    warnings.warn(
+        f"dt = {float(run.dt):g} is too long: with steps of {float(dt):g} s {found}; take shorter "
+        "steps, or tolerances.",
+        RuntimeWarning,
+        stacklevel=3,
+    )

@@ -1,0 +1,19 @@
+"""Extremes, at the experiment's quick size."""
+
+import pytest
+
+from tests.drawn import assert_is_drawn
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
+
+
+def test_nothing_is_silently_wrong(tmp_path):
+    numbers, figures = quick_run("extremes", tmp_path)
+    assert_is_drawn(figures["extremes.png"])
+    assert numbers["run"] == numbers["catalogue"] >= 60
+    assert numbers["silently_wrong"] == numbers["gaits"]["silently_wrong"] == 0
+    assert numbers["accurate"] > 0.7 * numbers["run"]
+    assert numbers["gaits"]["compared"] >= 2
+    (graze,) = numbers["grazing"]
+    assert graze["accurate"] >= 6

@@ -1,0 +1,46 @@
+"""Study of cases: its store, its counts and the catalogue."""
+
+import dataclasses
+
+from jaxbiped.extremes import VERDICTS, Case, by_group, catalogue, counts, reasons, study
+
+
+@dataclasses.dataclass(frozen=True)
+class Found:
+    verdict: str
+    reason: str = ""
+
+
+def judged(case):
+    calls.append(case.key)
+    wrong = case.group == "c"
+    return Found("refused", f"c = {case.at['c']} is not allowed") if wrong else Found("accurate")
+
+
+calls = []
+CASES = [Case("K", {"K": 1.0}), Case("c", {"c": 2.0}), Case("c", {"c": 3.5})]
+
+
+def test_a_store_is_gone_on_from(tmp_path):
+    calls.clear()
+    store, shown = tmp_path / "store.jsonl", []
+    study(CASES[:2], judged, store=store)
+    with store.open("a") as lines:
+        lines.write('{"key": "cut o')
+    store.write_text(store.read_text() + "\n")
+    rows = study(CASES, judged, store=store, follow=shown.append)
+    assert calls == [case.key for case in CASES]
+    assert [row["verdict"] for row in shown] == ["accurate", "refused"]
+    assert counts(rows, VERDICTS) == {
+        "run": 3, "accurate": 1, "flagged": 0, "refused": 2, "silently_wrong": 0, "unresolved": 0
+    }  # fmt: skip
+    assert by_group(rows, VERDICTS)["c"]["refused"] == 2
+    assert reasons(rows, "refused") == {"c = … is not allowed": 2}
+
+
+def test_the_catalogue_is_large_and_names_each_case_once():
+    cases = catalogue()
+    keys = {case.key for case in cases}
+    assert len(cases) == len(keys) >= 2000
+    assert [case.key for case in catalogue()] == [case.key for case in cases]
+    assert len(catalogue(quick=True)) < 100
