@@ -131,6 +131,15 @@ def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
             setting = f"{each['setting']} = {small(each['value'], 0)}"
             errors = small(each["state_error"]), small(each["gradient_error"])
             yield row(each["problem"], each["way"], setting, *errors, said)
+    damped = {
+        (each["way"], each["value"]): each
+        for each in numbers["rows"]
+        if each["problem"] == "spring and damper" and each["outcome"] == "answered"
+    }
+    ours, tsit5 = damped["jaxbiped", 1e-6], damped["diffrax Tsit5", 1e-6]
+    warp = damped["Warp", 1e-5]
+    yield f"{small(ours['gradient_error'])}, says {small(ours['said'])}"
+    yield f"diffrax {small(tsit5['gradient_error'])}, Warp {small(warp['gradient_error'])}"
 
 
 def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
