@@ -58,6 +58,8 @@ class Optimise:
     """Footsteps of the certificate's walk from a pushed start; 0 for none."""
     bifurcations: str = "slope"
     """Parameters in which the certificate seeks the nearest bifurcation: slope,d; or none."""
+    fatal_push: bool = False
+    """Whether the certificate seeks the smallest push after which the gait is left."""
     other_engine: bool = False
     """Whether the certificate also finds the gait by the other engine (compiles for minutes)."""
     store: Path | None = None
@@ -100,6 +102,7 @@ class Optimise:
             found,
             starts=self.basin,
             footsteps=self.footsteps,
+            fatal_push=self.fatal_push,
             bifurcations_along=along,
             other_engine=self.other_engine,
         )
@@ -170,6 +173,7 @@ def certificate_numbers(certificate: Certificate) -> JsonObject:
     told = certificate.optimality
     norm, norm_error = certificate.sensitivity_norm
     basin, walk, other = certificate.basin, certificate.walk, certificate.other_engine
+    push = certificate.fatal_push
     return {
         "kkt_residual": told.residual,
         "kkt_residual_error": told.error,
@@ -182,6 +186,7 @@ def certificate_numbers(certificate: Certificate) -> JsonObject:
         "stable": certificate.stable,
         "sensitivity_norm": {"value": norm, "error": norm_error},
         "basin": None if basin is None else dataclasses.asdict(basin),
+        "fatal_push": push and {"distance": push.distance, "push": push.push.tolist()},
         "walk": None if walk is None else walk._asdict(),
         "other_engine": None if other is None else other._asdict(),
         "nearest_bifurcations": [
@@ -261,6 +266,8 @@ def _certificate_lines(certificate: Certificate) -> list[str]:
             f"basin: {basin.estimate:.3f} of the starts about the gait ({basin.low:.3f} to "
             f"{basin.high:.3f})"
         )
+    if certificate.fatal_push is not None:
+        lines.append(f"smallest fatal push seen: {certificate.fatal_push.distance:.4f} (scaled)")
     if walk is not None:
         back = "back to the gait" if walk.returned else "NOT back to the gait"
         lines.append(f"walk from a push of {walk.push:g}: {walk.footsteps} footsteps, {back}")

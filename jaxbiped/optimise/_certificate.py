@@ -8,6 +8,7 @@ import numpy as np
 from jaxbiped._checks import check_choice, check_not_negative, check_positive, check_type
 from jaxbiped.basins._fractions import Fraction, wilson_interval
 from jaxbiped.basins._label import Label
+from jaxbiped.basins._minimal_fatal_shock import FatalShock
 from jaxbiped.continuation._nearest_bifurcation import NearestBifurcation, nearest_bifurcation
 from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._section import HeelStrike
@@ -24,11 +25,15 @@ from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.simulate._simulate import simulate
 from jaxbiped.solve._engine import ENGINES
 from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.sweep._labelling import Labelling
+from jaxbiped.sweep._nearest_failure import nearest_failure
 from jaxbiped.sweep._prepare import labelling
 from jaxbiped.sweep.starts._starts import sample
 
 _SETTLED = 1e-4
 """Relative difference between a walk's last footstep and the gait's that counts as none."""
+_FATAL = 1e-4
+"""Scaled distance to which the smallest fatal push is bisected."""
 
 
 class Walked(NamedTuple):
@@ -69,6 +74,8 @@ class Certificate(NamedTuple):
         stable: whether all lie inside the unit circle; None where an error bar crosses it.
         sensitivity_norm: see `OBJECTIVES`, with its error; infinite where the gait is not stable.
         basin: fraction of the starts within `scatter` of the gait that come back to it.
+        fatal_push: the smallest push found after which the gait is left, in the scales of
+            `nearest_failure`: a nearer one may exist, none was seen.
         walk: a walk from a pushed start.
         other_engine: the gait by the other engine.
         nearest_bifurcations: in each parameter asked for, what the gait comes to first.
@@ -81,6 +88,7 @@ class Certificate(NamedTuple):
     stable: bool | None
     sensitivity_norm: tuple[float, float]
     basin: Fraction | None
+    fatal_push: FatalShock | None
     walk: Walked | None
     other_engine: OtherEngine | None
     nearest_bifurcations: tuple[NearestBifurcation, ...]
@@ -93,6 +101,7 @@ def certify(
     scatter: float = 0.05,
     footsteps: int = 200,
     push: float = 0.01,
+    fatal_push: bool = False,
     other_engine: bool = False,
     bifurcations_along: Sequence[str] = ("slope",),
     seed: int = 0,
@@ -105,6 +114,8 @@ def certify(
         scatter: half-width of their angles [rad], and of their rates in units of √(g/l).
         footsteps: of the walk from a pushed start; 0 for none.
         push: relative change of all its velocities.
+        fatal_push: whether to look for the smallest push that is fatal, which labels some
+            thousands of starts.
         other_engine: whether to find the gait by the other engine, too, which compiles for minutes
             where that is XLA.
         bifurcations_along: parameters in each of which the gait is followed to its nearest
@@ -131,6 +142,8 @@ def certify(
     norm = jacobian_functionals(
         scene, gait.measures.state, ("sensitivity_norm",), engine=gait.engine
     )
+    knows = labelling(scene, guess=gait.measures.state) if starts or fatal_push else None
+    known = knows if knows is not None and knows.family.rows[0] else None
     return Certificate(
         optimality=optimum.optimality,
         multipliers=np.asarray(gait.multipliers),
@@ -138,7 +151,8 @@ def certify(
         unit_multiplier_error=float(gait.unit_multiplier_error),
         stable=None if undecided else bool(np.all(sizes < 1.0)),
         sensitivity_norm=(float(norm.values[0]), float(norm.errors[0])),
-        basin=_basin(scene, gait, int(starts), scatter, seed) if starts else None,
+        basin=_basin(known, gait, int(starts), scatter, seed) if known and starts else None,
+        fatal_push=_fatal_push(known) if known and fatal_push else None,
         walk=_walk(scene, gait, int(footsteps), push) if footsteps else None,
         other_engine=_by_other(scene, gait) if other_engine else None,
         nearest_bifurcations=tuple(
@@ -147,13 +161,9 @@ def certify(
     )
 
 
-def _basin(
-    scene: Scene | RigidScene, gait: Gait, count: int, scatter: float, seed: int
-) -> Fraction | None:
+def _basin(knows: Labelling, gait: Gait, count: int, scatter: float, seed: int) -> Fraction:
     """The fraction of starts about the gait, stance foot on the ground, that come back to it."""
-    knows = labelling(scene, guess=gait.measures.state)
-    if not knows.family.rows[0]:
-        return None
+    scene = knows.scene
     pace = float(np.sqrt(float(scene.ground.g) / float(scene.walker.l)))
     state = gait.measures.state
     about = {
@@ -168,6 +178,11 @@ def _basin(
     walking = int(np.sum(labels == int(Label.WALKING)))
     low, high = wilson_interval(walking, count)
     return Fraction(walking / count, float(low), float(high), walking)
+
+
+def _fatal_push(knows: Labelling) -> FatalShock:
+    """Without the simulator's derivatives, which would compile for as long as all the rest."""
+    return nearest_failure(knows, gradients=False, tolerance=_FATAL)
 
 
 def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> Walked:

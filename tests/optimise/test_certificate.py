@@ -28,7 +28,23 @@ def test_a_stable_gait_is_certified(best):
     assert found.unit_multiplier_error < 1e-5
     assert found.sensitivity_norm[1] < 1e-4 * found.sensitivity_norm[0]
     assert found.other_engine is None
+    assert found.fatal_push is None
     assert found.nearest_bifurcations == ()
+
+
+def test_the_fatal_push_is_that_of_labels(best):
+    found = jb.optimise.certify(best, starts=0, footsteps=0, bifurcations_along=(), fatal_push=True)
+    push, state = found.fatal_push.push, best.gait.measures.state
+    label = jb.labelling(best.scene, guess=state)
+    ends = []
+    for share in (0.99, 1.01):
+        moved = np.array([float(leaf) for leaf in state[1:]]) + share * push
+        start = jb.dynamics.RigidState(np.zeros(1), *moved[:, None])
+        ends.append(jb.basins.Label(int(label(start).label[0])))
+    assert 0.0 < found.fatal_push.distance < 1.0
+    assert ends[0] is jb.basins.Label.WALKING
+    assert ends[1] is not jb.basins.Label.WALKING
+    assert found.basin is None
 
 
 def test_an_unstable_gait_does_not_return():
