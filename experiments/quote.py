@@ -207,6 +207,17 @@ def of_level_ground(numbers: dict[str, Any]) -> Iterator[str]:
         yield row(f"{each['speed_m_s']:.2f}", *costs, *variables)
 
 
+def of_long_walks(numbers: dict[str, Any]) -> Iterator[str]:
+    """How a long walk keeps to its gait."""
+    period, spread = numbers["period_s"], numbers["window_std_s"]
+    yield f"after {numbers['footsteps']:,} footsteps"
+    yield f"differs from the period by {small(abs(numbers['mean_s'] / period - 1.0))} of it"
+    yield f"the largest deviation is {small(numbers['largest_deviation_s'] / period)}"
+    yield f"from {small(spread[0] / period)} in the first tenth to {small(spread[-1] / period)}"
+    low, high = numbers["peak_MiB"]
+    yield f"{low:.0f} MiB after a tenth and {high:.0f} MiB at the end"
+
+
 def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
     """How many scenes were searched, in how many walks settle, and how many were missed."""
     rows = [each for family in numbers.values() for each in family]
@@ -340,6 +351,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "identify": of_identify,
     "ladder": of_ladder,
     "level_ground": of_level_ground,
+    "long_walks": of_long_walks,
     "period_doubling": of_period_doubling,
     "search_robustness": of_search_robustness,
     "slope_branch": of_slope_branch,

@@ -3,7 +3,7 @@
 import dataclasses
 from pathlib import Path
 
-from jaxbiped._checks import check_writable_file
+from jaxbiped._checks import check_writable_directory, check_writable_file
 from jaxbiped._progress import stage
 from jaxbiped.cli._report import Report, table
 
@@ -25,9 +25,8 @@ class Extremes:
             check_writable_file("--json", self.json)
         store = None
         if self.out is not None:
-            self.out.mkdir(parents=True, exist_ok=True)
+            check_writable_directory("--out", self.out)
             store = self.out / "extremes.jsonl"
-            check_writable_file("--out", store)
         with stage("compiling"):
             from jaxbiped import extremes
         rows = extremes.study(extremes.catalogue(quick=self.quick), extremes.judge, store=store)
