@@ -6,6 +6,7 @@ between them are roots; derivatives are central differences at 60 digits. No sim
 """
 
 import dataclasses
+import functools
 from typing import Any
 
 from mpmath import mp, mpf
@@ -68,6 +69,7 @@ class Truth:
     bounces: int
 
 
+@functools.cache
 def closed_form(problem: Problem) -> Truth:
     """The ball's state and derivatives, to double precision."""
     with mp.workdps(DIGITS):

@@ -5,7 +5,6 @@ has a truth of its own, in the same closed form.
 """
 
 import dataclasses
-import importlib.util
 from typing import Any
 
 import jax
@@ -127,13 +126,7 @@ def _warp_kernel(wp: Any) -> Any:
     return step_ball
 
 
-def is_installed(name: str) -> bool:
-    """Whether a simulator is there."""
-    return importlib.util.find_spec(name) is not None
-
-
-PEERS = {
-    "mujoco": Way("MuJoCo MJX", "dt", TIME_STEPS, by_mjx, mujoco_law),
-    "warp": Way("Warp", "dt", TIME_STEPS, by_warp),
-}
-"""By the name of the module that they need."""
+PEERS = (
+    Way("MuJoCo MJX", "dt", TIME_STEPS, by_mjx, "mujoco", mujoco_law),
+    Way("Warp", "dt", TIME_STEPS, by_warp, "warp"),
+)

@@ -201,6 +201,7 @@ class Way:
         setting: what is varied.
         settings: its values, from rough to fine.
         prepare: makes ready what answers a problem at a setting.
+        module: what must be installed beside this project's own requirements; "" for nothing.
         law: the problem that it solves, where its contact is not the problem's own.
     """
 
@@ -208,6 +209,7 @@ class Way:
     setting: str
     settings: tuple[float, ...]
     prepare: Callable[[Problem, float], Run]
+    module: str = ""
     law: Callable[[Problem], Problem | None] = lambda problem: problem
 
 

@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from _smoothed_laws import smoothed_seed
 
 import jaxbiped as jb
 from jaxbiped.compiler import LANES, Program, Request
@@ -82,17 +83,12 @@ def scenes(count: int, duration: float, *, quick: bool) -> list[dict[str, Any]]:
 
     Where `quick`, of those that model most and least.
     """
-    seed = jb.seed_scene()
+    seed, smooth = jb.seed_scene(), smoothed_seed()
     friction, normal = seed.friction, seed.normal
     mu = friction.mu_static
     choices = {
         "the seed's": (normal, friction),
-        "smooth laws": (
-            jb.laws.SmoothRistowSchafer(K=1e6, c=1e7),
-            jb.laws.SmoothBengisuAkay(
-                mu_static=mu, mu_kinetic=friction.mu_kinetic, v0=friction.v0, xi=friction.xi
-            ),
-        ),
+        "smooth laws": (smooth.normal, smooth.friction),
         "regularised Coulomb": (normal, jb.laws.RegularisedCoulomb(mu=mu, v_d=1e-2)),
         "frictionless": (normal, jb.laws.Frictionless()),
         "frictionless Hertz": (jb.laws.Hertz(K=1e6), jb.laws.Frictionless()),

@@ -1,6 +1,5 @@
 """Cases of a trade study: the state after two seconds, by every way there is."""
 
-import dataclasses
 import functools
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -10,6 +9,7 @@ import _independent_walk
 import jax
 import jax.numpy as jnp
 import numpy as np
+from _smoothed_laws import smoothed_seed
 from _trade_store import Case, Store
 
 import jaxbiped as jb
@@ -77,7 +77,7 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
         how = functools.partial(_semi_implicit, walk, dt, truth)
         yield Case("walk", "semi-implicit Euler", f"dt={dt:g}", how)
     if not quick:
-        yield from _laws(store, seed)
+        yield from _laws(store)
 
 
 def cases_through_xla(store: Store, quick: bool) -> Iterator[Case]:
@@ -113,18 +113,10 @@ def _ours(
         yield Case(group, way.name, way.setting, lambda way=way: walk.row(way, truth()))
 
 
-def _laws(store: Store, seed: jb.Scene) -> Iterator[Case]:
+def _laws(store: Store) -> Iterator[Case]:
     """Other laws, each against its own truth: what they cost, not how far they are off."""
-    normal, friction = seed.normal, seed.friction
-    smooth = dataclasses.replace(
-        seed,
-        normal=jb.laws.SmoothRistowSchafer(K=normal.K, c=normal.c, n=normal.n),
-        friction=jb.laws.SmoothBengisuAkay(
-            friction.mu_static, friction.mu_kinetic, friction.v0, friction.xi
-        ),
-    )
     wider = jb.seed_scene(v0=1e-3)
-    for name, scene in (("smoothed laws", smooth), ("v0 ten times wider", wider)):
+    for name, scene in (("smoothed laws", smoothed_seed()), ("v0 ten times wider", wider)):
         walk = walk_of(scene, quick=False)
 
         def truth(name: str = name, walk: WalkTrade = walk) -> Truth:

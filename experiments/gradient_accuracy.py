@@ -5,13 +5,13 @@ every switch of the vector field ("landing"), or are chosen for the derivatives 
 both. Derivatives are always those of the solver's own steps. Laws: the seed's, and smoothed ones.
 """
 
-import dataclasses
 import time
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 from _options import Options, parse
+from _smoothed_laws import smoothed_seed
 
 import jaxbiped as jb
 
@@ -111,15 +111,7 @@ class Exact(NamedTuple):
 def laws(quick: bool) -> dict[str, jb.Scene]:
     """The scenes by the name of their laws."""
     seed = jb.seed_scene()
-    normal, friction = seed.normal, seed.friction
-    smooth = dataclasses.replace(
-        seed,
-        normal=jb.laws.SmoothRistowSchafer(K=normal.K, c=normal.c, n=normal.n),
-        friction=jb.laws.SmoothBengisuAkay(
-            friction.mu_static, friction.mu_kinetic, friction.v0, friction.xi
-        ),
-    )
-    return {"exact laws": seed} if quick else {"exact laws": seed, "smoothed laws": smooth}
+    return {"exact laws": seed} if quick else {"exact laws": seed, "smoothed laws": smoothed_seed()}
 
 
 def footstep(

@@ -6,13 +6,14 @@ form, which the numbers hold, too, so that other tools can be measured against i
 """
 
 import dataclasses
+import importlib.util
 import time
 from typing import Any
 
-import _ball_peers
 import matplotlib.pyplot as plt
 import numpy as np
 from _ball_closed_form import PROBLEMS, Problem, closed_form
+from _ball_peers import PEERS
 from _ball_ways import OUR_WAYS, Run, Way, relative_error
 from _options import Options, parse
 from tqdm import tqdm
@@ -24,7 +25,7 @@ REPEATS = 3
 def main() -> None:
     options = parse(__doc__ or "")
     problems = [_problem(problem) for problem in PROBLEMS]
-    ways = (*OUR_WAYS, *_ball_peers.PEERS.values())
+    ways = (*OUR_WAYS, *PEERS)
     work = [(problem, way) for problem in PROBLEMS for way in ways]
     rows: list[dict[str, Any]] = []
     for problem, way in tqdm(work, desc="ways"):
@@ -50,8 +51,7 @@ def _problem(problem: Problem) -> dict[str, Any]:
 def _rows(problem: Problem, way: Way, *, quick: bool) -> list[dict[str, Any]]:
     """Errors of one way at each of its settings, or why there are none."""
     named: dict[str, Any] = {"problem": problem.name, "way": way.name, "setting": way.setting}
-    missing = [module for module, peer in _ball_peers.PEERS.items() if peer is way]
-    if missing and not _ball_peers.is_installed(missing[0]):
+    if way.module and importlib.util.find_spec(way.module) is None:
         return [named | {"outcome": NOT_INSTALLED}]
     law = way.law(problem)
     if law is None:

@@ -3,9 +3,9 @@
 import dataclasses
 from pathlib import Path
 
-from jaxbiped._checks import check_writable_directory, check_writable_file
 from jaxbiped._progress import stage
 from jaxbiped.cli._report import Report, table
+from jaxbiped.cli._walk_options import OutputOptions
 
 
 @dataclasses.dataclass(frozen=True)
@@ -21,12 +21,8 @@ class Extremes:
 
     def run(self) -> int:
         """Runs the command; returns the exit code, 1 where something is silently wrong."""
-        if self.json is not None and str(self.json) != "-":
-            check_writable_file("--json", self.json)
-        store = None
-        if self.out is not None:
-            check_writable_directory("--out", self.out)
-            store = self.out / "extremes.jsonl"
+        OutputOptions(out=self.out, json=self.json).check()
+        store = None if self.out is None else self.out / "extremes.jsonl"
         with stage("compiling"):
             from jaxbiped import extremes
         rows = extremes.study(extremes.catalogue(quick=self.quick), extremes.judge, store=store)

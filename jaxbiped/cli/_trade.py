@@ -3,14 +3,14 @@
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from tqdm import tqdm
-from tyro.conf import OmitArgPrefixes
 
 from jaxbiped._checks import ArgumentError, check_count, check_positive
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
+from jaxbiped.cli._option_fields import Group, group
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 from jaxbiped.dynamics._state import State
@@ -40,12 +40,8 @@ class Trade:
     """Measure what each accuracy costs for a scene: errors of a walk and of the gait, by our own
     methods, engines and tolerances, each beside its steps and its time."""
 
-    scene: Annotated[SceneOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=SceneOptions
-    )
-    start: Annotated[StartOptions, OmitArgPrefixes] = dataclasses.field(
-        default_factory=StartOptions
-    )
+    scene: Group[SceneOptions] = group(SceneOptions)
+    start: Group[StartOptions] = group(StartOptions)
     duration: float = 2.0
     """Simulated time of the walk [s]."""
     repeats: int = 3

@@ -76,8 +76,7 @@ class Case:
     @property
     def key(self) -> str:
         """A name for the store, the same wherever the case is the same."""
-        told = json.dumps(dataclasses.asdict(self), sort_keys=True)
-        return hashlib.sha1(told.encode()).hexdigest()[:16]
+        return key_of(self)
 
     def scene(self) -> Scene:
         """The scene.
@@ -131,6 +130,12 @@ class Case:
     @property
     def _root_g(self) -> float:
         return math.sqrt(max(self.parameters.get("g", 9.8), 1e-3) / 9.8)
+
+
+def key_of(case: Any) -> str:
+    """The same text for the same numbers of a dataclass."""
+    told = json.dumps(dataclasses.asdict(case), sort_keys=True)
+    return hashlib.sha1(told.encode()).hexdigest()[:16]
 
 
 def start_of(scene: Scene, start: dict[str, float], dtype: str = "float64") -> Any:

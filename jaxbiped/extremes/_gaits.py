@@ -1,8 +1,6 @@
 """Gaits at extremes: their multipliers and sensitivities against the check's."""
 
 import dataclasses
-import hashlib
-import json
 import time
 import warnings
 from collections.abc import Iterator
@@ -14,9 +12,10 @@ import numpy as np
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state import State
-from jaxbiped.extremes._case import check_numbers
+from jaxbiped.extremes._case import check_numbers, key_of
 from jaxbiped.extremes._catalogue import parameters_at
 from jaxbiped.extremes._check_gait import apart, checked_gait
+from jaxbiped.extremes._verdict import SURE
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.scene._seed import seed_scene
@@ -25,8 +24,6 @@ WANTED = 1e-2
 """Relative error asked of gaits."""
 _VARIED = {"K": 10, "c": 11, "xi": 19}
 """Parameters with respect to which periods are differentiated, and their places in the check."""
-_SURE = 0.3
-"""Share of the error allowed that the check's own doubt may have."""
 _CHAINS: dict[str, tuple[tuple[float, ...], ...]] = {
     "K": (tuple(np.geomspace(1e6, 1e10, 13)), tuple(np.geomspace(1e6, 1e3, 10)[1:])),
     "c": (tuple(np.geomspace(1e7, 1e10, 10)[1:]), tuple(np.geomspace(1e7, 1e2, 16)[1:])),
@@ -67,8 +64,7 @@ class GaitCase:
     @property
     def key(self) -> str:
         """A name for the store, the same wherever the case is the same."""
-        told = json.dumps(dataclasses.asdict(self), sort_keys=True)
-        return "gait-" + hashlib.sha1(told.encode()).hexdigest()[:16]
+        return f"gait-{key_of(self)}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -166,9 +162,9 @@ def _judged(case: GaitCase, near: tuple[float, ...]) -> GaitVerdict:
     known |= dict(multipliers=errors[0], elasticities=errors[1], doubts=doubts)
     if not gait.error.met:
         return GaitVerdict("flagged", f"accuracy not met: {gait.error.reason}", **known)
-    wrong = any(e > WANTED and d <= _SURE * e for e, d in zip(errors, doubts, strict=True))
+    wrong = any(e > WANTED and d <= SURE * e for e, d in zip(errors, doubts, strict=True))
     if wrong:
         return GaitVerdict("silently_wrong", "a derivative is off", **known)
-    if not max(doubts) <= _SURE * WANTED:
+    if not max(doubts) <= SURE * WANTED:
         return GaitVerdict("unresolved", "the check's own differences part", **known)
     return GaitVerdict("accurate", **known)

@@ -17,7 +17,7 @@ from jaxbiped.solve._trajectory import Trajectory
 VERDICTS = ("accurate", "flagged", "refused", "silently_wrong", "unresolved")
 GROSS = 1e-2
 """Relative error from which a result that names no number is wrong."""
-_SURE = 0.3
+SURE = 0.3
 """Share of the error allowed that the check's own doubt may have."""
 _AT_ONCE = 1e-3
 """Share of the time within which a simulation ended at its start."""
@@ -85,7 +85,7 @@ def judge(case: Case) -> Verdict:
     known |= dict(error=_number(apart), doubt=_number(check.doubt))
     if flag:
         return Verdict("flagged", flag, **known)
-    if not check.doubt <= _SURE * wanted:
+    if not check.doubt <= SURE * wanted:
         return Verdict("unresolved", "the check's own solves part", **known)
     if apart > wanted:
         return Verdict("silently_wrong", "the state is off", **known)

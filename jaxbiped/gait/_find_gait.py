@@ -8,7 +8,6 @@ from typing import Literal, cast
 import diffrax
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 import optax
@@ -28,7 +27,7 @@ from jaxbiped.dynamics._state import check_state
 from jaxbiped.gait._accurate_gait import accurate_gait
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._engine import orbit_engine
-from jaxbiped.gait._fixed_point_search import Found, Search, SearchArguments, search
+from jaxbiped.gait._fixed_point_search import Found, Search, SearchArguments, search, walks_only
 from jaxbiped.gait._gait import Described, Gait, summarise_gait
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._origin import FoundBy, Origin, single_stage_origin
@@ -177,20 +176,15 @@ def find_gait(
         if staged:
             found, origin = search_along(*searching, origin)
         else:
-            found = _walks_only(search(*searching))
+            found = walks_only(search(*searching))
         return summarise_gait(spec, scene, start, found, *describing, origin)
     _compile_once(searching, describing, origin)
     found = _search(*searching)
     if not staged:
-        found = _walks_only(found)
+        found = walks_only(found)
     elif not _is_stable(found):
         found, origin = _search_on(searching, modelled, found, engine)
     return summarise_gait(spec, scene, start, found, *describing, origin)
-
-
-def _walks_only(found: Found) -> Found:
-    no_walk = (found.ending == int(Search.FOUND)) & ~found.sound
-    return found._replace(ending=jnp.where(no_walk, int(Search.NO_WALK), found.ending))
 
 
 def _is_stable(found: Found) -> bool:
@@ -222,12 +216,7 @@ def _search_on(
         return _search(spec, scene, active, start, precision, hasty)
 
     staged = search_in_stages(search_from, spec, scout, scene, modelled, first)
-    if staged.best is not None:
-        found = staged.best.found
-    elif int(first.ending) == int(Search.FOUND):
-        found = first._replace(ending=jnp.asarray(int(Search.NO_WALK)))
-    else:
-        found = first
+    found = walks_only(first) if staged.best is None else staged.best.found
     return found, origin_of(staged, modelled, start)
 
 

@@ -1,6 +1,5 @@
 """Periodic gaits from many starts."""
 
-import dataclasses
 from typing import Any, NamedTuple
 
 import jax
@@ -65,9 +64,6 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
         )
 
     gaits = _find_each(jtu.tree_map(as_float, scene), jtu.tree_map(as_float, starts), options)
-    no_walk = (gaits.ending == int(Search.FOUND)) & ~gaits.sound
-    ending = jnp.where(no_walk, int(Search.NO_WALK), gaits.ending)
-    gaits = dataclasses.replace(gaits, ending=ending)
     first, which = _told_apart(gaits)
     reached = np.bincount(which[which >= 0], minlength=len(first))
     order = np.argsort(-reached, kind="stable")

@@ -134,6 +134,12 @@ def search(
     )
 
 
+def walks_only(found: Found) -> Found:
+    """The same, told as no walk where the orbit is none."""
+    no_walk = (found.ending == int(Search.FOUND)) & ~found.sound
+    return found._replace(ending=jnp.where(no_walk, int(Search.NO_WALK), found.ending))
+
+
 def _with_soundness(spec: ReturnMapSpec, args: PyTree, guess: PyTree, end: Progress) -> Scalar:
     state, last = state_with(spec.system, guess, end.base), end.base_return
     # Not every system has a cyclic coordinate.

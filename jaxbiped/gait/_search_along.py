@@ -13,7 +13,7 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._default_guess import default_guess
-from jaxbiped.gait._fixed_point_search import Found, Search, search
+from jaxbiped.gait._fixed_point_search import Found, Search, search, walks_only
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._origin import FoundBy, Origin
@@ -103,9 +103,7 @@ def search_along(
         lambda way: select(way.over, way, _after(way, run(way), line, first)),
         begin,
     )
-    no_walk = (end.best.ending == int(Search.FOUND)) & ~end.best.sound
-    ending = jnp.where(no_walk, int(Search.NO_WALK), end.best.ending)
-    return end.best._replace(ending=ending), end.origin
+    return walks_only(end.best), end.origin
 
 
 def _after(way: _Way, latest: Found, line: Homotopy, first: Scalar) -> _Way:
