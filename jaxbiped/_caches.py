@@ -10,9 +10,7 @@ import os
 import threading
 import weakref
 from collections.abc import Callable, Hashable
-from typing import Any, Generic, NamedTuple, ParamSpec, Protocol, TypeVar
-
-import equinox as eqx
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 CACHE_BYTES_VARIABLE = "JAXBIPED_CACHE_BYTES"
 """Environment variable: bytes for records of simulations and for buffers; 0 to keep none."""
@@ -20,7 +18,6 @@ _CACHE_BYTES = 1 << 30
 PROGRAMS = 64
 """Compiled programs that each maker of such keeps; the one unused for longest goes first."""
 
-_P = ParamSpec("_P")
 _T = TypeVar("_T")
 
 
@@ -152,38 +149,11 @@ def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]
     return decorate
 
 
-class cached_jit(Generic[_P, _T]):  # noqa: N801
-    """Decorator: `equinox.filter_jit`, whose compiled programs and traces are bounded.
-
-    What is not an array is compiled in, functions too: a new one at each call would compile
-    and be kept each time. Beyond the bound all go.
-    """
-
-    def __init__(self, function: Callable[_P, _T]) -> None:
-        functools.update_wrapper(self, function)
-        self._jitted: Any = eqx.filter_jit(function)
-        _register(_name_of(function), self._info, self.clear)
-
-    def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
-        """Runs the function, compiled."""
-        if self._programs() >= PROGRAMS:
-            self.clear()
-        found: _T = self._jitted(*args, **kwargs)
-        return found
-
-    def lower(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
-        """The function, ready to be compiled for these arguments; see `equinox.filter_jit`."""
-        return self._jitted.lower(*args, **kwargs)
-
-    def clear(self) -> None:
-        """Forgets its programs and traces."""
-        self._jitted._cached.clear_cache()
-
-    def _programs(self) -> int:
-        return int(self._jitted._cached._cache_size())
-
-    def _info(self) -> CacheInfo:
-        return CacheInfo(self._programs(), PROGRAMS, "entries")
+def register_programs(
+    function: Callable[..., object], count: Callable[[], int], clear: Callable[[], object]
+) -> None:
+    """Puts a function's compiled programs, `PROGRAMS` at most, under `clear_caches`."""
+    _register(_name_of(function), lambda: CacheInfo(count(), PROGRAMS, "entries"), clear)
 
 
 def _name_of(function: Callable[..., object]) -> str:

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._caches import cached_jit
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._bristle_state import MinimalState
 from jaxbiped.dynamics._feet import standing_height

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import jax
 
-from jaxbiped._caches import cached_jit
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.constraints._constraint_method import (
     AbstractProjectingMethod,

@@ -12,7 +12,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._caches import cached_jit
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.gait._fixed_point_search import LOOSER
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with

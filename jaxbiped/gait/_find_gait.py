@@ -13,7 +13,8 @@ import numpy as np
 import optax
 from jaxtyping import PyTree
 
-from jaxbiped._caches import PROGRAMS, Once, bounded_cache, cached_jit
+from jaxbiped._cached_jit import cached_jit
+from jaxbiped._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped._checks import check_choice, check_count, check_type, check_unbatched
 from jaxbiped._progress import stage
 from jaxbiped._types import as_float
@@ -248,14 +249,14 @@ def _compilation_of(kind: tuple[object, ...]) -> Once[None]:
 def _compile(searching: SearchArguments, describing: Described, origin: Origin) -> None:
     """Compiles both programs, and what lanes run for them, at the same time."""
     spec, scene, _, start, *_ = searching
-    no_result = _empty_arrays(eqx.filter_eval_shape(_search, *searching))
+    no_result = _empty_arrays(_search.result_shape(*searching))
     told = stage("compiling the search (first time for this kind of scene)")
     with told, ThreadPoolExecutor() as meanwhile:
         with deferred_checks() as programs:
             # What takes lanes longest begins first.
-            lowered = summarise_gait.lower(spec, scene, start, no_result, *describing, origin)
-            ready = [meanwhile.submit(lowered.compile)]
-            ready.append(meanwhile.submit(_search.lower(*searching).compile))
+            finish = summarise_gait.begin(spec, scene, start, no_result, *describing, origin)
+            ready = [meanwhile.submit(finish)]
+            ready.append(meanwhile.submit(_search.begin(*searching)))
         for program in programs:
             program.check()
         for each in ready:

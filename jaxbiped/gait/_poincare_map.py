@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._caches import cached_jit
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Recorded
 from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state

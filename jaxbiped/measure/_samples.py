@@ -8,7 +8,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._caches import cached_jit
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import as_float
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import Array, PyTree
 
-from jaxbiped._caches import cached_jit
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._ending import Ending
 from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.scene._redundant_scene import RedundantScene

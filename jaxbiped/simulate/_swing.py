@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._caches import cached_jit
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError, check_count, check_finite, check_positive, check_type
 from jaxbiped._ending import Ending
 from jaxbiped._types import Parameter, Scalar, as_float

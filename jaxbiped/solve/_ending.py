@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._caches import cached_jit
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._energy import energies

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, PyTree
 
-from jaxbiped._caches import cached_jit
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import as_float
 from jaxbiped.basins._label import Label

@@ -141,6 +141,10 @@ class _AdjointSolve:
         row, self.read = ravel_pytree(step)
         self.size = len(row)
 
+    def __fingerprint__(self) -> object:
+        """See `jaxbiped._fingerprint`: a row is read as one of a step of this size."""
+        return self.engine, self.flow, self.size, self.final
+
     def program(self) -> Program:
         """The program."""
         return Program(self.start, self.attempt, self.finish, stream=self.size, backwards=True)

@@ -2,38 +2,32 @@
 
 import contextlib
 import ctypes
-import dataclasses
-import functools
+import pickle
 import threading
+import weakref
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import Array, PyTree
 
 from jaxbiped._types import Numbers
-from jaxbiped.compiler.codegen._lane_kernel import ENTRY, kernel_text
 from jaxbiped.compiler.codegen._lane_scheduler import FIELDS
 from jaxbiped.compiler.runtime._buffer_pool import BufferPool
 from jaxbiped.compiler.runtime._host_cpu import host
 from jaxbiped.compiler.runtime._input_streams import input_streams_of
-from jaxbiped.compiler.runtime._machine_code import MachineCode, assembly, machine_code
-from jaxbiped.compiler.runtime._program import (
-    Graph,
-    Outline,
-    Program,
-    graph_of,
-    leaves_of,
-    outline_of,
-)
+from jaxbiped.compiler.runtime._kernel import Kernel
+from jaxbiped.compiler.runtime._machine_code import MachineCode
+from jaxbiped.compiler.runtime._program import Graph, Outline, Program, leaves_of
 from jaxbiped.compiler.runtime._threads import default_threads, run_in_threads
 
 _MANY = 8
 """Vectors for each thread from which on two are computed side by side."""
-_TRACING = threading.Lock()
+_KNOWING = threading.Lock()
+_KNOWN: "weakref.WeakValueDictionary[str, CompiledProgram]" = weakref.WeakValueDictionary()
+"""Programs that somebody has, by their fingerprints."""
 
 
 class Recorded(NamedTuple):
@@ -72,74 +66,88 @@ class CompiledProgram:
 
     def __init__(self, program: Program, inputs: PyTree) -> None:
         """A program is traced when it is needed; `inputs` are one simulation's, or their shapes."""
-        # The outline and the graph need these: compiled by themselves, they are traced once.
-        self._program = dataclasses.replace(
-            program,
-            start=jax.jit(program.start),
-            finish=jax.jit(program.finish),
-            record=None if program.record is None else jax.jit(program.record),
-        )
-        self._inputs = jtu.tree_map(lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype), inputs)
-        self._graph: Graph | None = None
-        self._code: dict[int, MachineCode] = {}
+        self._hold(Kernel.of_program(program, inputs))
+
+    def _hold(self, kernel: Kernel) -> None:
+        self._kernel = kernel
         self._begun: set[int] = set()
-        self._lock, self._making = threading.Lock(), threading.Lock()
+        self._lock = threading.Lock()
+
+    @staticmethod
+    def of(program: Program, inputs: PyTree) -> "CompiledProgram":
+        """The one of a program, which may be in use already without having been traced."""
+        made = CompiledProgram(program, inputs)
+        digest = made._kernel.digest
+        if digest is None:
+            return made
+        with _KNOWING:
+            known = _KNOWN.setdefault(digest, made)
+        known._kernel.trace_from(made._kernel)
+        return known
+
+    @staticmethod
+    def kept(digest: str) -> "CompiledProgram":
+        """The one with this fingerprint.
+
+        Raises:
+            KeyError: neither the process nor the disk keeps it.
+        """
+        with _KNOWING:
+            known = _KNOWN.get(digest)
+            if known is None:
+                known = CompiledProgram.__new__(CompiledProgram)
+                known._hold(Kernel.kept(digest))
+                _KNOWN[digest] = known
+        return known
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Another process has it by its fingerprint."""
+        if self._kernel.digest is None:
+            raise pickle.PicklingError("a program that has no fingerprint")
+        return CompiledProgram.kept, (self._kernel.digest,)
+
+    def __fingerprint__(self) -> object:
+        """See `jaxbiped._fingerprint`."""
+        return self._kernel.digest or object()
 
     @property
-    def backwards(self) -> bool:
-        """Whether it reads streams from the last row on."""
-        return self._program.backwards
-
-    @functools.cached_property
     def size(self) -> int:
         """How many numbers the inputs of one simulation are."""
-        return sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(self._inputs))
+        return sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(self._kernel.inputs))
 
-    @functools.cached_property
+    @property
     def outline(self) -> Outline:
         """What leaves it."""
-        return outline_of(self._program, self._inputs)
+        return self._kernel.outline
+
+    @property
+    def graph(self) -> Graph:
+        """Its operations; traces it where that was not done."""
+        return self._kernel.graph
 
     def check(self) -> None:
-        """Waits until it is traced.
+        """Waits until it is traced, or known to have been.
 
         Raises:
             UnknownPrimitiveError: it holds an operation that lanes do not have.
         """
-        _ = self.graph
-
-    @property
-    def graph(self) -> Graph:
-        """Its operations."""
-        # One after the other: what is traced first can be compiled while the next one is traced.
-        if self._graph is None:
-            with _TRACING:
-                if self._graph is None:
-                    self._graph = graph_of(self._program, self._inputs)
-        return self._graph
-
-    @functools.cached_property
-    def maps(self) -> bool:
-        """Whether it loops over entries of arrays."""
-        return any(value.op == "map" for value in self.graph.body.values)
+        _ = self._kernel.signature
 
     def text(self, width: int) -> str:
         """The program as LLVM's text."""
-        return kernel_text(self.graph, width, host())
+        return self._kernel.text(width)
 
     def instructions(self) -> int:
         """How many machine instructions the program has, for vectors of the host's width."""
-        text = self.text(host().width)
-        lines = assembly(text, host(), as_written=self.maps).splitlines()
-        return sum(line.startswith("\t") and not line.startswith("\t.") for line in lines)
+        return self._kernel.instructions()
 
     def code(self, width: int) -> MachineCode:
         """The machine code, for vectors of this width."""
-        with self._making:
-            if width not in self._code:
-                text = self.text(width)
-                self._code[width] = machine_code(text, ENTRY, host(), as_written=self.maps)
-            return self._code[width]
+        return self._kernel.code(width)
+
+    def runs_at_once(self, count: int) -> bool:
+        """Whether it can run `count` simulations without being traced or compiled."""
+        return self._kernel.has_code(self.width(count, default_threads()))
 
     def width(self, count: int, threads: int) -> int:
         """Simulations in one vector: a thread that has only one is faster with it alone.
@@ -151,13 +159,13 @@ class CompiledProgram:
             return 1
         if count < _MANY * threads * host().width:
             return host().width
-        return host().width * (1 if self.maps else 2)
+        return host().width * (1 if self._kernel.signature.maps else 2)
 
     def make_ready(self, count: int) -> None:
         """Begins to trace and compile, in the background, what running `count` of them needs."""
         width = self.width(count, default_threads())
         with self._lock:
-            begun = width in self._code or width in self._begun
+            begun = width in self._begun
             self._begun.add(width)
         if not begun:
             threading.Thread(target=self._prepare, args=(width,)).start()
@@ -197,7 +205,7 @@ class CompiledProgram:
         count = leaves[0].shape[0]
         rows = [
             np.moveaxis(leaf, 0, -1).reshape(int(np.prod(shape.shape)), count)
-            for leaf, shape in zip(leaves, jtu.tree_leaves(self._inputs), strict=True)
+            for leaf, shape in zip(leaves, jtu.tree_leaves(self._kernel.inputs), strict=True)
         ]
         table = np.concatenate(rows).astype(np.float64)
         found, recorded = self.run_table(
@@ -229,10 +237,11 @@ class CompiledProgram:
         """
         table = np.ascontiguousarray(table, dtype=np.float64)
         count = table.shape[1]
-        outputs = np.full((len(self.graph.outputs), count), np.nan)
+        signature = self._kernel.signature
+        outputs = np.full((signature.outputs, count), np.nan)
         times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
-        streams = input_streams_of(stream, count, len(self.graph.row), backwards=self.backwards)
-        shape = (count, room, len(self.graph.recorded))
+        streams = input_streams_of(stream, count, signature.row, backwards=signature.backwards)
+        shape = (count, room, signature.recorded)
         records = np.zeros(shape) if memory is None else memory.array(shape)
         if schedule is not None:
             records[:] = np.nan
@@ -268,12 +277,12 @@ class CompiledProgram:
 
             workers = min(threads or default_threads(), -(-count // chosen))
             run_in_threads(work, workers, stop, quick=quick)
-        recorded = Recorded(records, record_counts) if self.graph.recording is not None else None
+        recorded = Recorded(records, record_counts) if signature.records else None
         return self._whole(outputs), recorded
 
     def _whole(self, varying: np.ndarray) -> np.ndarray:
         """The outputs with those among them that are always the same."""
-        constants = self.graph.constants
+        constants = self._kernel.signature.constants
         if not constants:
             return varying
         whole = np.empty((len(varying) + len(constants), varying.shape[1]))

@@ -74,7 +74,7 @@ class LaneEngine(AbstractEngine):
 @bounded_cache(PROGRAMS)
 def _compiled(program: Program, structure: jtu.PyTreeDef, shapes: Shapes) -> CompiledProgram:
     leaves = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in shapes]
-    return CompiledProgram(program, jtu.tree_unflatten(structure, leaves))
+    return CompiledProgram.of(program, jtu.tree_unflatten(structure, leaves))
 
 
 @bounded_cache(PROGRAMS)

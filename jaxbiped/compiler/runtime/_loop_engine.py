@@ -10,7 +10,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import Array, PyTree
 
-from jaxbiped._caches import cached_jit
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.compiler.runtime._compiled_program import Recorded
 from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result

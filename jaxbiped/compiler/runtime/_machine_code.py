@@ -1,22 +1,14 @@
 """Machine code from LLVM's text, kept in the process and on disk."""
 
 import hashlib
-import os
-import tempfile
 import threading
 import weakref
-from pathlib import Path
 
 import llvmlite
 import llvmlite.binding as llvm
 
+from jaxbiped._disk_cache import read_entry, write_entry
 from jaxbiped.compiler.runtime._host_cpu import Host
-
-CACHE_VARIABLE = "JAXBIPED_CACHE"
-"""Environment variable: the folder for compiled code; empty for none on disk."""
-_DISK_BYTES = 1 << 30
-"""What the folder may hold; code that was read or written longest ago goes first."""
-_DIGEST = 32
 
 
 class MachineCode:
@@ -34,6 +26,7 @@ class MachineCode:
 _LOADED: weakref.WeakValueDictionary[str, MachineCode] = weakref.WeakValueDictionary()
 """Code that some program still has, by what it was made from."""
 _LOCK = threading.Lock()
+_KIND = "lanes"
 
 
 def machine_code(text: str, entry: str, host: Host, *, as_written: bool) -> MachineCode:
@@ -42,12 +35,37 @@ def machine_code(text: str, entry: str, host: Host, *, as_written: bool) -> Mach
     A module may be compiled `as_written`, without LLVM's passes. These take out of a long loop all
     that its turns share, which then waits in memory for want of registers.
     """
+    name = code_name(text, entry, host, as_written=as_written)
+    code = _known_code(name, entry, host, as_written, text)
+    assert code is not None
+    return code
+
+
+def code_name(text: str, entry: str, host: Host, *, as_written: bool) -> str:
+    """By what the code of a module is found again."""
     parts = [text, entry, str(as_written), *map(str, host), *_versions()]
-    name = hashlib.sha256("\n".join(parts).encode()).hexdigest()
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def stored_code(name: str, entry: str, host: Host, *, as_written: bool) -> MachineCode | None:
+    """The code of this name, of a module that need not be known; None where nobody has it."""
+    return _known_code(name, entry, host, as_written, None)
+
+
+def _known_code(
+    name: str, entry: str, host: Host, as_written: bool, text: str | None
+) -> MachineCode | None:
     with _LOCK:
         code = _LOADED.get(name)
         if code is None:
-            code = _LOADED[name] = _load(text, entry, host, as_written, _folder(), name)
+            machine = _target_machine(host, as_written)
+            stored = read_entry(_KIND, f"{name}.o")
+            if stored is None:
+                if text is None:
+                    return None
+                stored = bytes(machine.emit_object(_module(text, machine, as_written)))
+                write_entry(_KIND, f"{name}.o", stored)
+            code = _LOADED[name] = _load(stored, machine, entry)
         return code
 
 
@@ -80,62 +98,8 @@ def _module(text: str, machine: llvm.TargetMachine, as_written: bool) -> llvm.Mo
     return module
 
 
-def _load(
-    text: str, entry: str, host: Host, as_written: bool, folder: Path | None, name: str
-) -> MachineCode:
-    machine = _target_machine(host, as_written)
-    path = None if folder is None else folder / f"{name}.o"
-    stored = None if path is None else _read(path)
-    if stored is None:
-        stored = bytes(machine.emit_object(_module(text, machine, as_written)))
-        if path is not None:
-            _write(path, stored)
+def _load(stored: bytes, machine: llvm.TargetMachine, entry: str) -> MachineCode:
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     engine.add_object_file(llvm.ObjectFileRef.from_data(stored))
     engine.finalize_object()
     return MachineCode(engine, entry)
-
-
-def _folder() -> Path | None:
-    """Where compiled code is kept: safe to delete at any time."""
-    chosen = os.environ.get(CACHE_VARIABLE)
-    if chosen is None:
-        base = os.environ.get("XDG_CACHE_HOME")
-        home = Path(base) if base else Path.home() / ".cache"
-        return home / "jaxbiped" / "lanes"
-    return Path(chosen) / "lanes" if chosen else None
-
-
-def _read(path: Path) -> bytes | None:
-    """Stored code; None where there is none, or not what was written."""
-    try:
-        content = path.read_bytes()
-        os.utime(path)
-    except OSError:
-        return None
-    digest, code = content[:_DIGEST], content[_DIGEST:]
-    return code if hashlib.sha256(code).digest() == digest else None
-
-
-def _write(path: Path, code: bytes) -> None:
-    """Stores code, whole or not at all; without a place to store it there is no harm."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent)
-        with os.fdopen(handle, "wb") as file:
-            file.write(hashlib.sha256(code).digest() + code)
-        os.replace(temporary, path)
-        _prune(path.parent)
-    except OSError:
-        return
-
-
-def _prune(folder: Path) -> None:
-    """Removes what is too much for the disk: who misses it compiles it again."""
-    files = [(entry.stat(), entry.path) for entry in os.scandir(folder) if entry.is_file()]
-    excess = sum(stat.st_size for stat, _ in files) - _DISK_BYTES
-    for stat, name in sorted(files, key=lambda file: file[0].st_mtime_ns):
-        if excess <= 0:
-            return
-        Path(name).unlink(missing_ok=True)
-        excess -= stat.st_size

@@ -4,7 +4,7 @@ import contextlib
 import contextvars
 import enum
 from collections.abc import Iterator, Sequence
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import equinox as eqx
 import jax
@@ -15,6 +15,7 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, PyTree
 
+from jaxbiped._host_call import host_call, lower_host_call
 from jaxbiped._types import Numbers
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram, Recorded
 from jaxbiped.compiler.runtime._program import leaves_of
@@ -237,27 +238,50 @@ def _abstract_evaluation(
     return [jax.core.ShapedArray(shape.shape, shape.dtype) for shape in shapes]
 
 
+class _LaneCall(NamedTuple):
+    """What a compiled program calls: simulations of a program, run in this way.
+
+    Attributes:
+        count: how many at once; `params` of the operation.
+    """
+
+    count: int
+    params: dict[str, Any]
+
+    def __call__(self, *given: np.ndarray) -> list[np.ndarray]:
+        return _run(*given, **self.params)
+
+    def __fingerprint__(self) -> object:
+        return tuple(self)
+
+    def ready(self) -> bool:
+        """Whether it runs without tracing or compiling."""
+        compiled: CompiledProgram = self.params["compiled"]
+        wants_code = self.params["wants"] is not _Part.COLUMNS
+        return not wants_code or compiled.runs_at_once(self.count)
+
+
 def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
-    """A call back from the compiled program, with arrays of NumPy.
+    """A call of the host from the compiled program, with arrays of NumPy.
 
     `jax.pure_callback` would make arrays of JAX of them, which copies, and where they are large
     waits for a thread of the same pool that this call holds: for ever, on few cores.
     """
-
-    def run(*given: np.ndarray) -> tuple[np.ndarray, ...]:
-        return tuple(_run(*given, **params))
-
+    count = context.avals_in[0].shape[0]
     if params["wants"] is not _Part.COLUMNS:
         # While XLA compiles the rest, this compiles as well.
         compiled, waiting = params["compiled"], _UNTRACED.get()
-        compiled.make_ready(context.avals_in[0].shape[0])
+        compiled.make_ready(count)
         if waiting is None:
             compiled.check()
         else:
             waiting.append(compiled)
+    run = _LaneCall(count, params)
+    if tuple(context.module_context.platforms) == ("cpu",):
+        return lower_host_call(context, host_call(run), operands)
     results, _, _ = mlir.emit_python_callback(
         context,
-        run,
+        lambda *given: tuple(run(*map(np.asarray, given))),
         None,
         list(operands),
         context.avals_in,

@@ -1,0 +1,178 @@
+"""Cached compilation: functions that XLA compiles once for all processes.
+
+A program that was compiled is kept on disk. The next process that calls the function with arguments
+of the same structure neither traces nor compiles it.
+"""
+
+import functools
+import threading
+from collections.abc import Callable, Hashable, Sequence
+from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
+
+import equinox as eqx
+import jax
+import jax.tree_util as jtu
+from jax._src.core import trace_state_clean
+
+from jaxbiped import _caches
+from jaxbiped._caches import Once, register_programs
+from jaxbiped._compiled_store import CompiledCall, read_call, trace_call
+from jaxbiped._disk_cache import cache_folder
+from jaxbiped._fingerprint import Leaf, fingerprint, leaf_of, settings
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+class _Arguments(NamedTuple):
+    """Arguments of a call that nothing traces.
+
+    Attributes:
+        arrays: those among them.
+        leaves: all, with a `Leaf` for each array; `structure` their tree.
+        kind: what decides which program runs.
+    """
+
+    arrays: list[Any]
+    leaves: list[Any]
+    structure: jtu.PyTreeDef
+    kind: Hashable
+
+    def filled(self, arrays: Sequence[Any]) -> Any:
+        """The arguments with these arrays."""
+        rest = iter(arrays)
+        return self.structure.unflatten(
+            [next(rest) if isinstance(leaf, Leaf) else leaf for leaf in self.leaves]
+        )
+
+
+class cached_jit(Generic[_P, _T]):  # noqa: N801
+    """Decorator: `equinox.filter_jit`, whose compiled programs and traces are bounded and kept.
+
+    What is not an array is compiled in, functions too: a new one at each call would compile
+    and be kept each time. Beyond the bound all go. On disk are programs of what the package and
+    its libraries define.
+    """
+
+    def __init__(self, function: Callable[_P, _T]) -> None:
+        functools.update_wrapper(self, function)
+        self._function: Callable[..., Any] = function
+        self._jitted: Any = eqx.filter_jit(function)
+        self._programs: dict[Hashable, Once[CompiledCall | None]] = {}
+        self._lock = threading.Lock()
+        register_programs(function, self._count, self.clear)
+
+    def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
+        """Runs the function, compiled."""
+        arguments = _arguments_of((args, kwargs))
+        program = None
+        if arguments is not None:
+            program = self._once(arguments)(functools.partial(self._make, arguments))
+        found: _T
+        if arguments is None or program is None:
+            self._make_room()
+            found = self._jitted(*args, **kwargs)
+        else:
+            found = program(arguments.arrays)
+        return found
+
+    def begin(self, *args: _P.args, **kwargs: _P.kwargs) -> Callable[[], object]:
+        """Traces the function, where no process did; what then compiles it, in any thread."""
+        arguments = _arguments_of((args, kwargs))
+        key = None if arguments is None else self._key(arguments)
+        if arguments is None or key is None:
+            return self._jitted.lower(*args, **kwargs).compile
+        make: Callable[[], CompiledCall | None]
+        kept = read_call(key)
+        make = self._trace(arguments, key) if kept is None else lambda: kept
+        return functools.partial(self._once(arguments), make)
+
+    def lower(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
+        """The function, ready to be compiled for these arguments; see `equinox.filter_jit`."""
+        return self._jitted.lower(*args, **kwargs)
+
+    def result_shape(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
+        """Its result with shapes instead of arrays."""
+        arguments = _arguments_of((args, kwargs))
+        key = None if arguments is None else self._key(arguments)
+        kept = None if key is None else read_call(key)
+        if arguments is None or kept is None:
+            return eqx.filter_eval_shape(self._jitted, *args, **kwargs)
+        self._once(arguments)(lambda: kept)
+        return kept.shapes()
+
+    def clear(self) -> None:
+        """Forgets its programs and traces."""
+        self._jitted._cached.clear_cache()
+        with self._lock:
+            self._programs.clear()
+
+    def _once(self, arguments: _Arguments) -> Once[CompiledCall | None]:
+        with self._lock:
+            known = self._programs.get(arguments.kind)
+        if known is None:
+            self._make_room()
+            with self._lock:
+                known = self._programs.setdefault(arguments.kind, Once())
+        return known
+
+    def _make(self, arguments: _Arguments) -> CompiledCall | None:
+        """The program for such arguments; None where it is left to `equinox`."""
+        key = self._key(arguments)
+        return None if key is None else read_call(key) or self._trace(arguments, key)()
+
+    def _trace(self, arguments: _Arguments, key: str) -> Callable[[], CompiledCall]:
+        def function(arrays: Sequence[Any]) -> Any:
+            args, kwargs = arguments.filled(arrays)
+            return self._function(*args, **kwargs)
+
+        functools.update_wrapper(function, self._function, assigned=("__name__", "__qualname__"))
+        return trace_call(function, arguments.arrays, key)
+
+    def _key(self, arguments: _Arguments) -> str | None:
+        """By what its program is found on disk; None where it is not to be kept."""
+        if cache_folder() is None:
+            return None
+        leaves = [leaf for leaf in arguments.leaves if isinstance(leaf, Leaf)]
+        return fingerprint(self._function, arguments.filled(leaves))
+
+    def _make_room(self) -> None:
+        if self._count() >= _caches.PROGRAMS:
+            self.clear()
+
+    def _count(self) -> int:
+        return int(self._jitted._cached._cache_size()) + len(self._programs)
+
+
+def _arguments_of(given: Any) -> _Arguments | None:
+    """Arguments of a program that can be kept; None where something traces or watches the call."""
+    if not trace_state_clean() or _is_watched():
+        return None
+    leaves, structure = jtu.tree_flatten(given)
+    arrays, known = [], []
+    for leaf in leaves:
+        if not eqx.is_array(leaf):
+            known.append(leaf)
+        elif isinstance(leaf, jax.core.Tracer) or getattr(leaf, "committed", False):
+            return None
+        else:
+            arrays.append(leaf)
+            known.append(leaf_of(leaf))
+    kind = structure, tuple((type(leaf), leaf) for leaf in known), settings()
+    try:
+        hash(kind)
+    except TypeError:
+        return None
+    return _Arguments(arrays, known, structure, kind)
+
+
+def _is_watched() -> bool:
+    """Whether JAX is to run as never otherwise."""
+    config = jax.config
+    return bool(
+        config.jax_disable_jit
+        or config.jax_debug_nans
+        or config.jax_debug_infs
+        or config.jax_default_device is not None
+        or jax.default_backend() != "cpu"
+    )

@@ -1,0 +1,181 @@
+"""Compiled store: programs that XLA compiled, kept on disk with all that calling them takes."""
+
+import contextlib
+import os
+import pickle
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.tree_util as jtu
+import numpy as np
+from jax.experimental import serialize_executable
+from jaxlib import lapack
+from jaxlib.mlir import ir
+
+from jaxbiped._disk_cache import read_entry, write_entry
+from jaxbiped._fingerprint import Leaf, leaf_of
+from jaxbiped._host_call import TARGET, HostCall, host_call, lowered_host_calls
+
+_KIND = "xla"
+_LAPACK = "lapack_"
+_NOISE = b"cpu_aot_loader.cc"
+"""XLA misses tuning flags, which are no features of a CPU, among the CPU's features."""
+_LOADING = threading.Lock()
+
+
+class ResultStructure(NamedTuple):
+    """What a function gives besides arrays.
+
+    Attributes:
+        leaves: of its result, with a `Leaf` for each array.
+        structure: their tree.
+    """
+
+    leaves: list[Any]
+    structure: jtu.PyTreeDef
+
+    @staticmethod
+    def of(result: Any) -> tuple["ResultStructure", list[Any]]:
+        """Of a result, and the arrays in it."""
+        leaves, structure = jtu.tree_flatten(result)
+        arrays = [isinstance(x, jax.Array | np.ndarray | np.generic) for x in leaves]
+        known = [leaf_of(x) if so else x for x, so in zip(leaves, arrays, strict=True)]
+        return ResultStructure(known, structure), [
+            x for x, so in zip(leaves, arrays, strict=True) if so
+        ]
+
+    def filled(self, arrays: Sequence[Any]) -> Any:
+        """The result with these arrays."""
+        rest = iter(arrays)
+        return self.structure.unflatten(
+            [next(rest) if isinstance(leaf, Leaf) else leaf for leaf in self.leaves]
+        )
+
+
+class CompiledCall(NamedTuple):
+    """A compiled function of arrays; call it.
+
+    Attributes:
+        compiled: by XLA, from arrays to a list of arrays.
+        result: what becomes of that list.
+        host_calls: what the program calls.
+    """
+
+    compiled: jax.stages.Compiled
+    result: ResultStructure
+    host_calls: list[HostCall]
+
+    def __call__(self, arrays: Sequence[Any]) -> Any:
+        return self.result.filled(jax.block_until_ready(self.compiled(*arrays)))
+
+    def shapes(self) -> Any:
+        """The result with shapes instead of arrays."""
+        leaves = [leaf for leaf in self.result.leaves if isinstance(leaf, Leaf)]
+        return self.result.filled(
+            [jax.ShapeDtypeStruct(x.shape, np.dtype(x.dtype), weak_type=x.weak) for x in leaves]
+        )
+
+
+def trace_call(
+    function: Callable[[Sequence[Any]], Any], arrays: Sequence[Any], key: str
+) -> Callable[[], CompiledCall]:
+    """Traces a function of arrays; what then compiles it, and keeps it by its key."""
+    results: list[ResultStructure] = []
+
+    def flat(*given: Any) -> list[Any]:
+        result, found = ResultStructure.of(function(given))
+        results.append(result)
+        return found
+
+    with lowered_host_calls() as calls:
+        lowered = jax.jit(flat).lower(*arrays)
+    targets = _foreign_targets(lowered)
+
+    def compile_it() -> CompiledCall:
+        made = CompiledCall(lowered.compile(), results[-1], calls)
+        # Others, such as calls back that are known by their place in this process, cannot be kept.
+        if all(name == TARGET or name.startswith(_LAPACK) for name in targets):
+            uses_lapack = any(name.startswith(_LAPACK) for name in targets)
+            _write(key, made, len(arrays), uses_lapack)
+        return made
+
+    return compile_it
+
+
+def read_call(key: str) -> CompiledCall | None:
+    """What was kept by a key; None where that is nothing, or what it calls is not there."""
+    content = read_entry(_KIND, key)
+    if content is None:
+        return None
+    # Whatever is amiss with it, the program is compiled again.
+    with contextlib.suppress(Exception):
+        code, count, uses_lapack, leaves, skeleton, functions = pickle.loads(content)
+        if not all(function.ready() for function in functions):
+            return None
+        calls = [host_call(function) for function in functions]
+        if uses_lapack:
+            # What tracing does otherwise.
+            lapack.prepare_lapack_call("geev", np.dtype(np.float64))
+        taken = jtu.tree_structure((tuple(range(count)), {}))
+        arrays = [leaf for leaf in leaves if isinstance(leaf, Leaf)]
+        given = jtu.tree_structure(list(range(len(arrays))))
+        with _LOADING, _without_noise():
+            compiled = serialize_executable.deserialize_and_load(
+                code, taken, given, execution_devices=jax.devices()[:1]
+            )
+        result = ResultStructure(leaves, jtu.tree_structure(skeleton))
+        return CompiledCall(compiled, result, calls)
+    return None
+
+
+def _write(key: str, made: CompiledCall, count: int, uses_lapack: bool) -> None:
+    """Keeps a program, unless it holds what another process could not have."""
+    if not all(call.storable for call in made.host_calls):
+        return
+    functions = list({call.key: call.function for call in made.host_calls}.values())
+    leaves, structure = made.result
+    skeleton = structure.unflatten(range(len(leaves)))
+    with contextlib.suppress(Exception):  # what cannot be pickled stays in this process
+        code, _, _ = serialize_executable.serialize(made.compiled)
+        write_entry(
+            _KIND, key, pickle.dumps((code, count, uses_lapack, leaves, skeleton, functions))
+        )
+
+
+def _foreign_targets(lowered: jax.stages.Lowered) -> set[str]:
+    """Names of the functions outside of XLA that a program calls."""
+    names: set[str] = set()
+
+    def note(operation: Any) -> Any:
+        if operation.name == "stablehlo.custom_call":
+            names.add(operation.attributes["call_target_name"].value)
+        return ir.WalkResult.ADVANCE
+
+    lowered.compiler_ir("stablehlo").operation.walk(note)
+    return names
+
+
+@contextlib.contextmanager
+def _without_noise() -> Iterator[None]:
+    """Keeps one wrong alarm of XLA's away from the terminal; all else told there arrives."""
+    sys.stderr.flush()
+    try:
+        terminal = os.dup(2)
+    except OSError:
+        yield
+        return
+    with tempfile.TemporaryFile() as told:
+        os.dup2(told.fileno(), 2)
+        try:
+            yield
+        finally:
+            os.dup2(terminal, 2)
+            told.seek(0)
+            for line in told:
+                if _NOISE not in line:
+                    os.write(terminal, line)
+            os.close(terminal)

@@ -1,0 +1,208 @@
+"""Fingerprint: what decides the meaning of functions and settings, the same in every process.
+
+By it a program on disk is found again. It holds for what the package and the libraries below it
+define; functions and classes of a notebook could change without a sign, so they have none.
+"""
+
+import dataclasses
+import enum
+import functools
+import hashlib
+import os
+import sys
+import types
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._caches import bounded_cache
+
+_PACKAGE = "jaxbiped"
+_LIBRARIES = (
+    "builtins", "collections", "diffrax", "equinox", "functools", "jax", "jaxlib", "jaxtyping",
+    "lineax", "llvmlite", "math", "numpy", "operator", "optax", "optimistix",
+)  # fmt: skip
+_SETTINGS = (
+    "jax_default_matmul_precision",
+    "jax_default_prng_impl",
+    "jax_enable_x64",
+    "jax_numpy_dtype_promotion",
+    "jax_numpy_rank_promotion",
+    "jax_threefry_partitionable",
+)
+_MOST_NESTED = 200
+
+
+class UnknownMeaningError(ValueError):
+    """Something whose meaning another process could not know."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Leaf:
+    """Where an array is that a program is given.
+
+    Attributes:
+        shape: of the array, with `dtype` and whether that is `weak`.
+    """
+
+    shape: tuple[int, ...]
+    dtype: str
+    weak: bool
+
+
+def fingerprint(*things: object) -> str | None:
+    """The fingerprint of these in this version of all that they use; None where there is none."""
+    digest = hashlib.sha256(_versions().encode())
+    try:
+        for part in _parts(things, 0):
+            digest.update(part)
+            digest.update(b"\0")
+    except UnknownMeaningError:
+        return None
+    return digest.hexdigest()
+
+
+def _parts(thing: Any, depth: int) -> Iterator[bytes]:
+    """What tells a thing from others, piece by piece."""
+    if depth > _MOST_NESTED:
+        raise UnknownMeaningError("nested too deeply, or within itself")
+    yield _name(type(thing)).encode()
+    own = getattr(thing, "__fingerprint__", None)
+    if own is not None and not isinstance(thing, type):
+        yield from _parts(own(), depth + 1)
+    elif thing is None or isinstance(thing, bool | int | float | complex | str | bytes | slice):
+        yield repr(thing).encode()
+    elif isinstance(thing, enum.Enum):
+        yield thing.name.encode()
+    elif isinstance(thing, np.dtype | np.generic):
+        yield repr(thing).encode()
+    elif isinstance(thing, np.ndarray | jax.Array):
+        yield from _array_parts(thing)
+    elif isinstance(thing, type):
+        yield _name(thing).encode()
+    else:
+        for each in _members(thing):
+            yield from _parts(each, depth + 1)
+        yield b"end"
+
+
+def _array_parts(array: Any) -> Iterator[bytes]:
+    if isinstance(array, jax.core.Tracer):
+        raise UnknownMeaningError("a traced array")
+    values = np.asarray(array)
+    yield f"{values.shape} {values.dtype}".encode()
+    yield values.tobytes()
+
+
+def _members(thing: Any) -> Iterator[object]:
+    """The parts of what has parts."""
+    if isinstance(thing, Mapping):
+        yield from thing.items()
+    elif isinstance(thing, tuple | list):
+        yield from thing
+    elif isinstance(thing, frozenset | set):
+        yield from sorted(thing, key=repr)
+    elif isinstance(thing, types.FunctionType):
+        yield from _function_members(thing)
+    elif isinstance(thing, types.MethodType):
+        yield from (thing.__func__, thing.__self__)
+    elif isinstance(thing, types.BuiltinFunctionType | np.ufunc):
+        yield _name(thing)
+    elif isinstance(thing, functools.partial):
+        yield from (thing.func, thing.args, thing.keywords)
+    elif isinstance(thing, jtu.PyTreeDef):
+        yield jtu.tree_unflatten(thing, [Leaf((), "", False)] * thing.num_leaves)
+    elif dataclasses.is_dataclass(thing):
+        for field in dataclasses.fields(thing):
+            yield field.name
+            yield getattr(thing, field.name, None)
+    elif _is_wrapper(thing):
+        yield thing.__wrapped__
+    elif type(thing).__module__.split(".")[0] == _PACKAGE and hasattr(thing, "__dict__"):
+        yield from sorted(_attributes(thing).items())
+    else:
+        raise UnknownMeaningError(f"a {type(thing)}")
+
+
+def _function_members(function: types.FunctionType) -> Iterator[object]:
+    """Of a function: where it is defined, and what it was defined with."""
+    yield _name(function)
+    yield function.__code__.co_firstlineno
+    yield function.__code__.co_code
+    yield function.__defaults__
+    yield function.__kwdefaults__
+    for cell in function.__closure__ or ():
+        try:
+            yield cell.cell_contents
+        except ValueError as empty:
+            raise UnknownMeaningError("a name that is not defined yet") from empty
+
+
+def _attributes(thing: object) -> dict[str, object]:
+    """What an object of one of the package's own classes was made with."""
+    found = vars(thing)
+    later = functools.cached_property
+    return {n: found[n] for n in found if not isinstance(getattr(type(thing), n, None), later)}
+
+
+def _is_wrapper(thing: object) -> bool:
+    """Whether it is a function under a transformation such as `jax.jit`."""
+    return callable(thing) and callable(getattr(thing, "__wrapped__", None))
+
+
+def _name(thing: Any) -> str:
+    """The name of a class or function of the package or a library that it uses."""
+    module = getattr(thing, "__module__", None) or getattr(type(thing), "__module__", "")
+    root = str(module).split(".")[0]
+    if root not in (_PACKAGE, *_LIBRARIES) and root != "types":
+        raise UnknownMeaningError(f"{thing!r} of {module}")
+    return f"{module}.{getattr(thing, '__qualname__', getattr(thing, '__name__', ''))}"
+
+
+@bounded_cache(1)
+def _source_digest() -> str:
+    """Of all the package's modules."""
+    digest = hashlib.sha256()
+    folder = Path(__file__).parent
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(str(path.relative_to(folder)).encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def settings() -> tuple[object, ...]:
+    """Settings of JAX that change what a program does."""
+    return tuple(getattr(jax.config, name, None) for name in _SETTINGS)
+
+
+def _versions() -> str:
+    """Of all that is used, with the machine and the settings."""
+    flags = os.environ.get("XLA_FLAGS", "")
+    return "\n".join([_libraries(), flags, *map(str, settings())])
+
+
+@bounded_cache(1)
+def _libraries() -> str:
+    from importlib.metadata import version
+
+    import llvmlite.binding as llvm
+
+    names = ("diffrax", "equinox", "jax", "jaxlib", "lineax", "llvmlite", "numpy", "optax",
+             "optimistix")  # fmt: skip
+    cpu = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
+    return "\n".join([sys.version, cpu, _source_digest(), *(f"{n} {version(n)}" for n in names)])
+
+
+def as_leaves(tree: Any) -> Any:
+    """A tree of shapes as one of `Leaf`s."""
+    return jtu.tree_map(leaf_of, tree)
+
+
+def leaf_of(array: Any) -> Leaf:
+    """Of an array."""
+    weak = bool(getattr(array, "weak_type", False))
+    return Leaf(tuple(np.shape(array)), str(array.dtype), weak)

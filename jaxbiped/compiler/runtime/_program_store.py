@@ -1,0 +1,108 @@
+"""Program store: what running a program takes besides its machine code, kept for the next process.
+
+With it, a program that some process had traced runs in another one that never traces it.
+"""
+
+import pickle
+from typing import Any, NamedTuple
+
+import jax
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._disk_cache import read_entry, write_entry
+from jaxbiped.compiler.codegen._lane_kernel import ENTRY
+from jaxbiped.compiler.runtime._host_cpu import Host
+from jaxbiped.compiler.runtime._machine_code import MachineCode, stored_code
+from jaxbiped.compiler.runtime._program import Graph, Outline
+
+_KIND = "programs"
+
+
+class Signature(NamedTuple):
+    """What a program's callers have to know of its operations.
+
+    Attributes:
+        inputs: pytree of the inputs, with shapes and dtypes.
+        outline: what leaves it.
+        outputs: how many numbers differ between simulations, `constants` those that do not, by
+            their places.
+        row: numbers in each row of the stream that it reads.
+        recorded: numbers in each record, `records` whether it makes any.
+        maps: whether it loops over entries of arrays.
+        backwards: whether it reads streams from the last row on.
+    """
+
+    inputs: Any
+    outline: Outline
+    outputs: int
+    constants: dict[int, float]
+    row: int
+    recorded: int
+    records: bool
+    maps: bool
+    backwards: bool
+
+    @property
+    def size(self) -> int:
+        """How many numbers the inputs of one simulation are."""
+        return sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(self.inputs))
+
+
+def signature_of(graph: Graph, inputs: Any, outline: Outline, *, backwards: bool) -> Signature:
+    """Of a program that was traced."""
+    return Signature(
+        inputs=inputs,
+        outline=outline,
+        outputs=len(graph.outputs),
+        constants=graph.constants,
+        row=len(graph.row),
+        recorded=len(graph.recorded),
+        records=graph.recording is not None,
+        maps=any(value.op == "map" for value in graph.body.values),
+        backwards=backwards,
+    )
+
+
+def read_signature(digest: str) -> Signature | None:
+    """Of the program with this fingerprint; None where it is not kept."""
+    content = read_entry(_KIND, digest)
+    if content is None:
+        return None
+    *parts, inputs, outputs, recorded = pickle.loads(content)
+    outline = Outline(_with_shapes(*outputs), recorded)
+    return Signature(_with_shapes(*inputs), outline, *parts)
+
+
+def write_signature(digest: str, signature: Signature) -> None:
+    """Keeps it."""
+    inputs, outline, *parts = signature
+    content = (*parts, _as_plain(inputs), _as_plain(outline.outputs), outline.recorded)
+    write_entry(_KIND, digest, pickle.dumps(content))
+
+
+def read_code(digest: str, width: int, host: Host, *, maps: bool) -> MachineCode | None:
+    """A program's machine code for vectors of this width; None where it is not kept."""
+    name = read_entry(_KIND, _code_entry(digest, width, host))
+    return None if name is None else stored_code(name.decode(), ENTRY, host, as_written=maps)
+
+
+def write_code_name(digest: str, width: int, host: Host, name: str) -> None:
+    """Keeps by what name to find a program's machine code."""
+    write_entry(_KIND, _code_entry(digest, width, host), name.encode())
+
+
+def _code_entry(digest: str, width: int, host: Host) -> str:
+    return f"{digest}-{host.cpu}-{host.width}-{width}"
+
+
+def _as_plain(tree: Any) -> tuple[Any, list[tuple[tuple[int, ...], str]]]:
+    """A tree of shapes as what can be pickled: its structure filled with numbers, and those."""
+    leaves, structure = jtu.tree_flatten(tree)
+    filled = jtu.tree_unflatten(structure, list(range(len(leaves))))
+    return filled, [(tuple(leaf.shape), str(leaf.dtype)) for leaf in leaves]
+
+
+def _with_shapes(filled: Any, shapes: list[tuple[tuple[int, ...], str]]) -> Any:
+    leaves = [jax.ShapeDtypeStruct(shape, np.dtype(dtype)) for shape, dtype in shapes]
+    return jtu.tree_unflatten(jtu.tree_structure(filled), leaves)
