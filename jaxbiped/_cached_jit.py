@@ -82,10 +82,11 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         key = None if arguments is None else self._key(arguments)
         if arguments is None or key is None:
             return self._jitted.lower(*args, **kwargs).compile
-        make: Callable[[], CompiledCall | None]
-        kept = read_call(key)
-        make = self._trace(arguments, key) if kept is None else lambda: kept
-        return functools.partial(self._once(arguments), make)
+        once = self._once(arguments)
+        kept = None if once.done else read_call(key)
+        if once.done or kept is not None:
+            return functools.partial(once, lambda: kept)
+        return functools.partial(once, self._trace(arguments, key))
 
     def lower(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
         """The function, ready to be compiled for these arguments; see `equinox.filter_jit`."""

@@ -97,6 +97,11 @@ class Once(Generic[_T]):
     def __init__(self) -> None:
         self._lock, self._made = threading.Lock(), list[_T]()
 
+    @property
+    def done(self) -> bool:
+        """Whether it is made."""
+        return bool(self._made)
+
     def __call__(self, make: Callable[[], _T]) -> _T:
         """The value, made where it is not; where making fails, the next call tries again."""
         if not self._made:

@@ -79,6 +79,11 @@ def holds_somewhere(condition: ArrayLike) -> bool:
     return not _is_traced(condition) and bool(np.any(condition))
 
 
+def is_zero_somewhere(value: ArrayLike) -> bool:
+    """Whether any entry is known to be zero."""
+    return not _is_traced(value) and bool(np.any(np.asarray(value) == 0.0))
+
+
 def check_finite(name: str, value: object) -> None:
     """Raises `ArgumentError` unless every entry of `value` is a finite number."""
     _require(name, value, "a finite number", lambda x: np.ones(x.shape, bool))

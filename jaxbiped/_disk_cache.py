@@ -65,8 +65,8 @@ def write_entry(kind: str, name: str, content: bytes) -> None:
     if path is None:
         return
     try:
-        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         for folder in (path.parent.parent, path.parent):
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             if not _is_own(folder):
                 os.chmod(folder, 0o700)
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".")

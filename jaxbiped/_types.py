@@ -56,6 +56,7 @@ def as_float(value: Parameter) -> Scalar:
     if not is_number(value):
         return value
     try:
-        return jnp.asarray(value, dtype=float)
+        # By NumPy: JAX would compile a program for each kind of number.
+        return jnp.asarray(np.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float)))
     except (TypeError, ValueError):
         return value

@@ -2,6 +2,8 @@
 
 import gc
 import os
+import shutil
+import tempfile
 from pathlib import Path
 
 import hypothesis
@@ -9,6 +11,7 @@ import jax
 import pytest
 
 import jaxbiped as jb
+from jaxbiped._disk_cache import CACHE_VARIABLE
 from tests.reference import reference_states
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 
@@ -35,8 +38,23 @@ def _few_programs_are_kept():
     yield
     mappings = Path("/proc/self/maps")
     if mappings.exists() and mappings.read_bytes().count(b"\n") > MANY_MAPPINGS:
+        jb.clear_caches()
         jax.clear_caches()
         gc.collect()
+
+
+def pytest_configure(config):
+    """One cache on disk for all workers of a run, empty at first: what one compiled others load."""
+    if "PYTEST_XDIST_WORKER" not in os.environ:
+        folder = tempfile.mkdtemp(prefix="jaxbiped-tests-")
+        os.environ[CACHE_VARIABLE] = folder
+        config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
+
+
+@pytest.fixture
+def no_disk_cache(monkeypatch):
+    """For a test that changes what a program does behind its fingerprint's back."""
+    monkeypatch.setenv(CACHE_VARIABLE, "")
 
 
 def pytest_collection_finish():

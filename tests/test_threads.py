@@ -71,7 +71,7 @@ def test_threads_that_find_everything_compiled(expected):
         same(found, expected[name])
 
 
-def test_threads_that_compile_at_once(expected):
+def test_threads_that_compile_at_once(expected, no_disk_cache):
     jb.clear_caches()
     for name, found in _all_at_once(2):
         same(found, expected[name])

@@ -2,7 +2,6 @@
 
 from typing import NamedTuple, TypeVar
 
-import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_finite, check_type
@@ -44,14 +43,14 @@ def seed_state() -> State:
         Scalar leaves, 64-bit floats.
     """
     return State(
-        hip_x=jnp.asarray(0.0, dtype=float),
-        hip_z=jnp.asarray(0.395, dtype=float),
-        theta_1=jnp.asarray(-0.2479, dtype=float),
-        theta_2=jnp.asarray(0.1655, dtype=float),
-        hip_vx=jnp.asarray(0.49797, dtype=float),
-        hip_vz=jnp.asarray(0.05853, dtype=float),
-        omega_1=jnp.asarray(-0.0052, dtype=float),
-        omega_2=jnp.asarray(-1.2565, dtype=float),
+        hip_x=as_float(0.0),
+        hip_z=as_float(0.395),
+        theta_1=as_float(-0.2479),
+        theta_2=as_float(0.1655),
+        hip_vx=as_float(0.49797),
+        hip_vz=as_float(0.05853),
+        omega_1=as_float(-0.0052),
+        omega_2=as_float(-1.2565),
     )
 
 

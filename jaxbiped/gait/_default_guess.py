@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._caches import bounded_cache
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._bristle_state import BristleState
@@ -16,6 +17,7 @@ from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
 
 
+@cached_jit  # many small operations
 def default_guess(scene: AbstractScene) -> WalkerState:
     """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight."""
     seed, own = _seed()

@@ -5,7 +5,7 @@ import equinox as eqx
 from jaxbiped._checks import (
     ArgumentError,
     check_at_least,
-    holds_somewhere,
+    is_zero_somewhere,
 )
 from jaxbiped._parameter import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar
@@ -39,9 +39,9 @@ class Walker(eqx.Module):
     def __check_init__(self) -> None:
         check_parameters(self)
         check_at_least("l", self.l, "r", self.r)
-        if holds_somewhere(self.J == 0.0):
+        if is_zero_somewhere(self.J):
             for name in ("d", "hip_mass"):
-                if holds_somewhere(getattr(self, name) == 0.0):
+                if is_zero_somewhere(getattr(self, name)):
                     raise ArgumentError(
                         f"J = 0 is not allowed where {name} = 0: legs that are mass points need d "
                         "and hip_mass above 0."

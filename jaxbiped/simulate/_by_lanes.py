@@ -4,8 +4,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import diffrax
+import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import Array, ArrayLike
 
@@ -103,7 +103,7 @@ def _step_by_step(
     run: "Simulation", solve: Solve, setting: Setting
 ) -> tuple[Solved, Array, State, diffrax.DenseInterpolation]:
     ended, rows = solve_step_by_step(solve, setting, most=run.max_solver_steps)
-    ended = jtu.tree_map(jnp.asarray, ended)
+    ended = jax.device_put(ended)
     return ended, *recorded_steps(run.state, rows, setting.solver)
 
 

@@ -4,12 +4,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Numbers, Scalar
 
 _CLIPPED_ULPS = 100
 """A step that would end this near the end, in units in the last place, ends there."""
 
 
+@cached_jit  # many small operations
 def just_before_end(duration: Numbers) -> Scalar:
     """The time from which on a step that would end there ends at `duration`, as diffrax has it.
 

@@ -108,15 +108,17 @@ class Trajectory(eqx.Module, Generic[SomeState]):
                 were saved, or this is a batch.
         """
         dense = self.require_dense()
-        flat = jnp.ravel(jnp.asarray(t, dtype=self.t.dtype))
-        traced = any(isinstance(x, jax.core.Tracer) for x in jtu.tree_leaves((dense, flat)))
-        if not traced:
-            _check_inside(dense, np.asarray(flat))
-        if traced or int(dense.ts_size) == 1:
+        if any(isinstance(x, jax.core.Tracer) for x in jtu.tree_leaves((dense, t))):
+            flat = jnp.ravel(jnp.asarray(t, dtype=self.t.dtype))
             states = jax.vmap(dense.evaluate)(flat)
+            return jtu.tree_map(lambda leaf: jnp.reshape(leaf, np.shape(t)), states)
+        times = np.ravel(np.asarray(t, dtype=self.t.dtype))
+        _check_inside(dense, times)
+        if int(dense.ts_size) == 1:
+            states = jax.vmap(dense.evaluate)(times)
         else:
-            states = evaluate_dense(dense, np.asarray(flat))
-        return jtu.tree_map(lambda leaf: jnp.reshape(leaf, np.shape(t)), states)
+            states = evaluate_dense(dense, times)
+        return jax.device_put(jtu.tree_map(lambda leaf: np.reshape(leaf, np.shape(t)), states))
 
     def require_dense(self) -> diffrax.DenseInterpolation:
         """The continuous solution of a single trajectory.
@@ -147,7 +149,10 @@ def single_time(t: Scalar, state: SomeState) -> tuple[Scalar, SomeState]:
 
 
 def _check_inside(dense: diffrax.DenseInterpolation, times: np.ndarray) -> None:
-    first, last = float(dense.t0), float(dense.t1)
+    steps = int(dense.ts_size) - 1
+    ends = np.asarray(dense.ts)
+    first, last = (ends[0], ends[steps]) if steps else (dense.t0, dense.t1)
+    first, last = float(first), float(last)
     outside = ~((times >= first) & (times <= last))
     if outside.any():
         raise ArgumentError(

@@ -185,7 +185,7 @@ def test_a_lone_start_is_labelled_as_in_any_batch(seed, simplest, monkeypatch):
         monkeypatch.delenv("JAXBIPED_THREADS")
 
 
-def test_both_engines_give_the_same_labels(simplest, monkeypatch):
+def test_both_engines_give_the_same_labels(simplest, monkeypatch, no_disk_cache):
     monkeypatch.setattr(XLA, "slots", 24)
     effort = simplest.effort._replace(engine="xla")
     # More starts than slots, so that slots are filled anew.

@@ -1,7 +1,5 @@
 """Programs that read a stream, a row at each attempt."""
 
-import dataclasses
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,7 +11,7 @@ from jaxbiped.compiler.runtime._primitive import call
 from jaxbiped.compiler.runtime._program import Program
 
 
-def _summing():
+def _summing(backwards=False):
     """Σ weight (a + 2 b) over as many rows (a, b) as the inputs say."""
 
     def start(given):
@@ -26,7 +24,8 @@ def _summing():
         return (total + weight * (row[0] + 2.0 * row[1]), count), count >= steps
 
     number = jax.ShapeDtypeStruct((), jnp.float64)
-    return CompiledProgram(Program(start, attempt, lambda _, c: c, stream=2), (number, number))
+    program = Program(start, attempt, lambda _, c: c, stream=2, backwards=backwards)
+    return CompiledProgram(program, (number, number))
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 19])
@@ -75,9 +74,7 @@ def test_a_stream_of_another_size_is_refused(stream, said):
 
 
 def test_a_stream_can_be_read_backwards():
-    program = dataclasses.replace(_summing()._program, backwards=True)
-    number = jax.ShapeDtypeStruct((), jnp.float64)
-    backwards = CompiledProgram(program, (number, number))
+    backwards = _summing(backwards=True)
     stream = [np.arange(6.0).reshape(3, 2), np.arange(4.0).reshape(2, 2)]
     total, _ = backwards.run((np.ones(2), np.ones(2)), stream=stream).outputs
     np.testing.assert_array_equal(total, [4.0 + 10.0, 2.0 + 6.0])

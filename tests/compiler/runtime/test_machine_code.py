@@ -1,12 +1,12 @@
 """The cache of compiled code: safe to delete, rebuilt where it is damaged."""
 
-import os
 import weakref
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxbiped._disk_cache import CACHE_VARIABLE
 from jaxbiped.compiler.runtime import _machine_code
 from tests.compiler.one_shot import compiled
 
@@ -15,7 +15,7 @@ POINTS = np.linspace(-1.0, 1.0, 5)
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
-    monkeypatch.setenv(_machine_code.CACHE_VARIABLE, str(tmp_path))
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
     monkeypatch.setattr(_machine_code, "_LOADED", weakref.WeakValueDictionary())
     return tmp_path / "lanes"
 
@@ -51,27 +51,12 @@ def test_other_programs_have_code_of_their_own(cache):
 
 
 def test_nothing_is_stored_where_nothing_is_wanted(cache, monkeypatch):
-    monkeypatch.setenv(_machine_code.CACHE_VARIABLE, "")
+    monkeypatch.setenv(CACHE_VARIABLE, "")
     _run()
     assert not cache.exists()
 
 
 def test_a_folder_that_cannot_be_written_does_no_harm(cache, monkeypatch):
     cache.parent.joinpath("file").write_text("in the way")
-    monkeypatch.setenv(_machine_code.CACHE_VARIABLE, str(cache.parent / "file"))
+    monkeypatch.setenv(CACHE_VARIABLE, str(cache.parent / "file"))
     _run()
-
-
-def test_what_was_used_longest_ago_makes_room_on_disk(cache, monkeypatch):
-    _run(2.0)
-    (first,) = cache.iterdir()
-    _run(3.0)
-    (second,) = set(cache.iterdir()) - {first}
-    os.utime(second, (1.0, 1.0))
-    os.utime(first, (0.0, 0.0))
-    _run(2.0)  # read: now used later than the second
-    monkeypatch.setattr(_machine_code, "_DISK_BYTES", 5 * first.stat().st_size // 2)
-    _run(4.0)
-    assert first in cache.iterdir()
-    assert second not in cache.iterdir()
-    assert len(list(cache.iterdir())) == 2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
-from jaxbiped.compiler.runtime import _compiled_program
+from jaxbiped.compiler.runtime import _kernel
 from jaxbiped.compiler.runtime._primitive import call, deferred_checks
 from jaxbiped.compiler.runtime._program import graph_of
 from tests.compiler.one_shot import compiled
@@ -20,9 +20,7 @@ def _called(function):
 def _traced(monkeypatch):
     """How often a program has been traced."""
     times = []
-    monkeypatch.setattr(
-        _compiled_program, "graph_of", lambda *given: times.append(1) or graph_of(*given)
-    )
+    monkeypatch.setattr(_kernel, "graph_of", lambda *given: times.append(1) or graph_of(*given))
     return times
 
 

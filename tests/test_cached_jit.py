@@ -1,0 +1,135 @@
+"""Compiled once for all processes: what is kept, found again, and left to each process."""
+
+import subprocess
+import sys
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped import _compiled_store
+from jaxbiped._cached_jit import cached_jit
+from jaxbiped._disk_cache import CACHE_VARIABLE, disk_use
+from jaxbiped.solve._final_step import just_before_end
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
+    just_before_end.clear()
+    yield tmp_path / "cache" / "xla"
+    just_before_end.clear()
+
+
+def _refuse(*_):
+    raise AssertionError("compiled again")
+
+
+def test_what_was_compiled_is_loaded(cache, monkeypatch):
+    first = just_before_end(np.float64(2.0))
+    (kept,) = cache.iterdir()
+    just_before_end.clear()
+    monkeypatch.setattr(_compiled_store, "trace_call", _refuse)
+    monkeypatch.setattr("jaxbiped._cached_jit.trace_call", _refuse)
+    assert just_before_end(np.float64(2.0)) == first < 2.0
+    assert just_before_end(np.float64(-3.0)) < -3.0
+    assert list(cache.iterdir()) == [kept]
+
+
+@pytest.mark.parametrize("damage", ["emptied", "garbage", "gone", "foreign"])
+def test_what_is_damaged_is_compiled_again(cache, damage):
+    first = just_before_end(np.float64(2.0))
+    (kept,) = cache.iterdir()
+    whole = kept.read_bytes()
+    if damage == "gone":
+        kept.unlink()
+    elif damage == "foreign":
+        kept.chmod(0o666)
+    else:
+        kept.write_bytes(b"" if damage == "emptied" else bytes(5000))
+    just_before_end.clear()
+    assert just_before_end(np.float64(2.0)) == first
+    assert len(kept.read_bytes()) == pytest.approx(len(whole), rel=0.2)
+    assert kept.stat().st_mode & 0o022 == 0
+
+
+def test_other_shapes_types_and_settings_are_other_programs(cache):
+    for given in (np.float64(2.0), np.array([1.0, 2.0]), jnp.ones(2), jnp.ones(())):
+        assert np.all(just_before_end(given) < given)
+    assert len(list(cache.iterdir())) == 2
+    just_before_end(jnp.asarray(2.0))  # of a weak type
+    assert len(list(cache.iterdir())) == 3
+    with jax.numpy_dtype_promotion("standard"):
+        just_before_end(np.float64(2.0))
+    assert len(list(cache.iterdir())) == 4
+
+
+def test_traced_and_transformed_it_is_a_part_of_the_whole(cache):
+    np.testing.assert_array_equal(
+        jax.jit(jax.vmap(just_before_end))(jnp.ones(3)), np.full(3, just_before_end(jnp.ones(())))
+    )
+
+
+def test_functions_of_a_notebook_are_compiled_as_ever(cache):
+    @cached_jit
+    def double(x, name="a"):
+        return 2.0 * x, name
+
+    value, name = double(jnp.ones(2), name="b")
+    np.testing.assert_array_equal(value, [2.0, 2.0])
+    assert name == "b"
+    assert disk_use()["xla"].entries == 0
+    assert double.result_shape(jnp.ones(3))[0].shape == (3,)
+    double.begin(jnp.ones(4))()
+
+
+def test_without_a_cache_it_is_compiled_as_ever(cache, monkeypatch):
+    monkeypatch.setenv(CACHE_VARIABLE, "")
+    assert just_before_end(np.float64(2.0)) < 2.0
+    assert not cache.exists()
+
+
+def test_its_shape_is_known_before_and_after(cache):
+    before = just_before_end.result_shape(np.ones(3))
+    just_before_end.begin(np.ones(3))()
+    just_before_end.clear()
+    after = just_before_end.result_shape(np.ones(3))
+    assert (before.shape, before.dtype) == (after.shape, after.dtype) == ((3,), np.float64)
+
+
+WALK = """
+import jaxbiped as jb
+from jaxbiped import _cached_jit, _compiled_store
+from jaxbiped.compiler.runtime import _kernel
+import sys
+if sys.argv[1] == "loads":
+    def refuse(*_):
+        raise AssertionError("traced again")
+    _kernel.graph_of = _compiled_store.trace_call = _cached_jit.trace_call = refuse
+scene = jb.seed_scene(slope=float(sys.argv[2]))
+walk = jb.simulate(scene, jb.seed_state(), footsteps=2, accuracy="draft")
+gait = jb.find_gait(scene, accuracy="draft", radius_sensitivities=False)
+print(walk.engine, walk.outcome, float(walk.t[-1]).hex(), float(gait.measures.period).hex())
+"""
+
+
+@pytest.mark.slow
+def test_another_process_runs_what_one_compiled(tmp_path, monkeypatch):
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
+
+    def run(how, slope):
+        command = [sys.executable, "-c", WALK, how, slope]
+        told = subprocess.run(command, capture_output=True, text=True)
+        assert told.returncode == 0, told.stderr
+        assert told.stderr == ""
+        return told.stdout
+
+    first = run("compiles", "0.02")
+    assert run("loads", "0.02") == first
+    other = run("loads", "0.025")
+    assert other.startswith("lanes walking")
+    scene = jb.seed_scene(slope=0.025)
+    walk = jb.simulate(scene, jb.seed_state(), footsteps=2, accuracy="draft")
+    assert float(walk.t[-1]).hex() == other.split()[2]

@@ -1,0 +1,105 @@
+"""Fingerprints: the same in every process, others for whatever could mean something else."""
+
+import dataclasses
+import functools
+import subprocess
+import sys
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped import _fingerprint
+from jaxbiped._fingerprint import Leaf, as_leaves, fingerprint
+from jaxbiped.solve._ending import WATCHES, ending_events
+
+SCENE = as_leaves(jb.seed_scene())
+
+KNOWN = {
+    "scene": (SCENE, jb.solvers.Rodas4(), WATCHES),
+    "functions": (
+        jb.find_gait,
+        functools.partial(jb.simulate, footsteps=3),
+        ending_events(WATCHES),
+    ),
+    "wrapped": (jax.jit(jb.footsteps), jb.MidStance().value),
+    "numbers": (1, 1.0, True, "1", b"1", None, np.arange(3), jnp.ones(2), jnp.float64),
+}
+PRINTED = """
+import jax
+jax.config.update("jax_numpy_dtype_promotion", "strict")
+import tests.test_fingerprint as t
+for things in t.KNOWN.values(): print(t.fingerprint(*things))
+"""
+
+
+@pytest.mark.slow
+def test_another_process_knows_the_same():
+    told = subprocess.run(
+        [sys.executable, "-c", PRINTED], capture_output=True, text=True, check=True
+    )
+    assert told.stdout.split() == [fingerprint(*things) for things in KNOWN.values()]
+
+
+def test_things_that_differ_are_told_apart():
+    stiffer = dataclasses.replace(SCENE, friction=jb.laws.Frictionless())
+    things = [
+        *KNOWN.values(), (stiffer,), (1,), (1.0,), (True,), ("1",), (None,), ((),), ((1,),),
+        ([1],), ((1, 2),), ((1, (2,)),), ({"a": 1},), ({"b": 1},), (np.zeros(2),),
+        (np.zeros(2, np.float32),), (np.zeros((2, 1)),), (Leaf((2,), "float64", False),),
+        (Leaf((2,), "float64", True),), (0.0,), (-0.0,), (jnp.sin,), (jnp.cos,),
+        (functools.partial(jb.simulate, footsteps=2),),
+    ]  # fmt: skip
+    found = [fingerprint(*each) for each in things]
+    assert None not in found
+    assert len(set(found)) == len(found)
+
+
+def test_closures_are_told_apart_by_what_they_hold():
+    events = ending_events(WATCHES)
+    assert len({fingerprint(event) for event in events}) == len(events)
+
+
+class _OfATest:
+    pass
+
+
+@pytest.mark.parametrize(
+    "thing",
+    [lambda x: x, _OfATest, _OfATest(), object(), iter(()), (1, [_OfATest])],
+    ids=["lambda", "class", "object", "plain", "iterator", "within"],
+)
+def test_what_could_change_unseen_has_none(thing):
+    assert fingerprint(thing) is None
+
+
+def test_what_is_within_itself_has_none():
+    ring = []
+    ring.append(ring)
+    assert fingerprint(ring) is None
+
+
+def test_traced_arrays_have_none():
+    seen = []
+    jax.make_jaxpr(lambda x: seen.append(fingerprint(x)) or x)(1.0)
+    assert seen == [None]
+
+
+@pytest.mark.parametrize("setting", ["jax_numpy_dtype_promotion", "jax_default_matmul_precision"])
+def test_settings_count(setting):
+    before = fingerprint(1)
+    value = getattr(jax.config, setting)
+    jax.config.update(setting, "standard" if "promotion" in setting else "highest")
+    try:
+        assert fingerprint(1) != before
+    finally:
+        jax.config.update(setting, value)
+    assert fingerprint(1) == before
+
+
+def test_the_source_counts(monkeypatch):
+    before = fingerprint(1)
+    monkeypatch.setattr(_fingerprint, "_libraries", lambda: "another version")
+    assert fingerprint(1) != before
