@@ -53,6 +53,10 @@ class HostCall:
     def __init__(self, key: str, function: HostFunction, *, storable: bool) -> None:
         self.key, self.function, self.storable = key, function, storable
 
+    def __call__(self, *arrays: np.ndarray) -> Sequence[np.ndarray]:
+        """Runs the function."""
+        return self.function(*arrays)
+
 
 def host_call(function: HostFunction) -> HostCall:
     """The call of a function; who holds a program that makes it has to keep it."""
@@ -67,17 +71,19 @@ def host_call(function: HostFunction) -> HostCall:
 
 
 def lower_host_call(context: Any, call: HostCall, operands: Sequence[Any]) -> Any:
-    """The call in a program that is being lowered, which keeps it."""
-    context.module_context.add_keepalive(call)
+    """The call in a program that is being lowered."""
     seen = _LOWERED.get()
-    if seen is not None:
+    if seen is None:
+        # For the executable to keep it: of calls back JAX holds what it never has to call.
+        context.module_context.add_host_callback(call)
+    else:
         seen.append(call)
     return jax.ffi.ffi_lowering(TARGET)(context, *operands, **{_KEY: call.key})
 
 
 @contextlib.contextmanager
 def lowered_host_calls() -> Iterator[list[HostCall]]:
-    """The calls in what is lowered within."""
+    """The calls in what is lowered within; who compiles that has to keep them."""
     calls: list[HostCall] = []
     token = _LOWERED.set(calls)
     try:
@@ -95,7 +101,7 @@ def _run(frame: "_CallFrame") -> None:
     for array in given:
         array.flags.writeable = False
     places = [_array(frame.results.values[i]) for i in range(frame.results.size)]
-    for place, value in zip(places, call.function(*given), strict=True):
+    for place, value in zip(places, call(*given), strict=True):
         if place.shape != np.shape(value):
             raise ValueError(f"a result has shape {np.shape(value)} instead of {place.shape}")
         place[...] = value

@@ -11,7 +11,7 @@ import pytest
 from jax.extend.core import Primitive
 from jax.interpreters import mlir
 
-from jaxbiped._host_call import host_call, lower_host_call, lowered_host_calls
+from jaxbiped._host_call import _FUNCTIONS, host_call, lower_host_call, lowered_host_calls
 
 
 class _Sum(NamedTuple):
@@ -81,14 +81,29 @@ def test_calls_of_one_meaning_are_one():
     assert unknown.key != host_call(lambda x: [x]).key
 
 
+def _calls():
+    gc.collect()
+    return [call for call in _FUNCTIONS.values() if isinstance(call.function, _Sum)]
+
+
 def test_a_program_keeps_what_it_calls():
+    run, given = jax.jit(lambda *x: _run(*x, scale=7.0)), (np.ones(2), np.zeros((1, 1)))
+    for compiled in (run, run.lower(*given).compile()):
+        for _ in range(3):
+            jax.clear_caches()
+            gc.collect()
+            total, _ = compiled(*given)
+            np.testing.assert_array_equal(total, [14.0])
+    assert _calls()
+    del run, compiled
+    jax.clear_caches()
+    assert not _calls()
+
+
+def test_who_lowers_may_keep_the_calls_instead():
     with lowered_host_calls() as calls:
         lowered = jax.jit(_run).lower(np.ones(2), np.zeros((1, 1)))
     assert [call.function for call in calls] == [_Sum(2.0)]
-    del calls
     compiled = lowered.compile()
-    del lowered
-    jax.clear_caches()
-    gc.collect()
     total, _ = compiled(np.ones(2), np.zeros((1, 1)))
     np.testing.assert_array_equal(total, [4.0])
