@@ -8,9 +8,9 @@ import jax
 import numpy as np
 from tqdm import tqdm
 
-from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped._progress import stage
+from jaxbiped.cli._integrator import Integrator
 from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import minimal_state
@@ -18,47 +18,12 @@ from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulation import Simulation
-from jaxbiped.solve._solvers import SOLVERS
 from jaxbiped.solve._trajectory import Trajectory
 
 ASTRAY = 0.05
 """Error of the state (SI units) from which a run that came to its end has still failed."""
 _TRUTH = 1e-10
 _MOST_STEPS = 1 << 25
-
-
-class Integrator(NamedTuple):
-    """How to integrate: a solver's name, and its tolerance or its step.
-
-    Attributes:
-        solver: one of `SOLVERS`.
-        rtol: relative tolerance; None for steps of one size.
-        dt: that size [s]; None under error control.
-    """
-
-    solver: str
-    rtol: float | None = None
-    dt: float | None = None
-
-    @staticmethod
-    def read(text: str) -> "Integrator":
-        """From `rodas4:1e-6` (a tolerance) or `euler:dt=1e-6` (a step [s]).
-
-        Raises:
-            ArgumentError: anything else.
-        """
-        name, _, number = text.partition(":")
-        fixed = number.startswith("dt=")
-        try:
-            value = float(number.removeprefix("dt="))
-        except ValueError:
-            value = -1.0
-        if name not in SOLVERS or not value > 0.0:
-            raise ArgumentError(
-                f"integrator = {text!r} is not allowed: write SOLVER:TOLERANCE or SOLVER:dt=STEP, "
-                f"the solver one of {', '.join(SOLVERS)}."
-            )
-        return Integrator(name, dt=value) if fixed else Integrator(name, rtol=value)
 
 
 class ConstraintRun(NamedTuple):

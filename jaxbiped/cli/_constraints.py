@@ -1,73 +1,44 @@
 """`jaxbiped constraints`: the constraint methods compared on the seed's walk."""
 
-import dataclasses
 import math
 from pathlib import Path
 
-from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive
 from jaxbiped._types import JsonObject
-from jaxbiped.cli._constraint_comparison import ConstraintRun, Integrator, compare_constraints
-from jaxbiped.cli._option_fields import Group, group
+from jaxbiped.cli._constraint_comparison import ConstraintRun, compare_constraints
+from jaxbiped.cli._integrator import Integrator
 from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
-from jaxbiped.constraints._constraint_methods import CONSTRAINT_METHODS
+from jaxbiped.cli._walk_options import OutputOptions
+from jaxbiped.cli.commands._constraints import Constraints
 from jaxbiped.scene._scene import Scene
 
 _MOST_ROWS = 200
 
 
-@dataclasses.dataclass(frozen=True)
-class Constraints:
-    """Compare the seven ways to hold the hip together: violation, error against the minimal
-    formulation, and time."""
-
-    scene: Group[SceneOptions] = group(SceneOptions)
-    start: Group[StartOptions] = group(StartOptions)
-    methods: tuple[str, ...] = tuple(CONSTRAINT_METHODS)
-    """Names of the methods to compare."""
-    integrators: tuple[str, ...] = ("rodas4:1e-6", "euler:dt=1e-6", "runge2:dt=1e-6")
-    """Each SOLVER:TOLERANCE, or SOLVER:dt=STEP for steps of one size [s]."""
-    duration: float = 0.5
-    """Simulated time [s]."""
-    repeats: int = 3
-    """Runs of which the fastest counts."""
-    out: Path | None = None
-    """Folder for the picture."""
-    json: Path | None = None
-    """File for the numbers in SI units; - prints only them."""
-
-    def run(self) -> int:
-        """Runs the command; returns the exit code."""
-        scene = self.scene.scene()
-        if not isinstance(scene, Scene):
-            raise ArgumentError(
-                "model or formulation is not allowed here: compliant and minimal are compared."
-            )
-        for name in self.methods:
-            check_choice("methods", name, CONSTRAINT_METHODS)
-        check_positive("duration", self.duration, "s")
-        check_count("repeats", self.repeats)
-        integrators = [Integrator.read(text) for text in self.integrators]
-        OutputOptions(out=self.out, json=self.json).check()
-        runs = compare_constraints(
-            scene,
-            self.start.state(scene),
-            duration=self.duration,
-            integrators=integrators,
-            methods=self.methods,
-            repeats=self.repeats,
-            progress=True,
-        )
-        report = Report(self.json)
-        report.say(run_table(runs))
-        report.say(
-            f"{self.duration:g} s from the start; errors against the minimal formulation at 1e-10"
-        )
-        numbers = run_numbers(runs)
-        if self.out is not None:
-            report.say(f"wrote {write_picture(numbers, self.out)}")
-        report.finish({"duration_s": self.duration, "runs": numbers})
-        return 0
+def run(options: Constraints) -> int:
+    """Runs the command; returns the exit code."""
+    scene = options.scene.scene()
+    assert isinstance(scene, Scene)
+    integrators = [Integrator.read(text) for text in options.integrators]
+    OutputOptions(out=options.out, json=options.json).check()
+    runs = compare_constraints(
+        scene,
+        options.start.state(scene),
+        duration=options.duration,
+        integrators=integrators,
+        methods=options.methods,
+        repeats=options.repeats,
+        progress=True,
+    )
+    report = Report(options.json)
+    report.say(run_table(runs))
+    report.say(
+        f"{options.duration:g} s from the start; errors against the minimal formulation at 1e-10"
+    )
+    numbers = run_numbers(runs)
+    if options.out is not None:
+        report.say(f"wrote {write_picture(numbers, options.out)}")
+    report.finish({"duration_s": options.duration, "runs": numbers})
+    return 0
 
 
 def write_picture(runs: list[JsonObject], out: Path) -> Path:
