@@ -25,7 +25,7 @@ SOLVERS = (
     "bosh3", "tsit5", "dopri5", "dopri8", "euler", "runge2",
 )  # fmt: skip
 ACCURACIES = ("draft", "balanced", "tight")
-GAIT_ACCURACIES = ("balanced", "tight")
+GAIT_ACCURACIES = ("draft", "balanced", "tight")
 SECTIONS = ("mid-stance", "heel-strike")
 SAMPLINGS = ("uniform", "latin-hypercube", "sobol", "halton")
 OPTIMISERS = ("trust-region", "slsqp", "trust-constr", "optax")
