@@ -5,6 +5,8 @@ from typing import NamedTuple
 from jaxbiped._checks import ArgumentError
 from jaxbiped.cli._choices import SOLVERS
 
+_EXPLICIT = ("bosh3", "tsit5", "dopri5", "dopri8", "euler", "runge2")
+
 
 class Integrator(NamedTuple):
     """How to integrate: a solver's name, and its tolerance or its step.
@@ -18,6 +20,11 @@ class Integrator(NamedTuple):
     solver: str
     rtol: float | None = None
     dt: float | None = None
+
+    @property
+    def explicit(self) -> bool:
+        """Whether its steps solve no equations: its programs are small, quickly compiled."""
+        return self.solver in _EXPLICIT
 
     @staticmethod
     def read(text: str) -> "Integrator":
