@@ -27,19 +27,9 @@ _HEAD = (
     "run s",
     "to standard",
 )
-_ROOM = (
-    "baumgarte",
-    "kvaerno5",
-    "rtol 1e-06",
-    "solver failed",
-    "",
-    "",
-    "1.0e-01",
-    "500000",
-    "0.001",
-)
-"""What the columns have room for; a row is printed before the others are known."""
-_BAR = "{percentage:3.0f}%|{bar}| {postfix} [{elapsed}<{remaining}]"
+_WIDTHS = (9, 10, 10, 13, 11, 8, 7, 7, 6, 11)
+"""Of the columns: a row is printed before the others are known."""
+_BAR = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
 
 def run(options: Constraints) -> int:
@@ -52,7 +42,7 @@ def run(options: Constraints) -> int:
     many = len(integrators) * len(options.methods)
     work = len(options.methods) * sum(map(work_of, integrators))
     complete = False
-    with tqdm(total=work, smoothing=0.0, bar_format=_BAR, postfix=f"0/{many} runs") as bar:
+    with tqdm(total=work, smoothing=0.0, bar_format=_BAR, desc=f"0/{many} runs") as bar:
         try:
             found = compare_constraints(
                 scene,
@@ -66,7 +56,7 @@ def run(options: Constraints) -> int:
             for line in _lines(found, runs):
                 with bar.external_write_mode(file=sys.stdout):
                     report.say(line)
-                bar.set_postfix_str(f"{len(runs)}/{many} runs")
+                bar.set_description_str(f"{len(runs)}/{many} runs")
             complete = True
         except KeyboardInterrupt:
             pass
@@ -134,6 +124,5 @@ def _row(run: ConstraintRun, usual: float | None) -> tuple[str, ...]:
 
 def _padded(row: tuple[str, ...]) -> str:
     """Head and row, in columns as wide as those of every other row."""
-    room = (*_ROOM, "")
-    head = [word.rjust(len(wide)) for word, wide in zip(_HEAD, room, strict=True)]
+    head = [word.rjust(width) for word, width in zip(_HEAD, _WIDTHS, strict=True)]
     return table(head, [row], most=1)

@@ -24,7 +24,7 @@ class Constraints:
     duration: float = 0.5
     """Simulated time [s]."""
     repeats: int = 3
-    """Runs of which the fastest counts."""
+    """Runs of which the fastest counts; none is repeated once they took a second."""
     out: Path | None = None
     """Folder for the picture."""
     json: Path | None = None
