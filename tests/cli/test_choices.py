@@ -77,6 +77,7 @@ _REFUSED = (
     "basin --sampling best", "basin --workers 0", "fit missing.json --vary K",
     "optimise --vary d --optimiser best", "constraints --methods glue",
     "constraints --integrators euler", "trade --repeats 0", "models --json /nowhere/models.json",
+    "walk --json /nowhere/walk.json", "constraints --json /nowhere/constraints.json",
 )  # fmt: skip
 
 

@@ -19,7 +19,6 @@ class Basin:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-
         self.scene.check()
         if self.scene.formulation == "redundant":
             raise ArgumentError(
@@ -28,6 +27,7 @@ class Basin:
             )
         self.starts.check()
         self.sweep.check()
+        OutputOptions(json=self.output.json).check()
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""

@@ -7,7 +7,7 @@ from jaxbiped._checks import ArgumentError, check_choice, check_count, check_pos
 from jaxbiped.cli._choices import CONSTRAINT_METHODS
 from jaxbiped.cli._integrator import Integrator
 from jaxbiped.cli._option_fields import Group, group
-from jaxbiped.cli._walk_options import SceneOptions, StartOptions
+from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,7 +32,6 @@ class Constraints:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-
         self.scene.check()
         if self.scene.model != "compliant" or self.scene.formulation != "minimal":
             raise ArgumentError(
@@ -45,6 +44,7 @@ class Constraints:
             Integrator.read(text)
         check_positive("duration", self.duration, "s")
         check_count("repeats", self.repeats)
+        OutputOptions(json=self.json).check()
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""

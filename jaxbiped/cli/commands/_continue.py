@@ -37,7 +37,6 @@ class ContinueGait:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-
         self.scene.check()
         self.start.check()
         check_finite("from", self.first)
@@ -47,6 +46,7 @@ class ContinueGait:
         check_count("max_points", self.max_points)
         check_gait_accuracy(self.accuracy)
         check_engine(self.engine)
+        OutputOptions(json=self.output.json).check()
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""

@@ -19,7 +19,6 @@ class Extremes:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-
         OutputOptions(out=self.out, json=self.json).check()
 
     def run(self) -> int:

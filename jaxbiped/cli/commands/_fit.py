@@ -29,7 +29,6 @@ class Fit:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-
         self.scene.check()
         if self.scene.formulation == "redundant":
             raise ArgumentError(

@@ -26,7 +26,6 @@ class FindGait:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-
         self.scene.check()
         self.start.check()
         check_accuracy(self.accuracy)
@@ -34,6 +33,7 @@ class FindGait:
         if self.section is not None:
             check_choice("section", self.section, SECTIONS)
         check_engine(self.engine)
+        OutputOptions(json=self.output.json).check()
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""

@@ -15,7 +15,6 @@ class Models:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-
         OutputOptions(json=self.json).check()
 
     def run(self) -> int:

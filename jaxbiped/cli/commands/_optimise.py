@@ -50,7 +50,6 @@ class Optimise:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-
         self.scene.check()
         if self.scene.formulation == "redundant":
             raise ArgumentError(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from jaxbiped._checks import ArgumentError, check_count, check_positive
 from jaxbiped.cli._option_fields import Group, group
-from jaxbiped.cli._walk_options import SceneOptions, StartOptions
+from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,7 +28,6 @@ class Trade:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-
         self.scene.check()
         if self.scene.model != "compliant" or self.scene.formulation != "minimal":
             raise ArgumentError(
@@ -37,6 +36,7 @@ class Trade:
         self.start.check()
         check_positive("duration", self.duration, "s")
         check_count("repeats", self.repeats)
+        OutputOptions(json=self.json).check()
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""

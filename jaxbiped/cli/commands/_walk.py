@@ -17,10 +17,10 @@ class Walk:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-
         self.scene.check()
         self.start.check()
         self.solve.check()
+        OutputOptions(json=self.output.json).check()
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
