@@ -1,17 +1,21 @@
 """Checks of arguments: one clear sentence each, raised before anything is compiled.
 
-Values that are being traced (inside `jit`, `vmap`, `grad`) have no number to check and pass.
+Values that are being traced (inside `jit`, `vmap`, `grad`) have no number to check and pass. JAX is
+not imported for a check: the command line refuses without it.
 """
 
 import errno
+import json
 import os
+import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-import jax
 import numpy as np
-from jaxtyping import ArrayLike
+
+if TYPE_CHECKING:
+    from jaxtyping import ArrayLike
 
 _Test: TypeAlias = Callable[[np.ndarray], np.ndarray]
 
@@ -40,6 +44,8 @@ def failure_kind(error: OSError) -> type[ArgumentError] | type[ResourceError]:
 def is_number(value: object) -> bool:
     """Whether a value may stand for a number or many; texts and truth values may not."""
     if hasattr(value, "dtype"):
+        import jax
+
         return bool(jax.dtypes.issubdtype(value.dtype, np.number))  # type: ignore[attr-defined]
     if isinstance(value, list | tuple):
         return all(map(is_number, value))
@@ -47,7 +53,8 @@ def is_number(value: object) -> bool:
 
 
 def _is_traced(value: object) -> bool:
-    return isinstance(value, jax.core.Tracer)
+    jax: Any = sys.modules.get("jax")  # where it is not imported, nothing is traced
+    return jax is not None and isinstance(value, jax.core.Tracer)
 
 
 def _numbers(name: str, value: object) -> np.ndarray:
@@ -74,7 +81,7 @@ def _require(name: str, value: object, allowed: str, test: _Test) -> None:
         raise ArgumentError(f"{name} = {_shown(array, bad)} is not allowed: it must be {allowed}.")
 
 
-def holds_somewhere(condition: ArrayLike) -> bool:
+def holds_somewhere(condition: "ArrayLike") -> bool:
     """Whether a condition is known to hold in any entry; what is being traced is not known."""
     return not _is_traced(condition) and bool(np.any(condition))
 
@@ -99,7 +106,7 @@ def check_not_negative(name: str, value: object, unit: str = "") -> None:
     _require(name, value, f"a finite number of at least 0{_in(unit)}", lambda x: x >= 0)
 
 
-def check_count(name: str, value: ArrayLike) -> None:
+def check_count(name: str, value: "ArrayLike") -> None:
     """Raises `ArgumentError` unless `value` is one whole number above zero, known beforehand."""
     allowed = "a whole number above 0"
     if _is_traced(value) or np.ndim(value):
@@ -110,6 +117,7 @@ def check_count(name: str, value: ArrayLike) -> None:
 
 def check_unbatched(name: str, value: object, one: str = "one number") -> None:
     """Raises `ArgumentError` where any leaf of `value` is an array instead of one number."""
+    import jax
 
     def is_array(x: object) -> bool:
         return type(x) is list or (x is value and type(x) is tuple)
@@ -168,6 +176,17 @@ def check_type(name: str, value: object, *kinds: type) -> None:
     if not isinstance(value, kinds):
         allowed = " or a ".join(kind.__name__ for kind in kinds)
         raise ArgumentError(f"{name} = {value!r} is not allowed: it must be a {allowed}.")
+
+
+def read_json(name: str, path: str | Path) -> Any:
+    """What a JSON file holds; raises `ArgumentError` for one that cannot be read or is no JSON."""
+    try:
+        return json.loads(Path(path).read_text())
+    except OSError as error:
+        reason = (error.strerror or "unreadable").lower()
+        raise ArgumentError(f"{name} = {str(path)!r} cannot be read ({reason}).") from None
+    except ValueError as error:
+        raise ArgumentError(f"{name} = {str(path)!r} is not JSON ({error}).") from None
 
 
 def check_writable_directory(name: str, path: Path) -> None:

@@ -37,15 +37,7 @@ def test_the_import_graph_of_the_architecture_is_up_to_date():
 
 
 def test_the_top_level_is_small():
-    public = [n for n in vars(jb) if not n.startswith("_") and not _is_internal_package(n)]
-    assert len(public) <= 70
-
-
-def _is_internal_package(name):
-    packages = {
-        "cli", "compiler", "extremes", "linalg", "scene", "solve", "trade", "variational",
-    }  # fmt: skip
-    return name in packages
+    assert len(jb.__all__) <= 70
 
 
 def test_importing_switches_to_64_bits():
@@ -54,9 +46,9 @@ def test_importing_switches_to_64_bits():
 
 
 def test_public_names_have_docstrings():
-    for name in dir(jb):
+    for name in jb.__all__:
         thing = getattr(jb, name)
-        if not name.startswith("_") and callable(thing):
+        if callable(thing):
             assert thing.__doc__, name
 
 

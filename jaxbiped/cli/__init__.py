@@ -10,18 +10,18 @@ from tyro.conf import subcommand
 
 from jaxbiped._checks import ArgumentError, ResourceError
 from jaxbiped._progress import tell_stages
-from jaxbiped.cli._basin import Basin
-from jaxbiped.cli._constraints import Constraints
-from jaxbiped.cli._continue import ContinueGait
-from jaxbiped.cli._extremes import Extremes
-from jaxbiped.cli._fit import Fit
-from jaxbiped.cli._gait import FindGait
-from jaxbiped.cli._models import Models
-from jaxbiped.cli._optimise import Optimise
 from jaxbiped.cli._refusal import one_sentence
 from jaxbiped.cli._report import Report as Report
-from jaxbiped.cli._trade import Trade
-from jaxbiped.cli._walk import Walk
+from jaxbiped.cli.commands._basin import Basin
+from jaxbiped.cli.commands._constraints import Constraints
+from jaxbiped.cli.commands._continue import ContinueGait
+from jaxbiped.cli.commands._extremes import Extremes
+from jaxbiped.cli.commands._fit import Fit
+from jaxbiped.cli.commands._gait import FindGait
+from jaxbiped.cli.commands._models import Models
+from jaxbiped.cli.commands._optimise import Optimise
+from jaxbiped.cli.commands._trade import Trade
+from jaxbiped.cli.commands._walk import Walk
 
 _Command = (
     Annotated[Walk, subcommand("walk")]
@@ -41,6 +41,9 @@ _Command = (
 class _Runnable(Protocol):
     """A command with its options."""
 
+    def check(self) -> None:
+        """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
+
     def run(self) -> int:
         """Runs it; returns the exit code."""
 
@@ -59,6 +62,7 @@ def main(arguments: list[str] | None = None) -> None:
         return
     tell_stages()
     try:
+        command.check()
         sys.exit(command.run())
     except (ArgumentError, ResourceError, OSError) as error:
         print(f"jaxbiped: {error}", file=sys.stderr)

@@ -1,12 +1,12 @@
 """Options of the commands: the actuators of a scene, each by its numbers."""
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING
 
-from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._parameter import parameter_infos
-from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator, Actuation
-from jaxbiped.scene.actuation._catalogue import ACTUATORS
+from jaxbiped._checks import ArgumentError
+
+if TYPE_CHECKING:
+    from jaxbiped.scene.actuation._abstract_actuator import Actuation
 
 
 @dataclasses.dataclass(frozen=True)
@@ -26,40 +26,22 @@ class ActuationOptions:
     foot_preload: tuple[str, ...] = ()
     """Extension of compliant feet that trail: extension=0.003 onset=0.1 span=0.05."""
 
-    def actuation(self) -> Actuation:
+    def check(self) -> None:
+        """Raises `ArgumentError` for what is not written as name=value."""
+        for field in dataclasses.fields(self):
+            for text in getattr(self, field.name):
+                named_text(field.name.replace("_", "-"), text)
+
+    def actuation(self) -> "Actuation":
         """The actuators that were asked for, None where none was; raises `ArgumentError`."""
-        parts = []
-        for name, kind in ACTUATORS.items():
-            texts = getattr(self, name.replace("-", "_"))
-            if texts:
-                parts.append(_actuator(name, kind, texts))
-        return tuple(parts) or None
+        from jaxbiped.cli._described import described_actuation
+
+        return described_actuation(self)
 
 
-def _actuator(
-    option: str, kind: type[AbstractActuator], texts: tuple[str, ...]
-) -> AbstractActuator:
-    infos, values = parameter_infos(kind), {}
-    fields = {field.name: field for field in dataclasses.fields(kind)}
-    for text in texts:
-        name, given, value = (part.strip() for part in text.partition("="))
-        if not name or not given:
-            raise ArgumentError(f"{option} = {text!r} is not allowed: write name=value.")
-        check_choice(f"{option}'s name", name, fields)
-        values[name] = _value(option, name, value) if name in infos else value
-    for name, field in fields.items():
-        if field.default is dataclasses.MISSING and name not in values:
-            raise ArgumentError(f"{option} needs {name}=value, its {infos[name].quantity.words}.")
-    return kind(**values)
-
-
-def _value(option: str, name: str, text: str) -> Any:
-    """A number, or several between commas."""
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise ArgumentError(
-            f"{option} = '{name}={text}' is not allowed: {name} must be a number, and {text!r} is "
-            "none."
-        ) from None
-    return numbers if len(numbers) > 1 else numbers[0]
+def named_text(option: str, text: str) -> tuple[str, str]:
+    """Name and value of name=value; raises `ArgumentError`."""
+    name, given, value = (part.strip() for part in text.partition("="))
+    if not name or not given:
+        raise ArgumentError(f"{option} = {text!r} is not allowed: write name=value.")
+    return name, value

@@ -1,35 +1,29 @@
 """`jaxbiped basin`: what becomes of many starts."""
 
-import dataclasses
 import json
 import math
 import time
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jaxbiped import _clock
-from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._fractions import fractions as fractions_of
 from jaxbiped.basins._label import label_names
-from jaxbiped.cli._basin_options import StartsOptions
-from jaxbiped.cli._option_fields import Engine, Group, group
 from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._walk_options import OutputOptions, SceneOptions
+from jaxbiped.cli.commands._basin import Basin
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._parameters import parameter_values
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.sweep._cluster import cluster_executor, local_executor
 from jaxbiped.sweep._labelling import Labelling, effort_of
 from jaxbiped.sweep._prepare import labelling
-from jaxbiped.sweep._sweep import CHUNK, sweep
+from jaxbiped.sweep._sweep import sweep
 from jaxbiped.sweep._zarr_store import check_store
 from jaxbiped.sweep.starts._coordinates import COORDINATES, coordinate_quantities
 from jaxbiped.sweep.starts._given_starts import GivenStarts
@@ -41,96 +35,52 @@ if TYPE_CHECKING:
 _MOST_ROWS = 64
 
 
-@dataclasses.dataclass(frozen=True)
-class SweepOptions:
-    """How starts are followed, and where the results go."""
-
-    footsteps: int = 30
-    """After which a start that is not certain yet is unresolved."""
-    accuracy: str = "draft"
-    """How accurately to solve: draft, balanced or tight."""
-    engine: Engine = "auto"
-    store: Path | None = None
-    """Zarr store for the results; a run that was killed continues there."""
-    any_version: bool = False
-    """Continue a store that another version or revision of jaxbiped wrote."""
-    chunk: int = CHUNK
-    """Starts that are labelled and written at once."""
-    workers: int = 1
-    """Processes of this machine that share the work, each with its share of the cores."""
-    scheduler: str | None = None
-    """Address of a dask scheduler whose workers do the work."""
-
-    def executor(self) -> tuple[Executor | None, int]:
-        """What runs the chunks, and how many at once; raises `ArgumentError`."""
-        check_count("workers", self.workers)
-        if self.scheduler is not None:
-            return cluster_executor(self.scheduler)
-        if self.workers > 1:
-            return local_executor(self.workers), self.workers
-        return None, 1
-
-
-@dataclasses.dataclass(frozen=True)
-class Basin:
-    """Label many starts: which walk on and in which gait, and how the others end."""
-
-    scene: Group[SceneOptions] = group(SceneOptions)
-    starts: Group[StartsOptions] = group(StartsOptions)
-    sweep: Group[SweepOptions] = group(SweepOptions)
-    output: Group[OutputOptions] = group(OutputOptions)
-
-    def run(self) -> int:
-        """Runs the command; returns the exit code."""
-        scene = self.scene.scene()
-        if isinstance(scene, RedundantScene):
-            raise ArgumentError(
-                'formulation = "redundant" is not allowed for a basin: starts are labelled in '
-                "minimal coordinates."
-            )
-        starts = self.starts.chosen(scene)
-        how: dict[str, Any] = dict(
-            footsteps=self.sweep.footsteps,
-            accuracy=self.sweep.accuracy,
-            engine=self.sweep.engine,
+def run(options: Basin) -> int:
+    """Runs the command; returns the exit code."""
+    scene = options.scene.scene()
+    assert not isinstance(scene, RedundantScene)
+    starts = options.starts.chosen(scene)
+    how: dict[str, Any] = dict(
+        footsteps=options.sweep.footsteps,
+        accuracy=options.sweep.accuracy,
+        engine=options.sweep.engine,
+    )
+    effort = effort_of(scene, **how)
+    options.output.check()
+    if options.sweep.store is not None:
+        check_store(options.sweep.store)
+    executor, workers = options.sweep.executor()
+    with stage("finding the gaits that starts are labelled by"):
+        known = labelling(scene, parameters=starts.parameters, **how)
+    began = time.perf_counter()
+    try:
+        found = sweep(
+            known,
+            starts,
+            store=options.sweep.store,
+            any_version=options.sweep.any_version,
+            chunk=options.sweep.chunk,
+            executor=executor,
+            workers=workers,
+            progress=True,
         )
-        effort = effort_of(scene, **how)
-        check_count("chunk", self.sweep.chunk)
-        self.output.check()
-        if self.sweep.store is not None:
-            check_store(self.sweep.store)
-        executor, workers = self.sweep.executor()
-        with stage("finding the gaits that starts are labelled by"):
-            known = labelling(scene, parameters=starts.parameters, **how)
-        began = time.perf_counter()
-        try:
-            found = sweep(
-                known,
-                starts,
-                store=self.sweep.store,
-                any_version=self.sweep.any_version,
-                chunk=self.sweep.chunk,
-                executor=executor,
-                workers=workers,
-                progress=True,
-            )
-        finally:
-            if executor is not None:
-                executor.shutdown()
-        seconds = time.perf_counter() - began
-        numbers = basin_numbers(found, seconds) | {"engine": effort.engine}
-        if isinstance(starts, GivenStarts):
-            numbers["labels"] = _names(found).tolist()
-        report = Report(self.output.json)
-        _print(report, numbers)
-        if self.output.out is not None:
-            with stage("drawing the basin"):
-                paths = _write_results(found, known, starts, self.output.out)
-            for path in paths:
-                report.say(f"wrote {path}")
-        numbers["wall_s"] = time.perf_counter() - _clock.IMPORT_BEGAN
-        report.finish(numbers)
-        return 0
+    finally:
+        if executor is not None:
+            executor.shutdown()
+    seconds = time.perf_counter() - began
+    numbers = basin_numbers(found, seconds) | {"engine": effort.engine}
+    if isinstance(starts, GivenStarts):
+        numbers["labels"] = _names(found).tolist()
+    report = Report(options.output.json)
+    _print(report, numbers)
+    if options.output.out is not None:
+        with stage("drawing the basin"):
+            paths = _write_results(found, known, starts, options.output.out)
+        for path in paths:
+            report.say(f"wrote {path}")
+    numbers["wall_s"] = time.perf_counter() - _clock.IMPORT_BEGAN
+    report.finish(numbers)
+    return 0
 
 
 def basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:

@@ -1,25 +1,20 @@
-"""Options of `jaxbiped basin`: which starts."""
+"""Options of `jaxbiped basin`: which starts, and how they are followed."""
 
-import csv
 import dataclasses
 import re
+from concurrent.futures import Executor
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import jax.numpy as jnp
-import numpy as np
+from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive
+from jaxbiped.cli._choices import ACCURACIES, CHUNK, SAMPLINGS
+from jaxbiped.cli._option_checks import check_engine
+from jaxbiped.cli._option_fields import Engine
 
-from jaxbiped._checks import ArgumentError, check_positive
-from jaxbiped.dynamics._rigid_state import rigid_state
-from jaxbiped.dynamics._state import State
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.sweep.starts._coordinates import check_coordinates
-from jaxbiped.sweep.starts._given_starts import GivenStarts
-from jaxbiped.sweep.starts._starts import AbstractStarts, grid, sample
-
-_USUAL = ("theta_swing=-0.5:0.3:100", "omega_swing=-2:4:100")
-"""Axes of a basin that nobody chose, and as many starts on each."""
-_USUAL_RIGID = ("theta_stance=0:0.5:100", "omega_stance=-2.5:0:100")
+if TYPE_CHECKING:
+    from jaxbiped.scene._rigid_scene import RigidScene
+    from jaxbiped.scene._scene import Scene
+    from jaxbiped.sweep.starts._starts import AbstractStarts
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,41 +40,29 @@ class StartsOptions:
     """Label these starts instead: CSV with the header
     hip_x,hip_z,theta_1,theta_2,hip_vx,hip_vz,omega_1,omega_2, in the slope's frame."""
 
-    def chosen(self, scene: Scene | RigidScene) -> AbstractStarts:
-        """The starts; raises `ArgumentError`."""
-        if self.starts is not None:
-            if self.x or self.y or self.more or self.samples is not None:
-                raise ArgumentError(
-                    f"starts = {str(self.starts)!r} goes without x, y, more and samples: name "
-                    "either."
-                )
-            return GivenStarts(read_starts(self.starts, scene))
-        axes = self._axes(scene)
-        if self.samples is None:
-            values = {name: np.linspace(a, b, count) for name, (a, b, count) in axes.items()}
-            return grid(scene, values, place=self.place)
-        bounds = {name: (low, high) for name, (low, high, _) in axes.items()}
-        return sample(
-            scene,
-            bounds,
-            self.samples,
-            method=self.sampling,
-            seed=self.seed,
-            place=self.place,
-        )
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes that were named, the horizontal one last."""
+        return tuple(text for text in (*self.more, self.y, self.x) if text is not None)
 
-    def _axes(self, scene: Scene | RigidScene) -> dict[str, tuple[float, float, int]]:
-        """First, last and count of each axis, the horizontal one last."""
-        usual = _USUAL if scene.compliant else _USUAL_RIGID
-        named = [text for text in (*self.more, self.y, self.x) if text is not None]
-        axes: dict[str, tuple[float, float, int]] = {}
-        for text in named or reversed(usual):
-            name, axis = parse_axis(text)
-            check_coordinates(scene, [name])
-            if name in axes:
-                raise ArgumentError(f"{name} is named by two axes: each needs its own.")
-            axes[name] = axis
-        return axes
+    def check(self) -> None:
+        """Raises `ArgumentError` for what is wrong in itself."""
+        if self.starts is not None and (self.axes or self.samples is not None):
+            raise ArgumentError(
+                f"starts = {str(self.starts)!r} goes without x, y, more and samples: name either."
+            )
+        for text in self.axes:
+            parse_axis(text)
+        check_choice("sampling", self.sampling, SAMPLINGS)
+        if self.samples is not None:
+            check_count("samples", self.samples)
+
+    def chosen(self, scene: "Scene | RigidScene") -> "AbstractStarts":
+        """The starts; raises `ArgumentError`."""
+        from jaxbiped.cli._chosen_starts import chosen_starts
+
+        self.check()
+        return chosen_starts(self, scene)
 
 
 def parse_axis(text: str) -> tuple[str, tuple[float, float, int]]:
@@ -102,38 +85,39 @@ def parse_axis(text: str) -> tuple[str, tuple[float, float, int]]:
     return name.replace("-", "_"), (first, last, count)
 
 
-def read_starts(path: Path, scene: Scene | RigidScene) -> object:
-    """Starts from a CSV file, leaves of shape (n,); a rigid walker keeps its part of them.
+@dataclasses.dataclass(frozen=True)
+class SweepOptions:
+    """How starts are followed, and where the results go."""
 
-    Raises:
-        ArgumentError: no such file, another header, or an entry that is not a number.
-    """
-    wanted = ",".join(State._fields)
-    try:
-        with path.open(newline="") as file:
-            rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
-    except (OSError, UnicodeDecodeError) as error:
-        raise ArgumentError(
-            f"starts = {str(path)!r} cannot be read ({error}): it must be a CSV file with the "
-            f"header {wanted}."
-        ) from None
-    if not rows or rows[0] != list(State._fields):
-        head = ",".join(rows[0]) if rows else ""
-        raise ArgumentError(f"starts = {str(path)!r} has the header {head!r}: it must be {wanted}.")
-    if len(rows) == 1:
-        raise ArgumentError(f"starts = {str(path)!r} holds no starts: give at least one row.")
-    numbers = []
-    for line, row in enumerate(rows[1:], start=2):
-        try:
-            numbers.append([float(cell) for cell in row])
-        except ValueError:
-            raise ArgumentError(
-                f"starts = {str(path)!r}, line {line}: {','.join(row)!r} is not all numbers."
-            ) from None
-        if len(row) != len(State._fields):
-            raise ArgumentError(
-                f"starts = {str(path)!r}, line {line}: {len(row)} numbers instead of "
-                f"{len(State._fields)}."
-            )
-    whole = State(*[jnp.asarray(column) for column in np.array(numbers).T])
-    return whole if scene.compliant else rigid_state(whole)
+    footsteps: int = 30
+    """After which a start that is not certain yet is unresolved."""
+    accuracy: str = "draft"
+    """How accurately to solve: draft, balanced or tight."""
+    engine: Engine = "auto"
+    store: Path | None = None
+    """Zarr store for the results; a run that was killed continues there."""
+    any_version: bool = False
+    """Continue a store that another version or revision of jaxbiped wrote."""
+    chunk: int = CHUNK
+    """Starts that are labelled and written at once."""
+    workers: int = 1
+    """Processes of this machine that share the work, each with its share of the cores."""
+    scheduler: str | None = None
+    """Address of a dask scheduler whose workers do the work."""
+
+    def check(self) -> None:
+        """Raises `ArgumentError` for what is wrong in itself."""
+        check_choice("accuracy", self.accuracy, ACCURACIES)
+        check_engine(self.engine)
+        for name in ("footsteps", "chunk", "workers"):
+            check_count(name, getattr(self, name))
+
+    def executor(self) -> tuple[Executor | None, int]:
+        """What runs the chunks, and how many at once; raises `ArgumentError`."""
+        if self.scheduler is None and self.workers == 1:
+            return None, 1
+        from jaxbiped.sweep._cluster import cluster_executor, local_executor
+
+        if self.scheduler is not None:
+            return cluster_executor(self.scheduler)
+        return local_executor(self.workers), self.workers

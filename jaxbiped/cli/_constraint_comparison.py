@@ -1,16 +1,18 @@
 """Comparison of constraint methods: violation, error and time."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import NamedTuple
 
 import jax
 import numpy as np
-from tqdm import tqdm
 
-from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped._progress import stage
+from jaxbiped.cli._integrator import Integrator
+from jaxbiped.compiler import default_threads
 from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import minimal_state
@@ -18,47 +20,16 @@ from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulation import Simulation
-from jaxbiped.solve._solvers import SOLVERS
 from jaxbiped.solve._trajectory import Trajectory
 
 ASTRAY = 0.05
 """Error of the state (SI units) from which a run that came to its end has still failed."""
 _TRUTH = 1e-10
 _MOST_STEPS = 1 << 25
-
-
-class Integrator(NamedTuple):
-    """How to integrate: a solver's name, and its tolerance or its step.
-
-    Attributes:
-        solver: one of `SOLVERS`.
-        rtol: relative tolerance; None for steps of one size.
-        dt: that size [s]; None under error control.
-    """
-
-    solver: str
-    rtol: float | None = None
-    dt: float | None = None
-
-    @staticmethod
-    def read(text: str) -> "Integrator":
-        """From `rodas4:1e-6` (a tolerance) or `euler:dt=1e-6` (a step [s]).
-
-        Raises:
-            ArgumentError: anything else.
-        """
-        name, _, number = text.partition(":")
-        fixed = number.startswith("dt=")
-        try:
-            value = float(number.removeprefix("dt="))
-        except ValueError:
-            value = -1.0
-        if name not in SOLVERS or not value > 0.0:
-            raise ArgumentError(
-                f"integrator = {text!r} is not allowed: write SOLVER:TOLERANCE or SOLVER:dt=STEP, "
-                f"the solver one of {', '.join(SOLVERS)}."
-            )
-        return Integrator(name, dt=value) if fixed else Integrator(name, rtol=value)
+_MOMENT = 1e-6
+"""Share of the duration that is simulated to compile a program."""
+_LONG = 1.0
+"""Time of runs after which none is repeated [s]."""
 
 
 class ConstraintRun(NamedTuple):
@@ -73,7 +44,7 @@ class ConstraintRun(NamedTuple):
         max_violation_m: largest ‖Φ‖ at the end of a step [m].
         max_violation_rate: largest ‖Φ̇‖ there [m/s].
         state_error: largest difference from the minimal formulation's state at the end (SI units).
-        wall_s_run: time of a warm run [s].
+        wall_s_run: time of the fastest run, compiled before [s].
         steps: attempted.
     """
 
@@ -97,11 +68,12 @@ def compare_constraints(
     integrators: Sequence[Integrator],
     methods: Sequence[str],
     repeats: int,
-    progress: bool = False,
-) -> list[ConstraintRun]:
+    advance: Callable[[int], object] = lambda work: None,
+) -> Iterator[ConstraintRun]:
     """Runs every method with every integrator from one start, compiled and timed apart.
 
-    The truth is the minimal formulation's state at the end, at a tolerance of 1e-10.
+    The truth is the minimal formulation's state at the end, at a tolerance of 1e-10. As many
+    programs as there are threads are compiled at once; nothing is while a run is timed.
 
     Args:
         scene: what to simulate.
@@ -109,21 +81,37 @@ def compare_constraints(
         duration: simulated time [s].
         integrators: how to integrate.
         methods: some of `CONSTRAINT_METHODS`.
-        repeats: runs of which the fastest counts.
-        progress: whether to show a bar on stderr.
+        repeats: runs of which the fastest counts; none is repeated once they took a second.
+        advance: is told of work that is done, `work_of` an integrator for each run.
 
-    Returns:
-        A `ConstraintRun` for every pair of method and integrator, the integrators of one method
-        together.
+    Yields:
+        A `ConstraintRun` for every pair of method and integrator as it is done, explicit
+        integrators first, the methods of each together.
     """
     with stage("simulating the minimal formulation to compare with"):
         truth = final_truth(scene, state, duration)
     scenes = {name: RedundantScene(scene, method_named(name)) for name in methods}
-    every = [(name, integrator) for name in methods for integrator in integrators]
-    return [
-        _run(name, scenes[name], state, duration, integrator, truth, repeats)
-        for name, integrator in tqdm(every, unit="runs", disable=not progress)
-    ]
+    quick_first = sorted(integrators, key=lambda each: not each.explicit)
+    every = [(name, integrator) for integrator in quick_first for name in methods]
+    threads = default_threads()
+    with ThreadPoolExecutor(threads) as pool:
+        for first in range(0, len(every), threads):
+            some = every[first : first + threads]
+            futures = [
+                pool.submit(_compiled, scenes[name], state, duration, integrator)
+                for name, integrator in some
+            ]
+            for (_, integrator), future in zip(some, futures, strict=True):
+                future.result()
+                advance(work_of(integrator) - 1)
+            for (name, integrator), future in zip(some, futures, strict=True):
+                yield _run(name, scenes[name], integrator, future.result(), truth, repeats)
+                advance(1)
+
+
+def work_of(integrator: Integrator) -> int:
+    """About how much work one of its runs is, most of it compiling, in units of a timing."""
+    return 3 if integrator.explicit else 12
 
 
 def final_truth(scene: Scene, state: WalkerState, duration: float) -> np.ndarray:
@@ -134,16 +122,10 @@ def final_truth(scene: Scene, state: WalkerState, duration: float) -> np.ndarray
     return np.array(request().final)
 
 
-def _run(
-    name: str,
-    scene: RedundantScene,
-    state: WalkerState,
-    duration: float,
-    integrator: Integrator,
-    truth: np.ndarray,
-    repeats: int,
-) -> ConstraintRun:
-    # Not compiled by itself: another tolerance or step size runs the same program.
+def _compiled(
+    scene: RedundantScene, state: WalkerState, duration: float, integrator: Integrator
+) -> Simulation:
+    """The request, whose program is compiled: another duration, tolerance or step runs the same."""
     request = Simulation.prepare(
         scene,
         state,
@@ -156,6 +138,18 @@ def _run(
         watch=(),  # stops for nothing but a failure
         max_solver_steps=_MOST_STEPS,
     )
+    jax.block_until_ready(replace(request, duration=_MOMENT * request.duration)())
+    return request
+
+
+def _run(
+    name: str,
+    scene: RedundantScene,
+    integrator: Integrator,
+    request: Simulation,
+    truth: np.ndarray,
+    repeats: int,
+) -> ConstraintRun:
     found, seconds = time_run(request, repeats)
     final = np.array(minimal_state(scene, found.final))
     error = float(np.max(np.abs(final - truth)))
@@ -176,10 +170,9 @@ def _run(
 
 
 def time_run(request: Simulation, repeats: int) -> tuple[Trajectory, float]:
-    """What a request gives, and the time of its fastest warm run [s]."""
-    found = jax.block_until_ready(request())
-    seconds = []
-    for _ in range(repeats):
+    """What a compiled request gives, and the time of its fastest run [s]."""
+    seconds: list[float] = []
+    while not seconds or (len(seconds) < repeats and sum(seconds) < _LONG):
         begin = time.perf_counter()
         found = jax.block_until_ready(request())
         seconds.append(time.perf_counter() - begin)

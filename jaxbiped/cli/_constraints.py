@@ -1,73 +1,75 @@
 """`jaxbiped constraints`: the constraint methods compared on the seed's walk."""
 
-import dataclasses
 import math
+import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive
+from tqdm import tqdm
+
 from jaxbiped._types import JsonObject
-from jaxbiped.cli._constraint_comparison import ConstraintRun, Integrator, compare_constraints
-from jaxbiped.cli._option_fields import Group, group
+from jaxbiped.cli._constraint_comparison import ConstraintRun, compare_constraints, work_of
+from jaxbiped.cli._integrator import Integrator
 from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
-from jaxbiped.constraints._constraint_methods import CONSTRAINT_METHODS
+from jaxbiped.cli._walk_options import OutputOptions
+from jaxbiped.cli.commands._constraints import Constraints
 from jaxbiped.scene._scene import Scene
 
-_MOST_ROWS = 200
+_HEAD = (
+    "method",
+    "integrator",
+    "by",
+    "ending",
+    "max |Phi| m",
+    "rate m/s",
+    "error",
+    "steps",
+    "run s",
+    "to standard",
+)
+_WIDTHS = (9, 10, 10, 13, 11, 8, 7, 7, 6, 11)
+"""Of the columns: a row is printed before the others are known."""
+_BAR = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
 
-@dataclasses.dataclass(frozen=True)
-class Constraints:
-    """Compare the seven ways to hold the hip together: violation, error against the minimal
-    formulation, and time."""
-
-    scene: Group[SceneOptions] = group(SceneOptions)
-    start: Group[StartOptions] = group(StartOptions)
-    methods: tuple[str, ...] = tuple(CONSTRAINT_METHODS)
-    """Names of the methods to compare."""
-    integrators: tuple[str, ...] = ("rodas4:1e-6", "euler:dt=1e-6", "runge2:dt=1e-6")
-    """Each SOLVER:TOLERANCE, or SOLVER:dt=STEP for steps of one size [s]."""
-    duration: float = 0.5
-    """Simulated time [s]."""
-    repeats: int = 3
-    """Runs of which the fastest counts."""
-    out: Path | None = None
-    """Folder for the picture."""
-    json: Path | None = None
-    """File for the numbers in SI units; - prints only them."""
-
-    def run(self) -> int:
-        """Runs the command; returns the exit code."""
-        scene = self.scene.scene()
-        if not isinstance(scene, Scene):
-            raise ArgumentError(
-                "model or formulation is not allowed here: compliant and minimal are compared."
+def run(options: Constraints) -> int:
+    """Runs the command; returns the exit code, 1 where Ctrl-C ended it."""
+    scene = options.scene.scene()
+    assert isinstance(scene, Scene)
+    integrators = [Integrator.read(text) for text in options.integrators]
+    OutputOptions(out=options.out, json=options.json).check()
+    report, runs = Report(options.json), list[ConstraintRun]()
+    many = len(integrators) * len(options.methods)
+    work = len(options.methods) * sum(map(work_of, integrators))
+    complete = False
+    with tqdm(total=work, smoothing=0.0, bar_format=_BAR, desc=f"0/{many} runs") as bar:
+        try:
+            found = compare_constraints(
+                scene,
+                options.start.state(scene),
+                duration=options.duration,
+                integrators=integrators,
+                methods=options.methods,
+                repeats=options.repeats,
+                advance=bar.update,
             )
-        for name in self.methods:
-            check_choice("methods", name, CONSTRAINT_METHODS)
-        check_positive("duration", self.duration, "s")
-        check_count("repeats", self.repeats)
-        integrators = [Integrator.read(text) for text in self.integrators]
-        OutputOptions(out=self.out, json=self.json).check()
-        runs = compare_constraints(
-            scene,
-            self.start.state(scene),
-            duration=self.duration,
-            integrators=integrators,
-            methods=self.methods,
-            repeats=self.repeats,
-            progress=True,
-        )
-        report = Report(self.json)
-        report.say(run_table(runs))
-        report.say(
-            f"{self.duration:g} s from the start; errors against the minimal formulation at 1e-10"
-        )
-        numbers = run_numbers(runs)
-        if self.out is not None:
-            report.say(f"wrote {write_picture(numbers, self.out)}")
-        report.finish({"duration_s": self.duration, "runs": numbers})
-        return 0
+            for line in _lines(found, runs):
+                with bar.external_write_mode(file=sys.stdout):
+                    report.say(line)
+                bar.set_description_str(f"{len(runs)}/{many} runs")
+            complete = True
+        except KeyboardInterrupt:
+            pass
+    if not complete:
+        report.say(f"stopped by Ctrl-C after {len(runs)} of {many} runs")
+    report.say(
+        f"{options.duration:g} s from the start; errors against the minimal formulation at 1e-10"
+    )
+    numbers = run_numbers(runs)
+    if options.out is not None and runs:
+        report.say(f"wrote {write_picture(numbers, options.out)}")
+    report.finish({"duration_s": options.duration, "complete": complete, "runs": numbers})
+    return 0 if complete else 1
 
 
 def write_picture(runs: list[JsonObject], out: Path) -> Path:
@@ -90,38 +92,37 @@ def run_numbers(runs: list[ConstraintRun]) -> list[JsonObject]:
     ]
 
 
-def run_table(runs: list[ConstraintRun]) -> str:
-    """Runs as a table; times also relative to the standard method's with the same integrator."""
-    usual = {
-        (run.integrator, run.rtol_or_dt): run.wall_s_run for run in runs if run.method == "standard"
-    }
-    rows = []
-    for run in runs:
-        base = usual.get((run.integrator, run.rtol_or_dt))
-        rows.append(
-            (
-                run.method,
-                run.integrator,
-                f"{'dt ' if run.fixed else 'rtol '}{run.rtol_or_dt:g}",
-                run.ending,
-                f"{run.max_violation_m:.1e}",
-                f"{run.max_violation_rate:.1e}",
-                f"{run.state_error:.1e}",
-                str(run.steps),
-                f"{run.wall_s_run:.3f}",
-                "" if base is None else f"{run.wall_s_run / base:.2f}",
-            )
-        )
-    head = (
-        "method",
-        "integrator",
-        "by",
-        "ending",
-        "max |Phi| m",
-        "rate m/s",
-        "error",
-        "steps",
-        "run s",
-        "to standard",
+def _lines(found: Iterator[ConstraintRun], runs: list[ConstraintRun]) -> Iterator[str]:
+    """The table line by line, each as its run is done, which is kept in `runs`."""
+    for run in found:
+        first = not runs
+        runs.append(run)
+        lines = _padded(_row(run, _usual(run, runs))).splitlines()
+        yield "\n".join(lines if first else lines[1:])
+
+
+def _usual(run: ConstraintRun, runs: Sequence[ConstraintRun]) -> float | None:
+    """The time of the standard method's run with the same integrator, None for none so far."""
+    same = (each for each in runs if each[1:4] == run[1:4] and each.method == "standard")
+    return next((each.wall_s_run for each in same), None)
+
+
+def _row(run: ConstraintRun, usual: float | None) -> tuple[str, ...]:
+    return (
+        run.method,
+        run.integrator,
+        f"{'dt ' if run.fixed else 'rtol '}{run.rtol_or_dt:g}",
+        run.ending,
+        f"{run.max_violation_m:.1e}",
+        f"{run.max_violation_rate:.1e}",
+        f"{run.state_error:.1e}",
+        str(run.steps),
+        f"{run.wall_s_run:.3f}",
+        "" if usual is None else f"{run.wall_s_run / usual:.2f}",
     )
-    return table(head, rows, most=_MOST_ROWS)
+
+
+def _padded(row: tuple[str, ...]) -> str:
+    """Head and row, in columns as wide as those of every other row."""
+    head = [word.rjust(width) for word, width in zip(_HEAD, _WIDTHS, strict=True)]
+    return table(head, [row], most=1)

@@ -1,17 +1,12 @@
 """`jaxbiped continue`: follow the periodic gait along a parameter and print its bifurcations."""
 
-import dataclasses
 import time
 from pathlib import Path
-from typing import Annotated
-
-from tyro.conf import arg
 
 from jaxbiped import _clock
 from jaxbiped._types import JsonObject
-from jaxbiped.cli._option_fields import Engine, GaitAccuracy, Group, group
 from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
+from jaxbiped.cli.commands._continue import ContinueGait
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import BranchPoint
@@ -21,63 +16,39 @@ _MOST_ROWS = 24
 _STABLE = {True: "yes", False: "no", None: "undecided"}
 
 
-@dataclasses.dataclass(frozen=True)
-class ContinueGait:
-    """Follow the periodic gait along a parameter; print its stability and its bifurcations."""
-
-    scene: Group[SceneOptions] = group(SceneOptions)
-    start: Group[StartOptions] = group(StartOptions)
-    output: Group[OutputOptions] = group(OutputOptions)
-    along: str = "slope"
-    """The parameter, by its name."""
-    first: Annotated[float, arg(name="from")] = 0.005
-    """Beginning of its range (SI units)."""
-    last: Annotated[float, arg(name="to")] = 0.1
-    """End of its range."""
-    footsteps: int = 1
-    """Footsteps in a cycle."""
-    log: bool | None = None
-    """Whether equal steps are equal factors; unless said, where the range spans two decades."""
-    largest_step: float = 0.02
-    """Largest arclength of a step, in which the range counts 1."""
-    max_points: int = 200
-    """Points followed in each direction at most."""
-    accuracy: GaitAccuracy = "balanced"
-    engine: Engine = "auto"
-
-    def run(self) -> int:
-        """Runs the command; returns the exit code."""
-        imported = time.perf_counter()
-        scene = self.scene.scene()
-        state = self.start.state(scene) if self.start.given else None
-        self.output.check()
-        branch = continue_gait(
-            scene,  # type: ignore[arg-type]
-            self.along,
-            bounds=(self.first, self.last),
-            guess=state,
-            footsteps=self.footsteps,
-            log=self.log,
-            largest_step=self.largest_step,
-            max_points=self.max_points,
-            accuracy=self.accuracy,
-            engine=self.engine,
-            progress=True,
-        )
-        wall = {
-            "import": imported - _clock.IMPORT_BEGAN,
-            "total": time.perf_counter() - _clock.IMPORT_BEGAN,
-        }
-        report = Report(self.output.json)
-        if len(branch):
-            _print(report, branch, wall)
-        else:
-            report.say(branch.stops[0].cause)
-        if len(branch) and self.output.out is not None:
-            for path in write_results(branch, self.output.out):
-                report.say(f"wrote {path}")
-        report.finish(branch_numbers(branch) | {"wall_s": wall})
-        return 0 if len(branch) else 1
+def run(options: ContinueGait) -> int:
+    """Runs the command; returns the exit code."""
+    imported = time.perf_counter()
+    scene = options.scene.scene()
+    state = options.start.state(scene) if options.start.given else None
+    options.output.check()
+    branch = continue_gait(
+        scene,  # type: ignore[arg-type]
+        options.along,
+        bounds=(options.first, options.last),
+        guess=state,
+        footsteps=options.footsteps,
+        log=options.log,
+        largest_step=options.largest_step,
+        max_points=options.max_points,
+        accuracy=options.accuracy,
+        engine=options.engine,
+        progress=True,
+    )
+    wall = {
+        "import": imported - _clock.IMPORT_BEGAN,
+        "total": time.perf_counter() - _clock.IMPORT_BEGAN,
+    }
+    report = Report(options.output.json)
+    if len(branch):
+        _print(report, branch, wall)
+    else:
+        report.say(branch.stops[0].cause)
+    if len(branch) and options.output.out is not None:
+        for path in write_results(branch, options.output.out):
+            report.say(f"wrote {path}")
+    report.finish(branch_numbers(branch) | {"wall_s": wall})
+    return 0 if len(branch) else 1
 
 
 def branch_numbers(branch: Branch) -> JsonObject:

@@ -13,7 +13,6 @@ from jaxbiped.dynamics._bristle_state import MinimalState
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._state import seed_state
-from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
@@ -30,13 +29,16 @@ def default_start(scene: Any) -> WalkerState:
     For the seed's own scene it is the seed's start to the last bit.
     """
     seed, own = seed_state(), seed_scene()
-    if not scene.compliant:
-        return default_guess(scene)
-    if _fitted_to(scene.walker, scene.normal, scene.ground.g) == _fitted_to(
+    if scene.compliant and _fitted_to(scene.walker, scene.normal, scene.ground.g) == _fitted_to(
         own.walker, own.normal, own.ground.g
     ):
         return seed
-    start = cast(MinimalState, default_guess(scene))
+    from jaxbiped.gait._default_guess import default_guess
+
+    guess = default_guess(scene)
+    if not scene.compliant:
+        return guess
+    start = cast(MinimalState, guess)
     depth = standing_height(own, seed.theta_2) - seed.hip_z
     load = (scene.walker.total_mass * scene.ground.g) / (own.walker.total_mass * own.ground.g)
     fitted = float(_depth(scene.normal, own.normal, depth, load))

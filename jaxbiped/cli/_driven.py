@@ -1,17 +1,19 @@
 """What a driven walk or gait costs, for the commands that print it."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jaxbiped._types import JsonObject
-from jaxbiped.gait._gait import Gait
 from jaxbiped.measure._cost_of_transport import cost_of_transport
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.simulate._simulate import simulate
 from jaxbiped.solve._trajectory import Trajectory
 
+if TYPE_CHECKING:
+    from jaxbiped.gait._gait import Gait
 
-def gait_cost(scene: Any, gait: Gait, footsteps: int) -> JsonObject:
+
+def gait_cost(scene: Any, gait: "Gait", footsteps: int) -> JsonObject:
     """Cost of transport over a cycle of a driven gait, ready for JSON; {} for a passive one.
 
     A cycle that begins between heel strikes is counted from the first of them.

@@ -1,6 +1,5 @@
 """`jaxbiped gait`: find the periodic gait and print its stability and sensitivities."""
 
-import dataclasses
 import math
 import time
 import warnings
@@ -11,12 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jaxbiped import _clock
-from jaxbiped._checks import check_choice, check_count
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._driven import cost_sentence, gait_cost
-from jaxbiped.cli._option_fields import Engine, Group, group
 from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
+from jaxbiped.cli.commands._gait import FindGait
 from jaxbiped.dynamics._rigid_checks import rigid_checks
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.gait._continuation import BranchEnd
@@ -44,70 +41,52 @@ _UNITS = {
 _MOST_ROWS = 64
 
 
-@dataclasses.dataclass(frozen=True)
-class FindGait:
-    """Find the periodic gait near a start; print its multipliers and its elasticities."""
-
-    scene: Group[SceneOptions] = group(SceneOptions)
-    start: Group[StartOptions] = group(StartOptions)
-    output: Group[OutputOptions] = group(OutputOptions)
-    accuracy: str = "balanced"
-    """How accurately to solve: draft, balanced or tight; or a relative error, such as 1e-4."""
-    footsteps: int = 1
-    """Footsteps in a cycle."""
-    section: str | None = None
-    """Where a cycle begins: mid-stance (the usual one) or heel-strike (a rigid walker's)."""
-    engine: Engine = "auto"
-
-    def run(self) -> int:
-        """Runs the command; returns the exit code."""
-        imported = time.perf_counter()
-        scene = self.scene.scene()
-        # A start that is not told is the search's own choice.
-        state = self.start.state(scene) if self.start.given else None
-        if self.section is not None:
-            check_choice("section", self.section, _SECTIONS)
-        check_count("footsteps", self.footsteps)
-        self.output.check()
-        section = None if self.section is None else _SECTIONS[self.section]()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
-            gait = find_gait(
-                scene,
-                state,
-                footsteps=self.footsteps,
-                section=section,
-                accuracy=accuracy_told(self.accuracy),
-                engine=self.engine,
-            )
-        found = gait.outcome is Search.FOUND  # waits for the result
-        wall = {
-            "import": imported - _clock.IMPORT_BEGAN,
-            "total": time.perf_counter() - _clock.IMPORT_BEGAN,
-        }
-        numbers = gait_numbers(gait) | {"search": explain_search(scene, gait), "wall_s": wall}
-        if gait.error is not None:
-            numbers["error"] = error_numbers(gait.error)
-        if found and isinstance(scene, RigidScene):
-            numbers["assumptions"] = _assumptions(scene, gait)
-        cost = gait_cost(scene, gait, self.footsteps) if found else {}
-        numbers |= cost
-        report = Report(self.output.json)
-        if found:
-            _print(report, numbers, gait)
-            if "assumptions" in numbers:
-                report.say(_assumption_line(numbers["assumptions"]))
-            if cost:
-                report.say(cost_sentence(cost))
-        else:
-            report.say(_failure(numbers, gait))
-        if gait.error is not None:
-            report.say(error_sentence(gait.error))
-        if found and self.output.out is not None:
-            for path in write_figures(gait, self.output.out):
-                report.say(f"wrote {path}")
-        report.finish(numbers)
-        return 0 if found else 1
+def run(options: FindGait) -> int:
+    """Runs the command; returns the exit code."""
+    imported = time.perf_counter()
+    scene = options.scene.scene()
+    # A start that is not told is the search's own choice.
+    state = options.start.state(scene) if options.start.given else None
+    options.output.check()
+    section = None if options.section is None else _SECTIONS[options.section]()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
+        gait = find_gait(
+            scene,
+            state,
+            footsteps=options.footsteps,
+            section=section,
+            accuracy=accuracy_told(options.accuracy),
+            engine=options.engine,
+        )
+    found = gait.outcome is Search.FOUND  # waits for the result
+    wall = {
+        "import": imported - _clock.IMPORT_BEGAN,
+        "total": time.perf_counter() - _clock.IMPORT_BEGAN,
+    }
+    numbers = gait_numbers(gait) | {"search": explain_search(scene, gait), "wall_s": wall}
+    if gait.error is not None:
+        numbers["error"] = error_numbers(gait.error)
+    if found and isinstance(scene, RigidScene):
+        numbers["assumptions"] = _assumptions(scene, gait)
+    cost = gait_cost(scene, gait, options.footsteps) if found else {}
+    numbers |= cost
+    report = Report(options.output.json)
+    if found:
+        _print(report, numbers, gait)
+        if "assumptions" in numbers:
+            report.say(_assumption_line(numbers["assumptions"]))
+        if cost:
+            report.say(cost_sentence(cost))
+    else:
+        report.say(_failure(numbers, gait))
+    if gait.error is not None:
+        report.say(error_sentence(gait.error))
+    if found and options.output.out is not None:
+        for path in write_figures(gait, options.output.out):
+            report.say(f"wrote {path}")
+    report.finish(numbers)
+    return 0 if found else 1
 
 
 def write_figures(gait: Gait, out: Path) -> list[Path]:

@@ -1,13 +1,12 @@
 """`jaxbiped models`: what can be modelled, and what it costs."""
 
 import dataclasses
-from pathlib import Path
 
-from jaxbiped._checks import check_writable_file
 from jaxbiped._parameter import parameter_infos
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._report import Report, table
+from jaxbiped.cli.commands._models import Models
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.measure._operation_counts import operation_counts
 from jaxbiped.scene._ladder import ladder
@@ -28,37 +27,28 @@ _SEED_NORMAL = dict(K=1e6, c=1e7, n=1.5, mass=2.0)
 _SEED_FRICTION = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
 
 
-@dataclasses.dataclass(frozen=True)
-class Models:
-    """List the laws of contact and the ladder of models, with parameters, units and cost."""
-
-    json: Path | None = None
-    """File for the same in JSON; - prints only that."""
-
-    def run(self) -> int:
-        """Runs the command; returns the exit code."""
-        if self.json is not None and str(self.json) != "-":
-            check_writable_file("--json", self.json)
-        seed = seed_scene()
-        with stage("counting the operations of every law"):
-            numbers = {
-                "normal": [
-                    _law(name, dataclasses.replace(seed, normal=law), law)
-                    for name in NORMAL_LAWS
-                    for law in [normal_law_like(name, **_SEED_NORMAL)]
-                ],
-                "friction": [
-                    _law(name, dataclasses.replace(seed, friction=law), law)
-                    for name in FRICTION_LAWS
-                    for law in [friction_law_like(name, **_SEED_FRICTION)]
-                ],
-                "actuation": [_actuator(name, kind) for name, kind in ACTUATORS.items()],
-                "rungs": [_rung(name, scene) for name, scene in ladder(seed).items()],
-            }
-        report = Report(self.json)
-        _print(report, numbers)
-        report.finish(numbers)
-        return 0
+def run(options: Models) -> int:
+    """Runs the command; returns the exit code."""
+    seed = seed_scene()
+    with stage("counting the operations of every law"):
+        numbers = {
+            "normal": [
+                _law(name, dataclasses.replace(seed, normal=law), law)
+                for name in NORMAL_LAWS
+                for law in [normal_law_like(name, **_SEED_NORMAL)]
+            ],
+            "friction": [
+                _law(name, dataclasses.replace(seed, friction=law), law)
+                for name in FRICTION_LAWS
+                for law in [friction_law_like(name, **_SEED_FRICTION)]
+            ],
+            "actuation": [_actuator(name, kind) for name, kind in ACTUATORS.items()],
+            "rungs": [_rung(name, scene) for name, scene in ladder(seed).items()],
+        }
+    report = Report(options.json)
+    _print(report, numbers)
+    report.finish(numbers)
+    return 0
 
 
 def _law(

@@ -3,21 +3,18 @@
 import dataclasses
 import math
 import sys
-from pathlib import Path
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_choice, check_not_negative, check_writable_file
+from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._gait import finite, parts
-from jaxbiped.cli._option_fields import Engine, GaitAccuracy, Group, group
 from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._walk_options import SceneOptions
+from jaxbiped.cli.commands._optimise import Optimise
 from jaxbiped.continuation._nearest_bifurcation import NearestBifurcation
 from jaxbiped.optimise._certificate import Certificate, certify
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.optimise._optimise_gait import Optimum, optimise_gait
-from jaxbiped.optimise._optimisers import OPTIMISERS
 from jaxbiped.optimise._runs import Outcome
 from jaxbiped.scene._parameters import parameter_names, parameter_quantities, parameter_values
 from jaxbiped.scene._redundant_scene import RedundantScene
@@ -29,91 +26,44 @@ _USUAL_RANGE = 2.0
 _MOST_ROWS = 64
 
 
-@dataclasses.dataclass(frozen=True)
-class Optimise:
-    """Find the parameters within bounds whose periodic gait is best, and certify it."""
-
-    vary: str
-    """Parameters that vary, d,r,J (half to double their values) or with bounds d=0.05:0.2,r,J."""
-    scene: Group[SceneOptions] = group(SceneOptions)
-    maximise: str | None = None
-    """Measure of the gait to maximise, such as speed."""
-    minimise: str | None = None
-    """Or to minimise, such as spectral_radius."""
-    subject_to: tuple[str, ...] = ()
-    """What must hold, such as "spectral_radius<0.4" "step_length>0.2"."""
-    optimiser: str = "trust-region"
-    """trust-region, slsqp, trust-constr, or without requirements optax."""
-    iterations: int = 200
-    """Most iterations of a run."""
-    restarts: int = 0
-    """Further runs, from the best of scattered designs."""
-    seed: int = 0
-    """Seed of these designs."""
-    accuracy: GaitAccuracy = "balanced"
-    engine: Engine = "auto"
-    basin: int = 1024
-    """Starts about the gait that are labelled for the certificate's basin; 0 for none."""
-    footsteps: int = 200
-    """Footsteps of the certificate's walk from a pushed start; 0 for none."""
-    bifurcations: str = "slope"
-    """Parameters in which the certificate seeks the nearest bifurcation: slope,d; or none."""
-    fatal_push: bool = False
-    """Whether the certificate seeks the smallest push after which the gait is left."""
-    other_engine: bool = False
-    """Whether the certificate also finds the gait by the other engine (compiles for minutes)."""
-    store: Path | None = None
-    """File that keeps every evaluation; the same command goes on from it."""
-    json: Path | None = None
-    """File for the numbers in SI units; - prints only them."""
-
-    def run(self) -> int:
-        """Runs the command; returns the exit code."""
-        scene = self.scene.scene()
-        if isinstance(scene, RedundantScene):
-            raise ArgumentError(
-                "formulation = redundant is not allowed here: how the hip is held makes no "
-                "difference to a gait; choose minimal."
-            )
-        check_choice("optimiser", self.optimiser, OPTIMISERS)
-        check_not_negative("basin", self.basin)
-        check_not_negative("footsteps", self.footsteps)
-        if self.json is not None and str(self.json) != "-":
-            check_writable_file("--json", self.json)
-        along = [n.strip() for n in self.bifurcations.split(",") if n.strip() not in ("", "none")]
-        for name in along:
-            check_choice("bifurcations", name, parameter_names(scene))
-        found = optimise_gait(
-            scene,
-            vary=_bounds(scene, self.vary),
-            maximise=self.maximise,
-            minimise=self.minimise,
-            subject_to=self.subject_to or None,
-            optimiser=self.optimiser,
-            iterations=self.iterations,
-            restarts=self.restarts,
-            seed=self.seed,
-            accuracy=self.accuracy,
-            engine=self.engine,
-            progress=sys.stderr.isatty(),
-            store=self.store,
-        )
-        certificate = certify(
-            found,
-            starts=self.basin,
-            footsteps=self.footsteps,
-            fatal_push=self.fatal_push,
-            bifurcations_along=along,
-            other_engine=self.other_engine,
-        )
-        goal = self.minimise if self.maximise is None else self.maximise
-        sense = "minimise" if self.maximise is None else "maximise"
-        assert goal is not None
-        numbers = optimum_numbers(found, certificate, goal, sense)
-        report = Report(self.json)
-        _print(report, scene, found, certificate, goal)
-        report.finish(numbers)
-        return 0 if found.outcome in (Outcome.CONVERGED, Outcome.CORNER) else 1
+def run(options: Optimise) -> int:
+    """Runs the command; returns the exit code."""
+    scene = options.scene.scene()
+    assert not isinstance(scene, RedundantScene)
+    along = [n.strip() for n in options.bifurcations.split(",") if n.strip() not in ("", "none")]
+    for name in along:
+        check_choice("bifurcations", name, parameter_names(scene))
+    found = optimise_gait(
+        scene,
+        vary=_bounds(scene, options.vary),
+        maximise=options.maximise,
+        minimise=options.minimise,
+        subject_to=options.subject_to or None,
+        optimiser=options.optimiser,
+        iterations=options.iterations,
+        restarts=options.restarts,
+        seed=options.seed,
+        accuracy=options.accuracy,
+        engine=options.engine,
+        progress=sys.stderr.isatty(),
+        store=options.store,
+    )
+    certificate = certify(
+        found,
+        starts=options.basin,
+        footsteps=options.footsteps,
+        fatal_push=options.fatal_push,
+        bifurcations_along=along,
+        other_engine=options.other_engine,
+    )
+    goal = options.minimise if options.maximise is None else options.maximise
+    sense = "minimise" if options.maximise is None else "maximise"
+    assert goal is not None
+    numbers = optimum_numbers(found, certificate, goal, sense)
+    report = Report(options.json)
+    _print(report, scene, found, certificate, goal)
+    report.finish(numbers)
+    return 0 if found.outcome in (Outcome.CONVERGED, Outcome.CORNER) else 1
 
 
 def _bounds(scene: Scene | RigidScene, text: str) -> dict[str, tuple[float, float]]:

@@ -5,8 +5,10 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from jaxbiped._types import JsonObject
+if TYPE_CHECKING:
+    from jaxbiped._types import JsonObject
 
 
 class Report:
@@ -21,7 +23,7 @@ class Report:
         if not self._only_json:
             _write(text + "\n")
 
-    def finish(self, numbers: JsonObject) -> None:
+    def finish(self, numbers: "JsonObject") -> None:
         """Writes the numbers."""
         text = json.dumps(numbers, indent=2) + "\n"
         if self._only_json:

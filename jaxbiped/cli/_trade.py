@@ -1,18 +1,16 @@
 """`jaxbiped trade`: what accuracy costs for a scene, by our own ways of solving."""
 
-import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
-from jaxbiped._checks import ArgumentError, check_count, check_positive
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
-from jaxbiped.cli._option_fields import Group, group
 from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, StartOptions
+from jaxbiped.cli._walk_options import OutputOptions
+from jaxbiped.cli.commands._trade import Trade
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import ACCURACIES, precision_of, tolerances
@@ -35,81 +33,60 @@ _QUICK_GAITS, _FULL_GAITS = (("rodas4", "lanes"),), (*_QUICK, ("rodas4", "xla"))
 _FULL_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 
 
-@dataclasses.dataclass(frozen=True)
-class Trade:
-    """Measure what each accuracy costs for a scene: errors of a walk and of the gait, by our own
-    methods, engines and tolerances, each beside its steps and its time."""
+def run(options: Trade) -> int:
+    """Runs the command; returns the exit code."""
+    scene = options.scene.scene()
+    assert isinstance(scene, Scene)
+    start = options.start.state(scene)
+    assert isinstance(start, State)
+    OutputOptions(out=options.out, json=options.json).check()
+    walk, gait = WalkTrade(scene, start, options.duration, options.repeats), GaitTrade(scene, 1)
+    report = Report(options.json)
+    found = {"walk": _measure(options, walk, _FULL if options.full else _QUICK)}
+    found["gait"] = _measure(options, gait, _FULL_GAITS if options.full else _QUICK_GAITS)
+    for name, (rows, truth) in found.items():
+        _say(report, name, rows, truth)
+    numbers: JsonObject = {"duration_s": options.duration}
+    numbers["rows"] = [
+        {"of": name} | row.numbers() for name, (rows, _) in found.items() for row in rows
+    ]
+    numbers["floors"] = {
+        name: truth.floor for name, (_, truth) in found.items() if truth is not None
+    }
+    numbers["cheapest"] = {name: _advice(rows) for name, (rows, _) in found.items()}
+    if options.out is not None:
+        for path in _write_pictures(found, options.out):
+            report.say(f"wrote {path}")
+    report.finish(numbers)
+    return 0 if found["walk"][1] is not None else 1
 
-    scene: Group[SceneOptions] = group(SceneOptions)
-    start: Group[StartOptions] = group(StartOptions)
-    duration: float = 2.0
-    """Simulated time of the walk [s]."""
-    repeats: int = 3
-    """Warm runs of which the median counts."""
-    full: bool = False
-    """Every solver, both engines and a ladder of tolerances; takes many minutes."""
-    out: Path | None = None
-    """Folder for the pictures."""
-    json: Path | None = None
-    """File for the numbers; - prints only them."""
 
-    def run(self) -> int:
-        """Runs the command; returns the exit code."""
-        scene = self.scene.scene()
-        if not isinstance(scene, Scene):
-            raise ArgumentError(
-                "model or formulation is not allowed here: compliant and minimal are measured."
-            )
-        start = self.start.state(scene)
-        assert isinstance(start, State)
-        check_positive("duration", self.duration, "s")
-        check_count("repeats", self.repeats)
-        OutputOptions(out=self.out, json=self.json).check()
-        walk, gait = WalkTrade(scene, start, self.duration, self.repeats), GaitTrade(scene, 1)
-        report = Report(self.json)
-        found = {"walk": self._measure(walk, _FULL if self.full else _QUICK)}
-        found["gait"] = self._measure(gait, _FULL_GAITS if self.full else _QUICK_GAITS)
-        for name, (rows, truth) in found.items():
-            _say(report, name, rows, truth)
-        numbers: JsonObject = {"duration_s": self.duration}
-        numbers["rows"] = [
-            {"of": name} | row.numbers() for name, (rows, _) in found.items() for row in rows
-        ]
-        numbers["floors"] = {
-            name: truth.floor for name, (_, truth) in found.items() if truth is not None
-        }
-        numbers["cheapest"] = {name: _advice(rows) for name, (rows, _) in found.items()}
-        if self.out is not None:
-            for path in _write_pictures(found, self.out):
-                report.say(f"wrote {path}")
-        report.finish(numbers)
-        return 0 if found["walk"][1] is not None else 1
+def _measure(
+    options: Trade, trade: WalkTrade | GaitTrade, methods: tuple[tuple[str, str], ...]
+) -> tuple[list[Row], Truth | None]:
+    """Rows of all ways, and the truth that they are told against; no rows without one."""
+    name = "walk" if isinstance(trade, WalkTrade) else "gait"
+    with stage(f"solving the {name} by the references"):
+        truth = trade.truth()
+    if truth is None:
+        return [], None
+    ways = [
+        Way(solver, engine, setting, rtol)
+        for solver, engine in methods
+        for setting, rtol in _settings(options, name, trade.scene)
+    ]
+    return [trade.row(way, truth) for way in tqdm(ways, unit=f"{name}s")], truth
 
-    def _measure(
-        self, trade: WalkTrade | GaitTrade, methods: tuple[tuple[str, str], ...]
-    ) -> tuple[list[Row], Truth | None]:
-        """Rows of all ways, and the truth that they are told against; no rows without one."""
-        name = "walk" if isinstance(trade, WalkTrade) else "gait"
-        with stage(f"solving the {name} by the references"):
-            truth = trade.truth()
-        if truth is None:
-            return [], None
-        ways = [
-            Way(solver, engine, setting, rtol)
-            for solver, engine in methods
-            for setting, rtol in self._settings(name, trade.scene)
-        ]
-        return [trade.row(way, truth) for way in tqdm(ways, unit=f"{name}s")], truth
 
-    def _settings(self, name: str, scene: Any) -> Iterator[tuple[str, float]]:
-        """What a user would write, and the relative tolerance that it stands for in this scene."""
-        for accuracy in ACCURACIES:
-            if name == "walk":
-                yield accuracy, float(tolerances(accuracy, None, None, scene).rtol)
-            else:
-                yield accuracy, float(precision_of(accuracy, scene).rtol)
-        for rtol in _FULL_TOLERANCES if self.full else ():
-            yield f"rtol={rtol:g}", rtol
+def _settings(options: Trade, name: str, scene: Any) -> Iterator[tuple[str, float]]:
+    """What a user would write, and the relative tolerance that it stands for in this scene."""
+    for accuracy in ACCURACIES:
+        if name == "walk":
+            yield accuracy, float(tolerances(accuracy, None, None, scene).rtol)
+        else:
+            yield accuracy, float(precision_of(accuracy, scene).rtol)
+    for rtol in _FULL_TOLERANCES if options.full else ():
+        yield f"rtol={rtol:g}", rtol
 
 
 def _advice(rows: list[Row]) -> JsonObject:

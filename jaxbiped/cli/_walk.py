@@ -16,11 +16,10 @@ from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._driven import cost_sentence, walk_cost
 from jaxbiped.cli._held import constraint_numbers, constraint_sentence
-from jaxbiped.cli._option_fields import Group, group
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._rigid_walk import run_rigid_walk
-from jaxbiped.cli._walk_options import OutputOptions, SceneOptions, SolveOptions, StartOptions
 from jaxbiped.cli._warnings import ending_name, relative_residual, walk_warnings
+from jaxbiped.cli.commands._walk import Walk
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.measure._energy_ledger import energy_ledger
@@ -43,100 +42,93 @@ _SHOWN = 60.0
 """The part of a long walk that is animated [s]."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Walk:
-    """Simulate the seed's walker from a start; print its footsteps and how it ended."""
+def run(options: Walk) -> int:
+    """Runs the command; returns the exit code."""
+    imported = time.perf_counter()
+    scene = options.scene.scene()
+    state = options.start.state(scene)
+    if isinstance(scene, RigidScene):
+        assert isinstance(state, RigidState)
+        return run_rigid_walk(scene, state, options.solve, options.output)
+    assert isinstance(state, State)
+    with stage("preparing the start"):
+        request = _request(options, scene, state)
+    options.output.check()
+    began = time.perf_counter()
+    trajectory, seconds = _simulate(request, options.solve.wanted())
+    wall = {
+        "import": imported - _clock.IMPORT_BEGAN,
+        "compile": time.perf_counter() - began - seconds,
+        "run": seconds,
+    }
+    _report(options, scene, trajectory, wall, float(request.rtol))
+    return 1 if trajectory.outcome == Ending.SOLVER_FAILED else 0
 
-    scene: Group[SceneOptions] = group(SceneOptions)
-    start: Group[StartOptions] = group(StartOptions)
-    solve: Group[SolveOptions] = group(SolveOptions)
-    output: Group[OutputOptions] = group(OutputOptions)
 
-    def run(self) -> int:
-        """Runs the command; returns the exit code."""
-        imported = time.perf_counter()
-        scene = self.scene.scene()
-        state = self.start.state(scene)
-        if isinstance(scene, RigidScene):
-            assert isinstance(state, RigidState)
-            return run_rigid_walk(scene, state, self.solve, self.output)
-        assert isinstance(state, State)
-        with stage("preparing the start"):
-            request = self._request(scene, state)
-        self.output.check()
-        began = time.perf_counter()
-        trajectory, seconds = _simulate(request, self.solve.wanted())
-        wall = {
-            "import": imported - _clock.IMPORT_BEGAN,
-            "compile": time.perf_counter() - began - seconds,
-            "run": seconds,
-        }
-        self._report(scene, trajectory, wall, float(request.rtol))
-        return 1 if trajectory.outcome == Ending.SOLVER_FAILED else 0
+def _request(options: Walk, scene: Scene | RedundantScene, state: State) -> Simulation:
+    return Simulation.prepare(
+        scene,
+        state,
+        duration=options.solve.duration,
+        solver=options.solve.solver,
+        **options.solve.tolerances(),
+        dt=options.solve.dt,
+        engine=options.solve.engine,
+        max_solver_steps=options.solve.most_steps(),
+    )
 
-    def _request(self, scene: Scene | RedundantScene, state: State) -> Simulation:
-        return Simulation.prepare(
-            scene,
-            state,
-            duration=self.solve.duration,
-            solver=self.solve.solver,
-            **self.solve.tolerances(),
-            dt=self.solve.dt,
-            engine=self.solve.engine,
-            max_solver_steps=self.solve.most_steps(),
-        )
 
-    def _report(
-        self, scene: Any, trajectory: Trajectory, wall: dict[str, float], tolerance: float
-    ) -> None:
-        with stage("measuring the footsteps"):
-            steps = footsteps(scene, trajectory)
-            ledger = energy_ledger(scene, trajectory)
-        known = tolerance if trajectory.error is None else trajectory.error.rtol
-        rtol = known if self.solve.dt is None else None
-        numbers: JsonObject = {
-            "ending": ending_name(scene, trajectory),
-            "slope_rad": float(scene.ground.slope),
-            "duration_s": float(trajectory.t[-1]),
-            "steps": _step_list(steps),
-            "energy_residual_J": float(ledger.residual[0]),
-            "energy_residual_relative": relative_residual(ledger),
-            "gravity_work_J": float(ledger.gravity_work[0]),
-            "solver": {
-                "name": self.solve.solver,
-                "rtol": rtol,
-                "dt": self.solve.dt,
-                "engine": trajectory.engine,
-                "accepted": int(trajectory.accepted),
-                "rejected": int(trajectory.rejected),
-            },
-            "wall_s": wall,
-        }
-        if trajectory.error is not None:
-            numbers["error"] = error_numbers(trajectory.error)
-        cost: JsonObject = {}
-        if scene.actuation is not None:
-            cost = walk_cost(scene, trajectory)
-            numbers |= {"actuation_work_J": float(ledger.actuation_work[0])} | cost
-        numbers["warnings"] = walk_warnings(scene, numbers, rtol=rtol)
-        report = Report(self.output.json)
-        if scene.redundant:
-            numbers["constraints"] = constraint_numbers(scene, trajectory)
-        _print(report, numbers)
-        if cost:
-            report.say(cost_sentence(cost))
-        if trajectory.error is not None:
-            report.say(error_sentence(trajectory.error))
-        for sentence in numbers["warnings"]:
-            report.say(f"WARNING: {sentence}")
-        if scene.redundant:
-            report.say(constraint_sentence(numbers["constraints"]))
-        if self.output.out is not None:
-            with stage("drawing the figures and the animation"):
-                paths = write_outputs(scene, trajectory, self.output.out)
-            for path in paths:
-                report.say(f"wrote {path}")
-        report.finish(numbers)
+def _report(
+    options: Walk, scene: Any, trajectory: Trajectory, wall: dict[str, float], tolerance: float
+) -> None:
+    with stage("measuring the footsteps"):
+        steps = footsteps(scene, trajectory)
+        ledger = energy_ledger(scene, trajectory)
+    known = tolerance if trajectory.error is None else trajectory.error.rtol
+    rtol = known if options.solve.dt is None else None
+    numbers: JsonObject = {
+        "ending": ending_name(scene, trajectory),
+        "slope_rad": float(scene.ground.slope),
+        "duration_s": float(trajectory.t[-1]),
+        "steps": _step_list(steps),
+        "energy_residual_J": float(ledger.residual[0]),
+        "energy_residual_relative": relative_residual(ledger),
+        "gravity_work_J": float(ledger.gravity_work[0]),
+        "solver": {
+            "name": options.solve.solver,
+            "rtol": rtol,
+            "dt": options.solve.dt,
+            "engine": trajectory.engine,
+            "accepted": int(trajectory.accepted),
+            "rejected": int(trajectory.rejected),
+        },
+        "wall_s": wall,
+    }
+    if trajectory.error is not None:
+        numbers["error"] = error_numbers(trajectory.error)
+    cost: JsonObject = {}
+    if scene.actuation is not None:
+        cost = walk_cost(scene, trajectory)
+        numbers |= {"actuation_work_J": float(ledger.actuation_work[0])} | cost
+    numbers["warnings"] = walk_warnings(scene, numbers, rtol=rtol)
+    report = Report(options.output.json)
+    if scene.redundant:
+        numbers["constraints"] = constraint_numbers(scene, trajectory)
+    _print(report, numbers)
+    if cost:
+        report.say(cost_sentence(cost))
+    if trajectory.error is not None:
+        report.say(error_sentence(trajectory.error))
+    for sentence in numbers["warnings"]:
+        report.say(f"WARNING: {sentence}")
+    if scene.redundant:
+        report.say(constraint_sentence(numbers["constraints"]))
+    if options.output.out is not None:
+        with stage("drawing the figures and the animation"):
+            paths = write_outputs(scene, trajectory, options.output.out)
+        for path in paths:
+            report.say(f"wrote {path}")
+    report.finish(numbers)
 
 
 def _simulate(request: Simulation, wanted: float | None) -> tuple[Trajectory, float]:

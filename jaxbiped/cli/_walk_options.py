@@ -1,13 +1,12 @@
 """Options of `jaxbiped walk` and `gait`: the model, its laws and their parameters."""
 
 import dataclasses
-from collections.abc import Iterable
-from inspect import signature
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jaxbiped._checks import (
     ArgumentError,
+    check_at_least,
     check_choice,
     check_count,
     check_finite,
@@ -15,37 +14,31 @@ from jaxbiped._checks import (
     check_writable_directory,
     check_writable_file,
 )
-from jaxbiped._types import as_float
 from jaxbiped.cli._actuation_options import ActuationOptions
-from jaxbiped.cli._default_start import default_start
-from jaxbiped.cli._option_fields import Engine, Group, group
-from jaxbiped.constraints._constraint_methods import method_named
-from jaxbiped.dynamics._rigid_state import WalkerState
-from jaxbiped.scene._ground import Ground
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._seed import seed_scene
-from jaxbiped.scene._walker import Walker
-from jaxbiped.scene.laws._catalogue import (
-    FRICTION_LAWS,
-    NORMAL_LAWS,
-    friction_law_like,
-    normal_law_like,
+from jaxbiped.cli._choices import (
+    CONSTRAINT_METHODS,
+    FORMULATIONS,
+    MODELS,
+    ORIENTATIONS,
+    SEED,
+    SOLVERS,
+    friction_law_names,
+    normal_law_names,
 )
-from jaxbiped.simulate._accurate_walk import check_accurate_walk
-from jaxbiped.solve._accuracy import accuracy_told
+from jaxbiped.cli._option_checks import check_accuracy, check_engine
+from jaxbiped.cli._option_fields import Engine, Group, group
 
-_SEED = {
-    parameter.name: parameter.default for parameter in signature(seed_scene).parameters.values()
-}
+if TYPE_CHECKING:
+    from jaxbiped.dynamics._rigid_state import WalkerState
+    from jaxbiped.scene._redundant_scene import RedundantScene
+    from jaxbiped.scene._rigid_scene import RigidScene
+    from jaxbiped.scene._scene import Scene
 
 MOST_STEPS = 1 << 20
 """Solver's steps that nobody asked for more than: about 25 minutes of the seed's walk."""
 _STEPS_OF_TEN_SECONDS = 65536
-MODELS = ("compliant", "rigid")
-FORMULATIONS = ("minimal", "redundant")
+
+
 _OF_CONTACT = ("n", "K", "c", "mu_static", "mu_kinetic", "v0", "xi")
 
 
@@ -69,102 +62,88 @@ class SceneOptions:
     set: tuple[str, ...] = ()
     """Any parameters by name, as name=value, after the laws were matched."""
 
-    slope: float = _SEED["slope"]
+    slope: float = SEED["slope"].value
     """Angle of the slope, downhill positive [rad]."""
-    m: float = _SEED["m"]
+    m: float = SEED["m"].value
     """Mass of one leg [kg]."""
-    J: float = _SEED["J"]
+    J: float = SEED["J"].value
     """Moment of inertia of one leg about its centre of mass [kg m^2]."""
-    l: float = _SEED["l"]
+    l: float = SEED["l"].value
     """Hip to sole [m]."""
-    d: float = _SEED["d"]
+    d: float = SEED["d"].value
     """Hip to the leg's centre of mass [m]."""
-    r: float = _SEED["r"]
+    r: float = SEED["r"].value
     """Foot radius [m]."""
-    hip_mass: float = _SEED["hip_mass"]
+    hip_mass: float = SEED["hip_mass"].value
     """Point mass at the hip [kg]."""
-    g: float = _SEED["g"]
+    g: float = SEED["g"].value
     """Gravitational acceleration [m/s^2]."""
-    n: float = _SEED["n"]
+    n: float = SEED["n"].value
     """Exponent of the contact law."""
-    K: float = _SEED["K"]
+    K: float = SEED["K"].value
     """Contact stiffness [N/m^n]."""
-    c: float = _SEED["c"]
+    c: float = SEED["c"].value
     """Contact damping [N s/m^2]."""
-    mu_static: float = _SEED["mu_static"]
+    mu_static: float = SEED["mu_static"].value
     """Static friction coefficient."""
-    mu_kinetic: float = _SEED["mu_kinetic"]
+    mu_kinetic: float = SEED["mu_kinetic"].value
     """Kinetic friction coefficient."""
-    v0: float = _SEED["v0"]
+    v0: float = SEED["v0"].value
     """Slip speed of the friction's peak [m/s]."""
-    xi: float = _SEED["xi"]
+    xi: float = SEED["xi"].value
     """Stribeck rate [s/m]."""
 
     driven: Group[ActuationOptions] = group(ActuationOptions)
 
-    def scene(self) -> Scene | RigidScene | RedundantScene:
-        """The scene that these options describe; raises `ArgumentError`."""
+    def check(self) -> None:
+        """Raises `ArgumentError` for what is wrong in itself, before a scene is made."""
         check_choice("model", self.model, MODELS)
         check_choice("formulation", self.formulation, FORMULATIONS)
-        scene = self._rigid() if self.model == "rigid" else self._compliant()
-        scene = dataclasses.replace(scene, actuation=self.driven.actuation())
-        scene = with_parameters(scene, dict(_named_value(text) for text in self.set))
-        if self.formulation == "redundant":
-            return self._redundant(scene)
-        rolls = isinstance(scene, RigidScene)
-        chosen = 'model = "rigid"' if rolls else 'formulation = "minimal"'
-        mend = "" if rolls else "; --formulation redundant has them"
-        for name, usual in (("method", None), ("orientation", "angle")):
-            if getattr(self, name) != usual:
-                raise ArgumentError(
-                    f"{name} = {getattr(self, name)} is not allowed with {chosen}: it has no "
-                    f"constraints{mend}."
-                )
-        return scene
+        if self.method is not None:
+            check_choice("method", self.method, CONSTRAINT_METHODS)
+        check_choice("orientation", self.orientation, ORIENTATIONS)
+        check_choice("normal", self.normal, normal_law_names())
+        check_choice("friction", self.friction, friction_law_names())
+        for name, parameter in SEED.items():
+            parameter.info.check(name, getattr(self, name))
+        check_at_least("l", self.l, "r", self.r)
+        self.named_values()
+        self.driven.check()
+        self._check_that_all_is_used()
 
-    def _redundant(self, scene: Scene | RigidScene) -> RedundantScene:
-        if isinstance(scene, RigidScene):
+    def _check_that_all_is_used(self) -> None:
+        usual, rolls = SceneOptions(), self.model == "rigid"
+        if rolls and self.formulation == "redundant":
             raise ArgumentError(
                 'formulation = redundant is not allowed with model = "rigid": it rolls in minimal '
                 "coordinates."
             )
-        return RedundantScene(scene, method_named(self.method or "index1"), self.orientation)
-
-    def _compliant(self) -> Scene:
-        own = seed_scene(**{name: getattr(self, name) for name in _SEED})
-        normal = normal_law_like(
-            _known_name("normal", self.normal, NORMAL_LAWS),
-            K=self.K,
-            c=self.c,
-            n=self.n,
-            mass=own.walker.total_mass,
-            g=self.g,
-        )
-        friction = friction_law_like(
-            _known_name("friction", self.friction, FRICTION_LAWS),
-            mu_static=self.mu_static,
-            mu_kinetic=self.mu_kinetic,
-            v0=self.v0,
-            xi=self.xi,
-        )
-        return dataclasses.replace(own, normal=normal, friction=friction)
-
-    def _rigid(self) -> RigidScene:
-        usual = SceneOptions()
-        for name in ("normal", "friction", *_OF_CONTACT):
+        for name in ("normal", "friction", *_OF_CONTACT) if rolls else ():
             value = getattr(self, name)
             if value != getattr(usual, name):
                 raise ArgumentError(
                     f'{name} = {value} is not allowed with model = "rigid": its feet have no laws '
                     "of contact."
                 )
-        body = {name: getattr(self, name) for name in ("m", "J", "l", "d", "r", "hip_mass")}
-        return RigidScene(walker=Walker(**body), ground=Ground(slope=self.slope, g=self.g))
+        chosen = 'model = "rigid"' if rolls else 'formulation = "minimal"'
+        mend = "" if rolls else "; --formulation redundant has them"
+        for name in ("method", "orientation") if self.formulation == "minimal" else ():
+            value = getattr(self, name)
+            if value != getattr(usual, name):
+                raise ArgumentError(
+                    f"{name} = {value} is not allowed with {chosen}: it has no constraints{mend}."
+                )
 
+    def named_values(self) -> dict[str, float]:
+        """The parameters that were set by name; raises `ArgumentError`."""
+        return dict(map(_named_value, self.set))
 
-def _known_name(name: str, value: str, known: Iterable[str]) -> str:
-    check_choice(name, value, known)
-    return value
+    def scene(self) -> "Scene | RigidScene | RedundantScene":
+        """The scene that these options describe; raises `ArgumentError`."""
+        from jaxbiped.cli._described import described_scene
+
+        self.check()
+        return described_scene(self)
 
 
 def _named_value(text: str) -> tuple[str, float]:
@@ -205,16 +184,20 @@ class StartOptions:
         """The numbers that were said."""
         return {name: x for name, x in dataclasses.asdict(self).items() if x is not None}
 
-    def state(self, scene: Scene | RigidScene | RedundantScene) -> WalkerState:
+    def check(self) -> None:
+        """Raises `ArgumentError` for a number that is not finite."""
+        for name, value in self.given.items():
+            check_finite(f"state.{name}", value)
+
+    def state(self, scene: "Scene | RigidScene | RedundantScene") -> "WalkerState":
         """The start, of the kind that the scene needs; raises `ArgumentError`.
 
         A rigid walker takes the place and the legs' angles and rates.
         """
-        for name, value in self.given.items():
-            check_finite(f"state.{name}", value)
-        start = default_start(scene)
-        own = {name: as_float(x) for name, x in self.given.items() if name in start._fields}
-        return start._replace(**own)
+        from jaxbiped.cli._described import described_start
+
+        self.check()
+        return described_start(self, scene)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -254,10 +237,25 @@ class SolveOptions:
     """Cap on the solver's steps: unless given 65536 for each ten seconds, at most 1048576."""
     engine: Engine = "auto"
 
+    def check(self) -> None:
+        """Raises `ArgumentError` for what is wrong in itself."""
+        check_choice("solver", self.solver, SOLVERS)
+        check_accuracy(self.accuracy)
+        check_engine(self.engine)
+        check_positive("rtol", self.rtol)
+        for name, unit in (("atol", ""), ("dt", "s")):
+            value = getattr(self, name)
+            if value is not None:
+                check_positive(name, value, unit)
+        self.most_steps()
+
     def wanted(self) -> float | None:
         """The relative error asked for; None where tolerances decide. Raises `ArgumentError`."""
         if self.accuracy is None:
             return None
+        from jaxbiped.simulate._accurate_walk import check_accurate_walk
+        from jaxbiped.solve._accuracy import accuracy_told
+
         return check_accurate_walk(accuracy_told(self.accuracy), atol=self.atol, dt=self.dt)
 
     def tolerances(self) -> dict[str, Any]:

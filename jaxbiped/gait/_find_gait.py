@@ -3,14 +3,13 @@
 import dataclasses
 import functools
 from concurrent.futures import ThreadPoolExecutor
-from typing import Literal, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 import diffrax
 import equinox as eqx
 import jax
 import jax.tree_util as jtu
 import numpy as np
-import optax
 from jaxtyping import PyTree
 
 from jaxbiped._cached_jit import cached_jit
@@ -45,6 +44,9 @@ from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name,
 from jaxbiped.solve._error_estimate import check_wanted
 from jaxbiped.variational._hybrid_system import section_of
 
+if TYPE_CHECKING:
+    import optax
+
 _RESIDUAL_SHARE = 0.3
 """Residual that counts as none, in units of the state's tolerance."""
 
@@ -58,7 +60,7 @@ def find_gait(
     parameters: tuple[str, ...] | None = None,
     accuracy: str | float | Precision = "balanced",
     method: Literal["newton", "optax"] = "newton",
-    optimiser: optax.GradientTransformation | None = None,
+    optimiser: "optax.GradientTransformation | None" = None,
     max_evaluations: int | None = None,
     radius_sensitivities: bool = True,
     solver: str | diffrax.AbstractSolver[PyTree] | None = None,
@@ -230,7 +232,9 @@ def _check_start(scene: AbstractScene, start: PyTree) -> WalkerState:
 
 
 @bounded_cache(1)  # the same object each time, so that nothing is compiled again
-def _adam() -> optax.GradientTransformation:
+def _adam() -> "optax.GradientTransformation":
+    import optax
+
     return optax.adam(1e-2)
 
 

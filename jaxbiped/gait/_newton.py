@@ -6,17 +6,19 @@ Problems (2004), algorithm NLEQ-ERR.
 """
 
 import enum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import optax
 from jaxtyping import PyTree
 
 from jaxbiped._types import RealScalarLike, Scalar, select
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.linalg._small_matrices import solve
+
+if TYPE_CHECKING:
+    import optax
 
 _NEAR, _NEARER = 1e-3, 1e-4
 """Residuals at which rough solves give way to coarse ones, and these to fine ones."""
@@ -35,7 +37,7 @@ class Method(eqx.Module):
         residual: largest change of a recurring component over a cycle that counts as none.
     """
 
-    optimiser: optax.GradientTransformation | None = eqx.field(static=True)
+    optimiser: "optax.GradientTransformation | None" = eqx.field(static=True)
     max_evaluations: int = eqx.field(static=True)
     residual: RealScalarLike
     patience: RealScalarLike | None = None
@@ -203,7 +205,7 @@ def _descent_step(
     change: Scalar,
     slope: Scalar,
     better: Scalar,
-    optimiser: optax.GradientTransformation,
+    optimiser: "optax.GradientTransformation",
 ) -> tuple[Scalar, PyTree]:
     """A step down the gradient of the squared residual."""
     gradient = slope.T @ jnp.where(better, change, 0.0)

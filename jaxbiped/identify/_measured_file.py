@@ -1,11 +1,10 @@
 """Measured gaits in a file."""
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, read_json
 from jaxbiped._types import JsonObject
 from jaxbiped.identify._measured_gait import MEASURES, MeasuredAngles, MeasuredGait
 
@@ -32,13 +31,7 @@ def read_measured(path: str | Path) -> list[MeasuredGait]:
     Raises:
         ArgumentError: a file that cannot be read, that is no JSON, or that holds something else.
     """
-    try:
-        held = json.loads(Path(path).read_text())
-    except OSError as error:
-        reason = (error.strerror or "unreadable").lower()
-        raise ArgumentError(f"file = {str(path)!r} cannot be read ({reason}).") from None
-    except ValueError as error:
-        raise ArgumentError(f"file = {str(path)!r} is not JSON ({error}).") from None
+    held = read_json("file", path)
     gaits = held.get("gaits") if isinstance(held, dict) else None
     if not isinstance(gaits, list) or not gaits or not all(isinstance(g, dict) for g in gaits):
         raise ArgumentError(

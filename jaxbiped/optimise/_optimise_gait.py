@@ -2,9 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple, TypeAlias
-
-import optax
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -30,6 +28,9 @@ from jaxbiped.scene._parameters import parameter_values
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
+
+if TYPE_CHECKING:
+    import optax
 
 Goal: TypeAlias = str | Mapping[str, float] | None
 """A measure by name, or weights of several."""
@@ -81,7 +82,7 @@ def optimise_gait(
     maximise: Goal = None,
     minimise: Goal = None,
     subject_to: SubjectTo = None,
-    optimiser: str | optax.GradientTransformation = "trust-region",
+    optimiser: "str | optax.GradientTransformation" = "trust-region",
     iterations: int = 200,
     restarts: int = 0,
     scatter: Mapping[str, float] | None = None,
@@ -146,6 +147,8 @@ def optimise_gait(
     if isinstance(optimiser, str):
         check_choice("optimiser", optimiser, OPTIMISERS)
     else:
+        import optax
+
         check_type("optimiser", optimiser, optax.GradientTransformation)
     check_count("iterations", iterations)
     check_count("footsteps", footsteps)

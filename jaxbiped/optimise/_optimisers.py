@@ -6,17 +6,19 @@ back towards it.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optax
 import scipy  # its submodules are imported where they are first used
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.optimise._design_problem import DesignProblem, scale_of
 from jaxbiped.optimise._objectives import CLUSTER, Evaluation
+
+if TYPE_CHECKING:
+    import optax
 
 OPTIMISERS = ("trust-region", "slsqp", "trust-constr", "optax")
 _RAISED = 10.0
@@ -171,7 +173,7 @@ def run_optax(
     u: np.ndarray,
     iterations: int,
     told: Callback,
-    transformation: optax.GradientTransformation | None = None,
+    transformation: "optax.GradientTransformation | None" = None,
 ) -> Ended:
     """Descent in logits of u, which keep the bounds; requirements it knows none.
 
@@ -182,6 +184,8 @@ def run_optax(
         raise ArgumentError(
             'optimiser = "optax" is not allowed with subject_to: choose "trust-region".'
         )
+    import optax
+
     method = optax.adam(_RATE) if transformation is None else transformation
     inside = np.clip(u, _EDGE, 1.0 - _EDGE)
     logits = jnp.asarray(np.log(inside / (1.0 - inside)))

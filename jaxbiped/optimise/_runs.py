@@ -1,10 +1,9 @@
 """Runs of an optimiser over a design problem, and the best design of all of them."""
 
 import enum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import optax
 from tqdm import tqdm
 
 from jaxbiped.optimise._design_problem import Design, DesignProblem
@@ -17,6 +16,9 @@ from jaxbiped.optimise._optimisers import (
     run_trust_constr,
 )
 from jaxbiped.optimise._trust_region import run_trust_region
+
+if TYPE_CHECKING:
+    import optax
 
 _OPTIMAL = 1e-3
 """Residual of the conditions of optimality from which a design counts as an optimum."""
@@ -75,7 +77,7 @@ class Runs:
         self,
         problem: DesignProblem,
         iterations: int,
-        optimiser: str | optax.GradientTransformation,
+        optimiser: "str | optax.GradientTransformation",
         progress: bool,
     ) -> None:
         self.problem, self.iterations, self.optimiser = problem, iterations, optimiser

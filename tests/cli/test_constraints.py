@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli import main
+from jaxbiped.cli import _constraint_comparison, main
+from jaxbiped.cli import _constraints as command
+from jaxbiped.cli._constraint_comparison import ConstraintRun, time_run
 from jaxbiped.cli._walk_options import SceneOptions
 from tests.drawn import assert_is_drawn, points_of, saved_figures
 
@@ -30,11 +32,13 @@ def test_compares_methods_and_integrators(capsys, tmp_path):
     assert_is_drawn(figure, unitless={"method"})
     shown = capsys.readouterr()
     assert "4/4" in shown.err
-    runs = json.loads(shown.out)["runs"]
+    told = json.loads(shown.out)
+    runs = told["runs"]
+    assert told["complete"]
     assert [(run["method"], run["rtol_or_dt"]) for run in runs] == [
         ("standard", 1e-5),
-        ("standard", 2e-3),
         ("described", 1e-5),
+        ("standard", 2e-3),
         ("described", 2e-3),
     ]
     marks = points_of(figure.axes[0], "euler, steps of 1e-05 s")[0]
@@ -42,12 +46,56 @@ def test_compares_methods_and_integrators(capsys, tmp_path):
     for run in runs:
         assert run["integrator"] == "euler"
         assert run["wall_s_run"] > 0.0
-    assert runs[0]["ending"] == runs[2]["ending"] == "walking"
+    assert runs[0]["ending"] == runs[1]["ending"] == "walking"
     # A step that the contact's stiffness does not stand is told, not dropped.
-    assert runs[1]["ending"] != "walking"
-    assert runs[2]["max_violation_m"] < 1e-15 < runs[0]["max_violation_m"]
+    assert runs[2]["ending"] != "walking"
+    assert runs[1]["max_violation_m"] < 1e-15 < runs[0]["max_violation_m"]
     assert runs[0]["state_error"] < 1e-2
     assert runs[0]["steps"] == pytest.approx(5000, abs=2)
+
+
+def _done(method, integrator, seconds):
+    return ConstraintRun(
+        method=method, integrator=integrator.solver, rtol_or_dt=integrator.dt or integrator.rtol,
+        fixed=integrator.dt is not None, ending="walking", max_violation_m=1e-9,
+        max_violation_rate=1e-8, state_error=1e-6, wall_s_run=seconds, steps=100,
+    )  # fmt: skip
+
+
+def test_rows_come_as_they_are_done_and_ctrl_c_keeps_them(monkeypatch, capsys, tmp_path):
+    shown = []
+
+    def compared(scene, start, *, integrators, methods, advance, **options):
+        assert len(integrators) == 3
+        for method, seconds in zip(methods[:2], (0.5, 0.75), strict=True):
+            yield _done(method, integrators[0], seconds)
+            advance(1)
+            shown.append(capsys.readouterr())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "compare_constraints", compared)
+    written = tmp_path / "constraints.json"
+    assert _run("constraints", "--json", str(written)) == 1
+    head, standard = shown[0].out.splitlines()
+    (baumgarte,) = shown[1].out.splitlines()
+    assert len(head) == len(standard) == len(baumgarte)
+    assert standard.split()[0] == "standard"
+    assert baumgarte.split()[-2:] == ["0.750", "1.50"]
+    assert "stopped by Ctrl-C after 2 of 21 runs" in capsys.readouterr().out
+    told = json.loads(written.read_text())
+    assert not told["complete"]
+    assert [run["method"] for run in told["runs"]] == ["standard", "baumgarte"]
+
+
+def test_runs_that_take_long_are_not_repeated(monkeypatch):
+    now = iter(range(0, 1000, 3))
+    monkeypatch.setattr(_constraint_comparison.time, "perf_counter", lambda: 0.1 * next(now))
+    asked = []
+    assert time_run(lambda: asked.append(1), repeats=3)[1] == pytest.approx(0.3)
+    assert len(asked) == 3
+    asked.clear()
+    assert time_run(lambda: asked.append(1), repeats=100)[1] == pytest.approx(0.3)
+    assert len(asked) == 4
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,97 @@
+"""jaxbiped: differentiable simulation of passive biped walkers in JAX.
+
+This page is the map. What a first session needs is here; the rest lies in namespaces by subject.
+`jaxbiped/__init__.py` reads it: a name is imported from where its line says when it is first used.
+"""
+
+# Namespaces.
+from jaxbiped import basins as basins
+from jaxbiped import constraints as constraints
+from jaxbiped import continuation as continuation
+from jaxbiped import dynamics as dynamics
+from jaxbiped import gait as gait
+from jaxbiped import identify as identify
+from jaxbiped import measure as measure
+from jaxbiped import optimise as optimise
+from jaxbiped import plot as plot
+from jaxbiped.scene import actuation as actuation
+from jaxbiped.scene import laws as laws
+from jaxbiped.solve import solvers as solvers
+from jaxbiped.sweep import starts as starts
+
+# Memory.
+from jaxbiped._caches import cache_info as cache_info
+from jaxbiped._caches import clear_caches as clear_caches
+
+# What is modelled.
+from jaxbiped.scene._ground import Ground as Ground
+from jaxbiped.scene._ladder import ladder as ladder
+from jaxbiped.scene._linkage_scene import LinkageScene as LinkageScene
+from jaxbiped.scene._parameters import parameter_names as parameter_names
+from jaxbiped.scene._parameters import parameter_quantities as parameter_quantities
+from jaxbiped.scene._parameters import parameter_values as parameter_values
+from jaxbiped.scene._parameters import with_parameters as with_parameters
+from jaxbiped.scene._redundant_scene import RedundantScene as RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene as RigidScene
+from jaxbiped.scene._scene import Scene as Scene
+from jaxbiped.scene._seed import seed_scene as seed_scene
+from jaxbiped.scene._walker import Walker as Walker
+from jaxbiped.scene._walker_linkage import walker_linkage as walker_linkage
+
+# States and the sections that they cross.
+from jaxbiped.dynamics._section import HeelStrike as HeelStrike
+from jaxbiped.dynamics._section import MidStance as MidStance
+from jaxbiped.dynamics._section import Section as Section
+from jaxbiped.dynamics._state import State as State
+from jaxbiped.dynamics._state import seed_state as seed_state
+
+# Simulation.
+from jaxbiped._checks import ArgumentError as ArgumentError
+from jaxbiped._checks import ResourceError as ResourceError
+from jaxbiped.simulate._rigid_walk import rigid_walk as rigid_walk
+from jaxbiped.simulate._simulation import CompiledSimulation as CompiledSimulation
+from jaxbiped.simulate._simulation import Simulation as Simulation
+from jaxbiped.simulate._simulate import simulate as simulate
+from jaxbiped.simulate._swing import swing as swing
+from jaxbiped.solve._accuracy import ACCURACIES as ACCURACIES
+from jaxbiped._ending import Ending as Ending
+from jaxbiped.solve._engine import ENGINES as ENGINES
+from jaxbiped.solve._trajectory import Trajectory as Trajectory
+
+# Measures of a walk.
+from jaxbiped.measure._dataset import trajectory_dataset as trajectory_dataset
+from jaxbiped.measure._energy_ledger import energy_ledger as energy_ledger
+from jaxbiped.measure._footsteps import footsteps as footsteps
+
+# Periodic gaits and gradients.
+from jaxbiped.gait._find_gait import find_gait as find_gait
+from jaxbiped.gait._find_gaits import find_gaits as find_gaits
+from jaxbiped.gait._gait import Gait as Gait
+from jaxbiped.gait._gait_measures import gait_measures as gait_measures
+from jaxbiped.gait._gradient_modes import Forward as Forward
+from jaxbiped.gait._gradient_modes import Implicit as Implicit
+from jaxbiped.gait._gradient_modes import Reverse as Reverse
+from jaxbiped.gait._return_map import return_map as return_map
+
+# Branches of gaits.
+from jaxbiped.continuation._continue_gait import continue_gait as continue_gait
+
+# Identification.
+from jaxbiped.identify._fit_gait import fit_gait as fit_gait
+
+# Basins and sweeps.
+from jaxbiped.sweep._attractor import Attractor as Attractor
+from jaxbiped.sweep._cluster import cluster_executor as cluster_executor
+from jaxbiped.sweep._cluster import local_executor as local_executor
+from jaxbiped.sweep._family import Family as Family
+from jaxbiped.sweep._gait_sweep import gait_sweep as gait_sweep
+from jaxbiped.sweep._label_at import label_at as label_at
+from jaxbiped.sweep._labelling import Labelled as Labelled
+from jaxbiped.sweep._labelling import Labelling as Labelling
+from jaxbiped.sweep._nearest_failure import nearest_failure as nearest_failure
+from jaxbiped.sweep._prepare import labelling as labelling
+from jaxbiped.sweep._prepare import with_gaits_met as with_gaits_met
+from jaxbiped.sweep._sweep import sweep as sweep
+
+# Optimisation.
+from jaxbiped.optimise._optimise_gait import optimise_gait as optimise_gait
