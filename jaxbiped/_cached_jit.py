@@ -169,7 +169,7 @@ def _arguments_of(given: Any) -> _Arguments | None:
 
 def _is_watched() -> bool:
     """Whether JAX is to run as never otherwise."""
-    config = jax.config
+    config: Any = jax.config
     return bool(
         config.jax_disable_jit
         or config.jax_debug_nans

@@ -86,7 +86,7 @@ def holds_somewhere(condition: "ArrayLike") -> bool:
     return not _is_traced(condition) and bool(np.any(condition))
 
 
-def is_zero_somewhere(value: ArrayLike) -> bool:
+def is_zero_somewhere(value: "ArrayLike") -> bool:
     """Whether any entry is known to be zero."""
     return not _is_traced(value) and bool(np.any(np.asarray(value) == 0.0))
 

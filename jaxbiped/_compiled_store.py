@@ -119,7 +119,8 @@ def read_call(key: str) -> CompiledCall | None:
         calls = [host_call(function) for function in functions]
         if uses_lapack:
             # What tracing does otherwise.
-            lapack.prepare_lapack_call("geev", np.dtype(np.float64))
+            initialize: Any = lapack.prepare_lapack_call
+            initialize("geev", np.dtype(np.float64))
         taken = jtu.tree_structure((tuple(range(count)), {}))
         arrays = [leaf for leaf in leaves if isinstance(leaf, Leaf)]
         given = jtu.tree_structure(list(range(len(arrays))))
@@ -155,7 +156,8 @@ def _foreign_targets(lowered: jax.stages.Lowered) -> set[str]:
             names.add(operation.attributes["call_target_name"].value)
         return ir.WalkResult.ADVANCE
 
-    lowered.compiler_ir("stablehlo").operation.walk(note)
+    module: Any = lowered.compiler_ir("stablehlo")
+    module.operation.walk(note)
     return names
 
 

@@ -13,6 +13,7 @@ from jaxbiped._progress import tell_stages
 from jaxbiped.cli._refusal import one_sentence
 from jaxbiped.cli._report import Report as Report
 from jaxbiped.cli.commands._basin import Basin
+from jaxbiped.cli.commands._cache import Cache
 from jaxbiped.cli.commands._constraints import Constraints
 from jaxbiped.cli.commands._continue import ContinueGait
 from jaxbiped.cli.commands._extremes import Extremes
@@ -34,6 +35,7 @@ _Command = (
     | Annotated[Constraints, subcommand("constraints")]
     | Annotated[Trade, subcommand("trade")]
     | Annotated[Extremes, subcommand("extremes")]
+    | Annotated[Cache, subcommand("cache")]
     | Annotated[None, subcommand("version")]
 )
 

@@ -242,10 +242,10 @@ class _LaneCall(NamedTuple):
     """What a compiled program calls: simulations of a program, run in this way.
 
     Attributes:
-        count: how many at once; `params` of the operation.
+        simulations: how many at once; `params` of the operation.
     """
 
-    count: int
+    simulations: int
     params: dict[str, Any]
 
     def __call__(self, *given: np.ndarray) -> list[np.ndarray]:
@@ -258,7 +258,7 @@ class _LaneCall(NamedTuple):
         """Whether it runs without tracing or compiling."""
         compiled: CompiledProgram = self.params["compiled"]
         wants_code = self.params["wants"] is not _Part.COLUMNS
-        return not wants_code or compiled.runs_at_once(self.count)
+        return not wants_code or compiled.runs_at_once(self.simulations)
 
 
 def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
