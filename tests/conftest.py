@@ -44,11 +44,15 @@ def _few_programs_are_kept():
 
 
 def pytest_configure(config):
-    """One cache on disk for all workers of a run, empty at first: what one compiled others load."""
-    if "PYTEST_XDIST_WORKER" not in os.environ:
+    """One cache on disk for all workers: what one compiled others load. In CI it is new."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        return
+    if os.environ.get("CI"):
         folder = tempfile.mkdtemp(prefix="jaxbiped-tests-")
-        os.environ[CACHE_VARIABLE] = folder
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
+    else:
+        folder = str(config.cache.mkdir("jaxbiped"))
+    os.environ[CACHE_VARIABLE] = folder
 
 
 @pytest.fixture

@@ -54,7 +54,7 @@ def test_public_names_have_docstrings():
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_what_outlives_a_call_is_kept_by_the_caches(path):
-    if path.name == "_caches.py":
+    if path.name in ("_caches.py", "_cached_jit.py"):
         return
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Attribute):

@@ -5,7 +5,6 @@ engines that run a `Program`, `LANES` and its twin `XLA`, each by `can(request)`
 """
 
 from jaxbiped.compiler.passes._operation_counts import count_operations as count_operations
-from jaxbiped.compiler.runtime._compiled_program import Recorded as Recorded
 from jaxbiped.compiler.runtime._engine import AbstractEngine as AbstractEngine
 from jaxbiped.compiler.runtime._engine import Request as Request
 from jaxbiped.compiler.runtime._engine import Result as Result
@@ -14,6 +13,7 @@ from jaxbiped.compiler.runtime._loop_engine import LoopEngine as LoopEngine
 from jaxbiped.compiler.runtime._primitive import Recording as Recording
 from jaxbiped.compiler.runtime._primitive import deferred_checks as deferred_checks
 from jaxbiped.compiler.runtime._program import Program as Program
+from jaxbiped.compiler.runtime._recorded import Recorded as Recorded
 from jaxbiped.compiler.runtime._threads import THREADS_VARIABLE as THREADS_VARIABLE
 from jaxbiped.compiler.runtime._threads import default_threads as default_threads
 

@@ -8,12 +8,10 @@ import weakref
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Array, PyTree
+from jaxtyping import PyTree
 
-from jaxbiped._types import Numbers
 from jaxbiped.compiler.codegen._lane_scheduler import FIELDS
 from jaxbiped.compiler.runtime._buffer_pool import BufferPool
 from jaxbiped.compiler.runtime._host_cpu import host
@@ -21,6 +19,7 @@ from jaxbiped.compiler.runtime._input_streams import input_streams_of
 from jaxbiped.compiler.runtime._kernel import Kernel
 from jaxbiped.compiler.runtime._machine_code import MachineCode
 from jaxbiped.compiler.runtime._program import Graph, Outline, Program, leaves_of
+from jaxbiped.compiler.runtime._recorded import Recorded
 from jaxbiped.compiler.runtime._threads import default_threads, run_in_threads
 
 _MANY = 8
@@ -28,30 +27,6 @@ _MANY = 8
 _KNOWING = threading.Lock()
 _KNOWN: "weakref.WeakValueDictionary[str, CompiledProgram]" = weakref.WeakValueDictionary()
 """Programs that somebody has, by their fingerprints."""
-
-
-class Recorded(NamedTuple):
-    """What was recorded of n simulations.
-
-    Attributes:
-        values: shape (n, room, numbers in a record). Beyond the records there are NaN where a
-            schedule says when they are due, else zeros: memory that nobody ever touched.
-        counts: how many records there were, shape (n,); more than `room` are lost.
-    """
-
-    values: np.ndarray
-    counts: np.ndarray
-
-    @property
-    def room(self) -> int:
-        """For how many records there was room."""
-        return int(self.values.shape[-2])
-
-    def columns(self, first: Numbers) -> list[Array]:
-        """Of one simulation, as `Recording.columns`."""
-        known = jnp.arange(self.room) < self.counts
-        rows = jnp.where(known[:, None], self.values, jnp.nan)
-        return list(jnp.concatenate([jnp.asarray(first)[None], rows]).T)
 
 
 class Ran(NamedTuple):

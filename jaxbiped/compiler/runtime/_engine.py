@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.compiler.runtime._compiled_program import Recorded
+from jaxbiped.compiler.runtime._recorded import Recorded
 from jaxbiped.compiler.runtime._primitive import Recording
 from jaxbiped.compiler.runtime._program import Program
 

@@ -12,7 +12,8 @@ from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.compiler.passes._vertex_elimination import jacobian
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result, Shapes
-from jaxbiped.compiler.runtime._primitive import Schedule, call, call_recording
+from jaxbiped.compiler.runtime._lane_call import Schedule
+from jaxbiped.compiler.runtime._primitive import call, call_recording
 from jaxbiped.compiler.runtime._program import Program
 
 

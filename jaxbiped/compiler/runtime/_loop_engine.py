@@ -12,7 +12,7 @@ from jaxtyping import Array, PyTree
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
-from jaxbiped.compiler.runtime._compiled_program import Recorded
+from jaxbiped.compiler.runtime._recorded import Recorded
 from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result
 from jaxbiped.compiler.runtime._program import Program
 

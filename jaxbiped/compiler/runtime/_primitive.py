@@ -2,9 +2,8 @@
 
 import contextlib
 import contextvars
-import enum
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import equinox as eqx
 import jax
@@ -17,23 +16,15 @@ from jaxtyping import Array, PyTree
 
 from jaxbiped._host_call import host_call, lower_host_call
 from jaxbiped._types import Numbers
-from jaxbiped.compiler.runtime._compiled_program import CompiledProgram, Recorded
+from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
+from jaxbiped.compiler.runtime._lane_call import LaneCall, Part, Schedule, run_lanes
 from jaxbiped.compiler.runtime._program import leaves_of
-from jaxbiped.compiler.runtime._record_cache import BLOCK
+from jaxbiped.compiler.runtime._recorded import Recorded
 from jaxbiped.compiler.runtime._recorder import Recorder
-from jaxbiped.compiler.runtime._threads import default_threads
 
 _UNTRACED: contextvars.ContextVar[list[CompiledProgram] | None] = contextvars.ContextVar(
     "programs that may not be expressible", default=None
 )
-
-
-class _Part(enum.Enum):
-    """Which part of what simulations give is wanted."""
-
-    ALL = "outputs and records"
-    OUTPUTS = "outputs, while records are kept on the host"
-    COLUMNS = "records that were kept on the host"
 
 
 @contextlib.contextmanager
@@ -48,13 +39,6 @@ def deferred_checks() -> Iterator[list[CompiledProgram]]:
         yield programs
     finally:
         _UNTRACED.reset(token)
-
-
-class Schedule:
-    """Times of records, the same for every simulation. Compared by identity."""
-
-    def __init__(self, times: np.ndarray) -> None:
-        self.times = np.ascontiguousarray(times, dtype=np.float64)
 
 
 class Recording(eqx.Module):
@@ -78,7 +62,7 @@ class Recording(eqx.Module):
 
         `first` has shape (k,), the arrays (1 + room,).
         """
-        params = _params(self.recorder.compiled, recorder=self.recorder, wants=_Part.COLUMNS)
+        params = _params(self.recorder.compiled, recorder=self.recorder, wants=Part.COLUMNS)
         return _bind([self.numbers, first], params)
 
 
@@ -121,7 +105,7 @@ def call_recording(
     reads = None if stream is None else stream.recorder
     recorder = Recorder(compiled, room, quick, once, reads)
     numbers = _numbers(inputs if stream is None else (inputs, stream.numbers))
-    (table,) = _bind([numbers], _params(compiled, recorder=recorder, wants=_Part.OUTPUTS))
+    (table,) = _bind([numbers], _params(compiled, recorder=recorder, wants=Part.OUTPUTS))
     return _outputs(compiled, table), Recording(numbers, recorder)
 
 
@@ -131,7 +115,7 @@ def _params(
     room: int = 0,
     quick: bool = False,
     schedule: Schedule | None = None,
-    wants: _Part = _Part.ALL,
+    wants: Part = Part.ALL,
     recorder: Recorder | None = None,
 ) -> dict[str, Any]:
     """Of the operation: what is run and how, and which part of what that gives is wanted."""
@@ -151,7 +135,7 @@ def _bind(given: list[Numbers], params: dict[str, Any]) -> list[Any]:
     """The operation's results for one simulation."""
     if any(isinstance(leaf, jax.core.Tracer) for leaf in given):
         return [leaf[0] for leaf in _RUN.bind(*[x[None] for x in given], **params)]
-    found = _run(*[np.asarray(x)[None] for x in given], **params)
+    found = run_lanes(*[np.asarray(x)[None] for x in given], **params)
     return [jnp.asarray(leaf[0]) for leaf in found]
 
 
@@ -162,57 +146,18 @@ def _outputs(compiled: CompiledProgram, table: Array) -> PyTree:
     return jtu.tree_unflatten(structure, leaves)
 
 
-def _run(
-    numbers: Numbers,
-    stream: Numbers | None = None,
-    *,
-    compiled: CompiledProgram,
-    schedule: Schedule | None,
-    room: int,
-    quick: bool,
-    wants: _Part,
-    recorder: Recorder | None,
-) -> list[np.ndarray]:
-    """Of inputs (n, k) and their streams: outputs (n, o), and what was recorded."""
-    given = np.asarray(numbers)
-    if recorder is not None and wants is _Part.OUTPUTS:
-        return [recorder.outputs(given).T]
-    if recorder is not None and wants is _Part.COLUMNS:
-        return recorder.columns(given, np.asarray(stream))
-    times = None if schedule is None else schedule.times
-    alone = quick and len(given) == 1
-    width = compiled.width(len(given), default_threads())
-
-    def run(part: slice, rows: Sequence[np.ndarray] | None) -> list[np.ndarray]:
-        outputs, recorded = compiled.run_table(
-            given[part].T,
-            schedule=times,
-            stream=rows,
-            room=room if times is None else len(times),
-            quick=alone,
-            width=width,
-        )
-        return [outputs.T, *(recorded or ())]
-
-    if recorder is None:
-        return run(slice(None), None if stream is None else list(np.asarray(stream)))
-    parts = [slice(k, k + BLOCK) for k in range(0, max(1, len(given)), BLOCK)]
-    found = [run(part, recorder.rows(np.asarray(stream)[part])) for part in parts]
-    return [np.concatenate(each) for each in zip(*found, strict=True)]
-
-
 def _shapes(
     leaves: Sequence[jax.core.ShapedArray],
     *,
     compiled: CompiledProgram,
     schedule: Schedule | None,
     room: int,
-    wants: _Part,
+    wants: Part,
     recorder: Recorder | None,
     **_: object,
 ) -> list[jax.ShapeDtypeStruct]:
     count = leaves[0].shape[0]
-    if wants is _Part.COLUMNS:
+    if wants is Part.COLUMNS:
         assert recorder is not None
         column = jax.ShapeDtypeStruct((count, 1 + recorder.room), jnp.float64)
         return [column] * leaves[1].shape[1]
@@ -220,7 +165,7 @@ def _shapes(
     outputs = jtu.tree_leaves(compiled.outline.outputs)
     size = sum(int(np.prod(leaf.shape)) for leaf in outputs)
     found = [jax.ShapeDtypeStruct((count, size), jnp.float64)]
-    if numbers is not None and wants is _Part.ALL:
+    if numbers is not None and wants is Part.ALL:
         room = room if schedule is None else len(schedule.times)
         found.append(jax.ShapeDtypeStruct((count, room, numbers), jnp.float64))
         found.append(jax.ShapeDtypeStruct((count,), jnp.int64))
@@ -228,7 +173,7 @@ def _shapes(
 
 
 def _implementation(*leaves: Array, **params: Any) -> list[Array]:
-    return [jnp.asarray(leaf) for leaf in _run(*leaves, **params)]
+    return [jnp.asarray(leaf) for leaf in run_lanes(*leaves, **params)]
 
 
 def _abstract_evaluation(
@@ -238,29 +183,6 @@ def _abstract_evaluation(
     return [jax.core.ShapedArray(shape.shape, shape.dtype) for shape in shapes]
 
 
-class _LaneCall(NamedTuple):
-    """What a compiled program calls: simulations of a program, run in this way.
-
-    Attributes:
-        simulations: how many at once; `params` of the operation.
-    """
-
-    simulations: int
-    params: dict[str, Any]
-
-    def __call__(self, *given: np.ndarray) -> list[np.ndarray]:
-        return _run(*given, **self.params)
-
-    def __fingerprint__(self) -> object:
-        return tuple(self)
-
-    def ready(self) -> bool:
-        """Whether it runs without tracing or compiling."""
-        compiled: CompiledProgram = self.params["compiled"]
-        wants_code = self.params["wants"] is not _Part.COLUMNS
-        return not wants_code or compiled.runs_at_once(self.simulations)
-
-
 def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
     """A call of the host from the compiled program, with arrays of NumPy.
 
@@ -268,7 +190,7 @@ def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
     waits for a thread of the same pool that this call holds: for ever, on few cores.
     """
     count = context.avals_in[0].shape[0]
-    if params["wants"] is not _Part.COLUMNS:
+    if params["wants"] is not Part.COLUMNS:
         # While XLA compiles the rest, this compiles as well.
         compiled, waiting = params["compiled"], _UNTRACED.get()
         compiled.make_ready(count)
@@ -276,7 +198,7 @@ def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
             compiled.check()
         else:
             waiting.append(compiled)
-    run = _LaneCall(count, params)
+    run = LaneCall(count, params)
     if tuple(context.module_context.platforms) == ("cpu",):
         return lower_host_call(context, host_call(run), operands)
     results, _, _ = mlir.emit_python_callback(
