@@ -14,7 +14,7 @@ import importlib as _importlib
 import os as _os
 import pathlib as _pathlib
 import sys as _sys
-import types as _types
+from types import ModuleType as _ModuleType
 from typing import Any as _Any
 
 if "jax" in _sys.modules:
@@ -33,11 +33,11 @@ _HOMES = {
 __all__ = list(_HOMES)
 
 
-class _Package(_types.ModuleType):
+class _Package(_ModuleType):
     """This package, in which the functions `simulate` and `sweep` go before packages so named."""
 
     def __setattr__(self, name: str, value: object) -> None:
-        if isinstance(value, _types.ModuleType) and _HOMES.get(name, __name__) != __name__:
+        if isinstance(value, _ModuleType) and _HOMES.get(name, __name__) != __name__:
             return  # the import of a package of that name would put it here
         super().__setattr__(name, value)
 

@@ -100,3 +100,17 @@ def test_a_walk_without_pictures_imports_nothing_for_pictures():
     assert not {"netCDF4", "scipy", "tqdm", *_LATER} & set(loaded)
     packages = {name.split(".")[1] for name in loaded if name.startswith("jaxbiped.")}
     assert not {"gait", "sweep", "optimise", "continuation", "plot"} & packages
+
+
+def test_modules_become_attributes_of_the_package():
+    """Names of the package's own must not hide those of its modules."""
+    code = (
+        "import sys, jaxbiped as jb, jaxbiped.cli, jaxbiped.compiler; jb.simulate\n"
+        "names = [n.split('.')[1] for n in sys.modules if n.startswith('jaxbiped._')]\n"
+        "assert names and all(getattr(jb, n) is sys.modules['jaxbiped.' + n] for n in names)\n"
+        "assert jb.compiler is sys.modules['jaxbiped.compiler'] and callable(jb.simulate)"
+    )
+    told = subprocess.run(
+        [sys.executable, "-W", "error::ImportWarning", "-c", code], capture_output=True, text=True
+    )
+    assert told.returncode == 0, told.stderr

@@ -12,9 +12,9 @@ from jaxtyping import Array, PyTree
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
-from jaxbiped.compiler.runtime._recorded import Recorded
 from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result
 from jaxbiped.compiler.runtime._program import Program
+from jaxbiped.compiler.runtime._recorded import Recorded
 
 _ROUND = 128
 """Attempted steps after which slots that are over take the next simulations."""
