@@ -126,7 +126,9 @@ def _on_times_of(walk: Trajectory, other: Trajectory) -> dict[str, Any]:
 
 def _largest_change(told: np.ndarray, *others: np.ndarray) -> np.ndarray:
     # What no arrival filled is infinite in all of them.
-    return np.max([np.where(told == other, 0.0, np.abs(told - other)) for other in others], axis=0)
+    with np.errstate(invalid="ignore"):
+        changes = [np.where(told == other, 0.0, np.abs(told - other)) for other in others]
+    return np.max(changes, axis=0)
 
 
 def _shapes(tree: PyTree) -> list[tuple[int, ...]]:
