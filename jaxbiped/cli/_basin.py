@@ -4,6 +4,7 @@ import dataclasses
 import json
 import math
 import time
+import warnings
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,8 +27,12 @@ from jaxbiped.scene._parameters import parameter_values
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import accuracy_told
 from jaxbiped.sweep._cluster import cluster_executor, local_executor
-from jaxbiped.sweep._labelling import Labelling, effort_of
+from jaxbiped.sweep._doubt import Doubt
+from jaxbiped.sweep._effort import effort_of
+from jaxbiped.sweep._label_errors import LabelErrors, label_errors
+from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._prepare import labelling
 from jaxbiped.sweep._sweep import CHUNK, sweep
 from jaxbiped.sweep._zarr_store import check_store
@@ -48,7 +53,8 @@ class SweepOptions:
     footsteps: int = 30
     """After which a start that is not certain yet is unresolved."""
     accuracy: str = "draft"
-    """How accurately to solve: draft, balanced or tight."""
+    """How accurately to solve: draft, balanced or tight; or the share of the labels that may be
+    wrong, such as 1e-4."""
     engine: Engine = "auto"
     store: Path | None = None
     """Zarr store for the results; a run that was killed continues there."""
@@ -91,7 +97,7 @@ class Basin:
         starts = self.starts.chosen(scene)
         how: dict[str, Any] = dict(
             footsteps=self.sweep.footsteps,
-            accuracy=self.sweep.accuracy,
+            accuracy=accuracy_told(self.sweep.accuracy),
             engine=self.sweep.engine,
         )
         effort = effort_of(scene, **how)
@@ -104,16 +110,18 @@ class Basin:
             known = labelling(scene, parameters=starts.parameters, **how)
         began = time.perf_counter()
         try:
-            found = sweep(
-                known,
-                starts,
-                store=self.sweep.store,
-                any_version=self.sweep.any_version,
-                chunk=self.sweep.chunk,
-                executor=executor,
-                workers=workers,
-                progress=True,
-            )
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)  # the report says it
+                found = sweep(
+                    known,
+                    starts,
+                    store=self.sweep.store,
+                    any_version=self.sweep.any_version,
+                    chunk=self.sweep.chunk,
+                    executor=executor,
+                    workers=workers,
+                    progress=True,
+                )
         finally:
             if executor is not None:
                 executor.shutdown()
@@ -135,7 +143,8 @@ class Basin:
 
 def basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
     """What is known of a basin in SI units, ready for JSON."""
-    fractions = fractions_of(_names(found))
+    doubt = found.doubt.values == int(Doubt.REMAINS) if "doubt" in found else None
+    fractions = fractions_of(_names(found), doubt=doubt)
     fresh = int(found.attrs["labelled_in_this_run"])
     gaits = [
         gait | {"parameters": row["parameters"]}
@@ -151,7 +160,7 @@ def basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
         "mean_footsteps": float(found.footsteps.mean()),
         "solver_steps": int(found.attempted.sum()),
         "gaits": gaits,
-    }
+    } | ({"label_errors": label_errors(found).numbers()} if "doubt" in found else {})
 
 
 def _names(found: "xarray.Dataset") -> np.ndarray:
@@ -164,7 +173,8 @@ def _print(report: Report, numbers: JsonObject) -> None:
         for name, values in numbers["fractions"].items()
     ]
     report.say(table(("label", "starts", "%", "from", "to"), rows, most=_MOST_ROWS))
-    report.say("from, to: 95 % interval by Wilson")
+    told = " and labels in doubt" if "label_errors" in numbers else ""
+    report.say(f"from, to: 95 % interval by Wilson{told}")
     report.say()
     head = ("gait", "period s", "length m", "largest multiplier", "radius")
     rows = [
@@ -185,6 +195,8 @@ def _print(report: Report, numbers: JsonObject) -> None:
         f"and {numbers['solver_steps'] / numbers['starts']:.0f} solver steps a start; "
         f"engine {numbers['engine']}"
     )
+    if "label_errors" in numbers:
+        report.say(LabelErrors(**numbers["label_errors"]).sentence())
 
 
 def _at(parameters: dict[str, float]) -> str:

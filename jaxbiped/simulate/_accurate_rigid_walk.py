@@ -7,7 +7,6 @@ import dataclasses
 
 import jax
 import jax.tree_util as jtu
-import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending

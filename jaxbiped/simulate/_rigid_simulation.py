@@ -1,6 +1,7 @@
 """A rigid walk that is ready to run: what to solve, how tightly, by which engine."""
 
 import dataclasses
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -30,10 +31,12 @@ class RigidSimulation(eqx.Module):
     max_arrivals: int = eqx.field(static=True)
     engine: str = eqx.field(static=True)
 
-    def with_inputs(self, *, embedded: bool | None = None, **inputs: Parameter) -> "RigidSimulation":
-        """The same with other inputs of `walk`, by name, in its precision."""
+    def with_inputs(
+        self, *, embedded: bool | None = None, **inputs: Parameter
+    ) -> "RigidSimulation":
+        """The same with other numbers of `walk`, by name, in its precision."""
         like = self.walk.duration.dtype
-        new = {name: as_float(value).astype(like) for name, value in inputs.items()}
+        new: Any = {name: as_float(value).astype(like) for name, value in inputs.items()}
         kept = self.embedded if embedded is None else embedded
         return dataclasses.replace(self, walk=self.walk._replace(**new), embedded=kept)
 

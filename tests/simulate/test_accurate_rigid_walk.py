@@ -99,9 +99,7 @@ def test_what_cannot_be_met_is_told_with_what_was_reached():
     assert not walk.error.met
     assert 1e-16 < walk.error.relative < 1e-10
     with pytest.warns(RuntimeWarning, match="the solve ended as out of steps"):
-        short = jb.rigid_walk(
-            rigid_seed(), START, footsteps=9, accuracy=1e-6, max_solver_steps=20
-        )
+        short = jb.rigid_walk(rigid_seed(), START, footsteps=9, accuracy=1e-6, max_solver_steps=20)
     assert np.isinf(short.error.relative)
 
 
