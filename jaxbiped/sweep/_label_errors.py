@@ -119,11 +119,13 @@ def estimate_label_errors(seen: Seen, *, wanted: float, rtol: float) -> LabelErr
     zoological sample censuses", Univ. Calif. Publ. Stat. 1 (1951) 131; the variance is Seber's.
     """
     a, b, ab = seen.looser, seen.other, seen.both
-    all_wrong = (a + 1.0) * (b + 1.0) / (ab + 1.0) - 1.0
-    overlooked = max(0.0, all_wrong - (a + b - ab))
+    # Chapman's (a + 1)(b + 1)/(ab + 1) − 1 in all, less those that were seen.
+    overlooked = (a - ab) * (b - ab) / (ab + 1.0)
     variance = (a + 1.0) * (b + 1.0) * (a - ab) * (b - ab) / ((ab + 1.0) ** 2 * (ab + 2.0))
-    # One more than estimated: where none was seen, none is not certain.
-    high = overlooked + _QUANTILE * math.sqrt(variance + overlooked + 1.0)
+    # One more than estimated: where none was seen, none is not certain. Counts are skewed as the
+    # log-normal distribution is (Chao, Biometrics 43 (1987) 783).
+    more = overlooked + 1.0
+    high = more * math.exp(_QUANTILE * math.sqrt(math.log1p((variance + more) / more**2)))
     wrong = overlooked / seen.starts
     return LabelErrors(
         starts=seen.starts,
