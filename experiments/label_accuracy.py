@@ -23,6 +23,7 @@ DRAWS, QUICK_DRAWS = 5, 1
 NAMED = {"draft": "draft", "balanced": "balanced", "tight": "tight"}
 TOLERANCES = (3e-5, 1e-5, 1e-6, 1e-7, 1e-8)
 WANTED = (1e-2, 1e-3, 1e-4)
+QUICK_TOLERANCES, QUICK_WANTED = (3e-5, 1e-5), (1e-2,)
 FINEST = {"compliant": 1e-10, "rigid": 1e-13}
 MOST_STEPS = 1 << 19
 SCENES = {"compliant": jb.seed_scene(slope=SLOPE), "rigid": jb.ladder()["rigid"]}
@@ -77,14 +78,13 @@ def of_names(options: Options, scene: Any, count: int) -> tuple[dict[str, Any], 
     """How many labels change between the named accuracies and a finer solve, and where."""
     starts = starts_of("compliant", scene, count, 0)
     exact = reference("compliant", scene, starts)
-    again = swept(scene, starts, rtol=FINEST["compliant"], max_solver_steps=MOST_STEPS)[
-        "label"
-    ].values
+    finest: dict[str, Any] = {"rtol": FINEST["compliant"], "max_solver_steps": MOST_STEPS}
+    again = swept(scene, starts, **finest)["label"].values
     ways: dict[str, dict[str, Any]] = {name: {"accuracy": name} for name in NAMED}
     ways |= {
         f"{solver} {rtol:g}": {"rtol": rtol, "solver": solver}
         for solver in ("rodas4", "rodas5p")
-        for rtol in TOLERANCES
+        for rtol in (QUICK_TOLERANCES if options.quick else TOLERANCES)
     }
     found = {
         name: swept(scene, starts, max_solver_steps=MOST_STEPS, **how)
@@ -123,11 +123,12 @@ def of_numbers(
     options: Options, name: str, scene: Any, count: int, draws: int
 ) -> list[dict[str, Any]]:
     """Of each accuracy asked for by a number: what it says of its labels, and what is true."""
-    rows = {wanted: [] for wanted in WANTED}
+    wishes = QUICK_WANTED if options.quick else WANTED
+    rows: dict[float, list[dict[str, Any]]] = {wanted: [] for wanted in wishes}
     for seed in tqdm(range(1, draws + 1), unit="draws"):
         starts = starts_of(name, scene, count, seed)
         exact = reference(name, scene, starts)
-        for wanted in WANTED:
+        for wanted in wishes:
             found = swept(scene, starts, accuracy=wanted)
             said = jb.label_errors(found)
             flagged = found["doubt"].values == int(jb.Doubt.REMAINS)
@@ -192,7 +193,7 @@ def draw(
     left.plot(theta[differ], omega[differ], "kx", markersize=6, label="draft and tight differ")
     left.set_xlabel(f"{AXES[0]} [{UNITS[0]}]")
     left.set_ylabel(f"{AXES[1]} [{UNITS[1]}]")
-    left.legend(loc="upper right", fontsize=8, markerscale=2.0)
+    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=8)
     for solver in ("rodas4", "rodas5p"):
         points = [
             (rtol, row["changed"] / count)
@@ -205,6 +206,8 @@ def draw(
     right.axhline(1.0 / count, color="0.6", linewidth=0.8, label="one label")
     right.set_xlabel("relative tolerance")
     right.set_ylabel("share of labels that a finer solve changes")
+    right.set_xlim(min(TOLERANCES), max(TOLERANCES))
+    right.set_ylim(0.5 / count, None)
     right.legend()
     path = options.path("label_accuracy.png")
     figure.savefig(path, dpi=150)
