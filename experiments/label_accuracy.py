@@ -130,8 +130,8 @@ def of_numbers(
         exact = reference(name, scene, starts)
         for wanted in wishes:
             found = swept(scene, starts, accuracy=wanted)
-            said = jb.label_errors(found)
-            flagged = found["doubt"].values == int(jb.Doubt.REMAINS)
+            said = jb.basins.label_errors(found)
+            flagged = found["doubt"].values == int(jb.basins.Doubt.REMAINS)
             wrong = int(((found["label"].values != exact) & ~flagged).sum())
             plain = swept(scene, starts, rtol=said.rtol)
             rows[wanted].append(

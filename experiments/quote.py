@@ -376,6 +376,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "gradient_accuracy": of_gradient_accuracy,
     "gradient_truth": of_gradient_truth,
     "identify": of_identify,
+    "label_accuracy": of_label_accuracy,
     "ladder": of_ladder,
     "level_ground": of_level_ground,
     "long_walks": of_long_walks,

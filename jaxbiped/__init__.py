@@ -92,12 +92,9 @@ from jaxbiped.identify._fit_gait import fit_gait as fit_gait
 from jaxbiped.sweep._attractor import Attractor as Attractor
 from jaxbiped.sweep._cluster import cluster_executor as cluster_executor
 from jaxbiped.sweep._cluster import local_executor as local_executor
-from jaxbiped.sweep._doubt import Doubt as Doubt
 from jaxbiped.sweep._family import Family as Family
 from jaxbiped.sweep._gait_sweep import gait_sweep as gait_sweep
 from jaxbiped.sweep._label_at import label_at as label_at
-from jaxbiped.sweep._label_errors import LabelErrors as LabelErrors
-from jaxbiped.sweep._label_errors import label_errors as label_errors
 from jaxbiped.sweep._labelled import Labelled as Labelled
 from jaxbiped.sweep._labelling import Labelling as Labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure as nearest_failure

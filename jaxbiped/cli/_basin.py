@@ -15,8 +15,10 @@ from jaxbiped import _clock
 from jaxbiped._checks import ArgumentError, check_count
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
+from jaxbiped.basins._doubt import Doubt
 from jaxbiped.basins._fractions import fractions as fractions_of
 from jaxbiped.basins._label import label_names
+from jaxbiped.basins._label_errors import LabelErrors, label_errors
 from jaxbiped.cli._basin_options import StartsOptions
 from jaxbiped.cli._option_fields import Engine, Group, group
 from jaxbiped.cli._report import Report, table
@@ -29,9 +31,7 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import accuracy_told
 from jaxbiped.sweep._cluster import cluster_executor, local_executor
-from jaxbiped.sweep._doubt import Doubt
 from jaxbiped.sweep._effort import effort_of
-from jaxbiped.sweep._label_errors import LabelErrors, label_errors
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._prepare import labelling
 from jaxbiped.sweep._sweep import CHUNK, sweep

@@ -20,12 +20,12 @@ from jaxbiped.scene._parameters import parameter_values, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._broadcast import broadcast_leaves
-from jaxbiped.sweep._doubt import settled_labels
 from jaxbiped.sweep._effort import Effort
 from jaxbiped.sweep._family import Family
 from jaxbiped.sweep._follow_start import follow_starts
 from jaxbiped.sweep._identity import identity
 from jaxbiped.sweep._labelled import Labelled
+from jaxbiped.sweep._settled_labels import settled_labels
 
 
 class Labelling(eqx.Module):

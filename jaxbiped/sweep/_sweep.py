@@ -12,8 +12,8 @@ from tqdm import tqdm
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label import Label
+from jaxbiped.basins._label_errors import ERRORS
 from jaxbiped.sweep._array_layout import Layout, fields_of
-from jaxbiped.sweep._label_errors import ERRORS
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._memory_store import MemoryStore
 from jaxbiped.sweep._prepare import Guesses, guesses_among, with_gaits_met, with_guesses
@@ -71,9 +71,10 @@ def sweep(
     Returns:
         A dataset with the labels and all else of `Labelled`, along the axes of the starts.
         Its attributes say scene, tolerances, gaits, versions and revision. Where the accuracy was
-        asked for by a number it also tells which labels were and remain in doubt (`doubt`, see
-        `Doubt`), and `jb.label_errors` how many were labelled anew, and what share of the others is
-        estimated to be wrong; a `RuntimeWarning` tells where that is more than the number.
+        asked for by a number it also tells which labels were and remain in doubt (`doubt`, codes of
+        `jb.basins.Doubt`), and `jb.basins.label_errors` how many were labelled anew, and what share
+        of the others is estimated to be wrong; a `RuntimeWarning` tells where that is more than the
+        number.
 
     Raises:
         ArgumentError: an argument that is not allowed; a store of other settings or another

@@ -6,10 +6,10 @@ from concurrent.futures import Executor
 
 import numpy as np
 
+from jaxbiped.basins._doubt import Doubt, Witness
+from jaxbiped.basins._label_errors import LabelErrors, Seen, estimate_label_errors
 from jaxbiped.sweep._array_layout import DOUBT_FIELDS, Layout
-from jaxbiped.sweep._doubt import Doubt, Witness
 from jaxbiped.sweep._effort import FINEST_FIRST
-from jaxbiped.sweep._label_errors import LabelErrors, Seen, estimate_label_errors
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._store import ALL_GAITS, AbstractStore
 from jaxbiped.sweep._workers import compute_chunks

@@ -129,7 +129,7 @@ def test_the_share_of_wrong_labels_is_asked_for_and_told(tmp_path, capsys):
     assert "95 % interval by Wilson and labels in doubt" in told
     found = xr.open_zarr(tmp_path / "store")
     assert errors["relabelled"] == int((found.doubt > 0).sum())
-    assert jb.label_errors(found).numbers() == errors
+    assert jb.basins.label_errors(found).numbers() == errors
 
 
 @pytest.mark.parametrize(

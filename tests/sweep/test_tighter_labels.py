@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.sweep._label_errors import estimate_label_errors
+from jaxbiped.basins._label_errors import estimate_label_errors
 from jaxbiped.sweep._zarr_store import ZarrStore
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same_results, simplest_grid
@@ -35,10 +35,10 @@ def test_labels_are_those_of_a_tight_solve_whatever_the_chunks():
     whole = jb.sweep(LABELLING, STARTS)
     known = jb.with_gaits_met(gaitless(SCENE, simplest_state(*STABLE), accuracy="tight"), STARTS)
     exact = known(STARTS.batch(known, 0, STARTS.size).states)
-    certain = whole.doubt.values.ravel() != int(jb.Doubt.REMAINS)
+    certain = whole.doubt.values.ravel() != int(jb.basins.Doubt.REMAINS)
     np.testing.assert_array_equal(whole.label.values.ravel()[certain], exact.label[certain])
     assert whole.doubt.attrs["flag_meanings"] == "none settled remains"
-    errors = jb.label_errors(whole)
+    errors = jb.basins.label_errors(whole)
     assert errors.met
     assert (errors.starts, errors.wanted, errors.rtol) == (64, 1e-2, 3e-5)
     assert errors.relabelled == int((whole.disagreed > 0).sum())
@@ -48,7 +48,7 @@ def test_labels_are_those_of_a_tight_solve_whatever_the_chunks():
 def test_all_starts_are_labelled_again_where_too_many_may_be_wrong(tmp_path, monkeypatch):
     monkeypatch.setattr(TIGHTER, "estimate_label_errors", _never_met)
     whole = jb.sweep(LABELLING, STARTS)
-    assert jb.label_errors(whole).rtol == pytest.approx(3e-6)
+    assert jb.basins.label_errors(whole).rtol == pytest.approx(3e-6)
     np.testing.assert_allclose(json.loads(whole.attrs["label_tolerances"]), [3e-5, 3e-6])
     with ThreadPoolExecutor(2) as pool:
         same_results(jb.sweep(LABELLING, STARTS, chunk=16, executor=pool, workers=2), whole)
@@ -70,7 +70,7 @@ def test_all_starts_are_labelled_again_where_too_many_may_be_wrong(tmp_path, mon
     monkeypatch.setattr(ZarrStore, "write", write)
     again = jb.sweep(LABELLING, STARTS, store=path, chunk=8)
     same_results(again, whole)
-    assert jb.label_errors(again) == jb.label_errors(whole)
+    assert jb.basins.label_errors(again) == jb.basins.label_errors(whole)
     # What is complete is not labelled again.
     same_results(jb.sweep(LABELLING, STARTS, store=path, chunk=8), whole)
     with pytest.raises(jb.ArgumentError, match="made with other settings"):

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import jaxbiped as jb
-from jaxbiped.sweep._label_errors import Seen, estimate_label_errors
+from jaxbiped.basins._label_errors import Seen, estimate_label_errors
 
 
 def _seen(random, wrong, recalls, starts=10_000):
@@ -48,9 +48,9 @@ def test_nothing_seen_is_not_certain_and_an_excess_is_warned_of():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         none.warn()
-    assert jb.LabelErrors(**many.numbers()) == many
+    assert jb.basins.LabelErrors(**many.numbers()) == many
 
 
 def test_a_sweep_by_a_named_accuracy_tells_no_errors():
     with pytest.raises(jb.ArgumentError, match="tells no errors of its labels"):
-        jb.label_errors(xr.Dataset())
+        jb.basins.label_errors(xr.Dataset())

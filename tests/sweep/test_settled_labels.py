@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.sweep._doubt import Witness, settled_labels
+from jaxbiped.basins._doubt import Witness
 from jaxbiped.sweep._effort import effort_of
 from jaxbiped.sweep._labelled import Labelled
+from jaxbiped.sweep._settled_labels import settled_labels
 from jaxbiped.sweep._tighter_labels import seen_of
 from tests.sweep.walkers import same
 
@@ -57,7 +58,11 @@ def test_starts_are_settled_that_lie_beside_the_boundary_and_no_others():
 
 def test_what_never_agrees_is_flagged_and_not_silently_labelled():
     found = settled_labels(_followed(np.ones(3), jumps=(1,)), 3, EFFORT, SCENE)
-    assert found.doubt.tolist() == [jb.Doubt.NONE, jb.Doubt.REMAINS, jb.Doubt.NONE]
+    assert found.doubt.tolist() == [
+        jb.basins.Doubt.NONE,
+        jb.basins.Doubt.REMAINS,
+        jb.basins.Doubt.NONE,
+    ]
     assert found.disagreed.tolist() == [0, Witness.OTHER, 0]
     assert seen_of(found.doubt, found.disagreed, found.changed).in_doubt == 1
 
@@ -70,7 +75,7 @@ def test_no_starts_label_depends_on_another(distances, data):
     one = data.draw(st.integers(0, len(distances) - 1))
     alone = settled_labels(_followed(distances[[one]]), 1, EFFORT, SCENE)
     same(alone, Labelled(*[leaf[[one]] for leaf in whole]))
-    settled = whole.doubt == jb.Doubt.SETTLED
+    settled = whole.doubt == jb.basins.Doubt.SETTLED
     np.testing.assert_array_equal(whole.label[settled], distances[settled] > 0.0)
 
 
@@ -92,10 +97,10 @@ def test_labels_that_the_draft_has_wrong_are_put_right():
     exact[place] = [HARD[number] for number in numbers[place]]
     assert before.doubt is None
     assert (before.label != exact).sum() == len(HARD)
-    certain = found.doubt != jb.Doubt.REMAINS
+    certain = found.doubt != jb.basins.Doubt.REMAINS
     assert (found.label != exact)[certain].sum() <= 3
     assert np.all(found.label[~place] == exact[~place])
-    assert (found.doubt[place] == jb.Doubt.SETTLED).any()
+    assert (found.doubt[place] == jb.basins.Doubt.SETTLED).any()
     assert ours.settings()["effort"]["wanted"] == 1e-3
     assert "wanted" not in draft.settings()["effort"]
     code = jb.label_at(ours, tuple(bounds))

@@ -1,16 +1,16 @@
-"""Doubt about labels: where several solves of one start do not agree, and what settles it.
+"""Settled labels: starts whose label is in doubt, labelled again more tightly.
 
 A label is a category, whose error is no small number: near a boundary any tolerance may lead to
 either side. So each start is solved three times, and again more tightly where these disagree.
 """
 
-import enum
 from collections.abc import Callable
 from typing import Any
 
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped.basins._doubt import Doubt, Witness
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import resolve_slip_speed
@@ -31,26 +31,6 @@ _STEPS = 2
 
 Follow = Callable[[np.ndarray, Effort], Labelled]
 """Labels of the starts with these numbers, by one solve of each."""
-
-
-class Doubt(enum.IntEnum):
-    """Whether a label was, or is, in doubt.
-
-    - none: all three solves gave the same label.
-    - settled: they did not; at two finer tolerances in a row two methods gave this one.
-    - remains: no two tolerances in a row did; the label is that of the finest.
-    """
-
-    NONE = 0
-    SETTLED = 1
-    REMAINS = 2
-
-
-class Witness(enum.IntFlag):
-    """Which solves gave another label than the first: at a looser tolerance, by another method."""
-
-    LOOSER = 1
-    OTHER = 2
 
 
 def settled_labels(
