@@ -3,7 +3,8 @@
 Writes accuracy_coverage.png. Scenes are the seed's with parameters and start drawn at random, and
 each accuracy a number drawn at random. References are ours by Rodas4P at the finest tolerance, a
 method that neither the results nor their bars come from. Its own error is the difference from
-Rodas5P for walks, and for gaits the bars that every gait carries.
+Rodas5P for walks, and for gaits the bars that every gait carries. Rigid walks are held against the
+finest tolerance of their one method, whose error is the difference from a ten times looser one.
 """
 
 import warnings
@@ -16,8 +17,8 @@ from tqdm import tqdm
 
 import jaxbiped as jb
 
-WALKS, GAITS = 300, 24
-QUICK_WALKS, QUICK_GAITS = 6, 1
+WALKS, GAITS, RIGID = 300, 24, 300
+QUICK_WALKS, QUICK_GAITS, QUICK_RIGID = 6, 1, 20
 DURATION = 1.0
 PARAMETERS = ("K", "c", "xi")
 FINEST = 1e-11
@@ -31,21 +32,24 @@ def main() -> None:
     random = np.random.default_rng(SEED)
     walks = _many(_walk, QUICK_WALKS if options.quick else WALKS, random, "walks")
     gaits = _many(_gait, QUICK_GAITS if options.quick else GAITS, random, "gaits")
+    # A generator of their own: they can be drawn without the others.
+    own = np.random.default_rng(SEED + 1)
+    rigid = _many(_rigid, QUICK_RIGID if options.quick else RIGID, own, "rigid walks")
+    every = (*walks, *gaits, *rigid)
     pairs: dict[str, list[list[float]]] = {}
-    for found in (*walks, *gaits):
+    for found in every:
         for name, points in found["pairs"].items():
             pairs.setdefault(name, []).extend(points)
     coverage = {name: _coverage(np.array(points)) for name, points in pairs.items()}
     for name, row in coverage.items():
-        scenes = [
-            np.array(each["pairs"][name]) for each in (*walks, *gaits) if name in each["pairs"]
-        ]
+        scenes = [np.array(each["pairs"][name]) for each in every if name in each["pairs"]]
         rows = [_coverage(points) for points in scenes]
         row["scenes"] = len(rows)
         row["scenes_all_covered"] = sum(each["covered"] == each["resolved"] for each in rows)
     numbers = {
         "walks": _counts(walks),
         "gaits": _counts(gaits),
+        "rigid": _counts(rigid),
         "coverage": coverage,
         "picture": str(_draw(options, pairs)),
     }
@@ -112,6 +116,45 @@ def _walk(random: np.random.Generator) -> dict[str, Any]:
         "met": met,
         "silently_wrong": bool(met and fell),
         "pairs": {"state": points.tolist()} if known else {},
+    }
+
+
+def _rigid(random: np.random.Generator) -> dict[str, Any]:
+    """True errors and bars of time and state at the end of a rigid walk."""
+
+    def around(value: float, spread: float) -> float:
+        return float(value * spread ** random.uniform(-1.0, 1.0))
+
+    walker = jb.Walker(
+        m=around(1.0, 2.0), J=around(0.0096, 1.5), l=0.4, d=around(0.1, 1.2), r=around(0.08, 1.3)
+    )
+    scene = jb.RigidScene(walker=walker, ground=jb.Ground(slope=around(0.02, 1.3)))
+    start = jb.dynamics.rigid_state(jb.seed_state())
+    start = start._replace(
+        omega_1=start.omega_1 + random.uniform(-0.3, 0.3),
+        omega_2=start.omega_2 + random.uniform(-0.3, 0.3),
+    )
+    how: dict[str, Any] = dict(duration=1.5) if random.uniform() < 0.5 else dict(footsteps=4)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # the record tells it, too
+        walk = jb.rigid_walk(scene, start, accuracy=10.0 ** random.uniform(-9.0, -2.0), **how)
+    exact, checked = (jb.rigid_walk(scene, start, rtol=rtol, **how) for rtol in (1e-13, 1e-12))
+    met, differs = walk.error.met, walk.outcome != exact.outcome
+    # A fall is noticed at the end of a step, and so elsewhere by every tolerance.
+    walks = walk.outcome is jb.Ending.WALKING and not differs
+    told, true, other = (
+        np.array([float(x) for x in (each.t[-1], *each.final)]) for each in (walk, exact, checked)
+    )
+    bars = (walk.error.bars["t"], *walk.error.bars["state"])
+    points = np.column_stack(
+        [np.abs(told - true), [float(bar[-1]) for bar in bars], np.abs(true - other)]
+    )
+    # What the walk was asked for itself has neither error nor bar.
+    points = points[1 if "duration" in how else 0 :]
+    return {
+        "met": met,
+        "silently_wrong": bool(met and differs),
+        "pairs": {"rigid state": points.tolist()} if met and walks else {},
     }
 
 

@@ -262,11 +262,38 @@ def of_period_doubling(numbers: dict[str, Any]) -> Iterator[str]:
 def of_accuracy_coverage(numbers: dict[str, Any]) -> Iterator[str]:
     """How many true errors lie within their bars."""
     walks, gaits = numbers["walks"], numbers["gaits"]
-    yield f"{walks['met']} of {walks['run']} walks and {gaits['met']} of {gaits['run']} gaits"
+    rigid = numbers["rigid"]
+    yield (
+        f"{walks['met']} of {walks['run']} walks, {rigid['met']} of {rigid['run']} rigid ones and "
+        f"{gaits['met']} of {gaits['run']} gaits"
+    )
     for name, found in numbers["coverage"].items():
         ratio = f"{found['median_ratio']:.1f}"
         counts = ("numbers", "resolved", "covered", "scenes", "scenes_all_covered")
         yield row(name, *(str(found[each]) for each in counts), ratio)
+
+
+def of_label_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
+    """How many labels change with the tolerance, and what is known of those that do."""
+    named, starts = numbers["named"], numbers["starts"]
+    changed = {each["way"]: each for each in named["rows"]}
+    yield f"Of {starts:,} starts"
+    for name in ("draft", "balanced", "tight"):
+        each = changed[name]
+        yield row(
+            f"`{name}`", str(each["changed"]), str(each["walking_changed"]),
+            f"{each['attempted']:.0f}",
+        )  # fmt: skip
+    yield f"{named['between']['draft and tight']} labels differ between draft and tight"
+    yield f"the two references differ in {named['references_differ']}"
+    for model, found in numbers["by_number"].items():
+        for each in found:
+            yield row(
+                model, f"{each['wanted']:g}", str(each["relabelled"]), str(each["changed"]),
+                str(each["in_doubt"]), f"{each['wrong_before']} → {each['truly_wrong']}",
+                small(each["wrong_share"]), small(each["estimated_share"]),
+                f"{each['within_interval']} of {each['draws']}", f"{each['steps_ratio']:.1f}",
+            )  # fmt: skip
 
 
 def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
@@ -349,6 +376,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "gradient_accuracy": of_gradient_accuracy,
     "gradient_truth": of_gradient_truth,
     "identify": of_identify,
+    "label_accuracy": of_label_accuracy,
     "ladder": of_ladder,
     "level_ground": of_level_ground,
     "long_walks": of_long_walks,

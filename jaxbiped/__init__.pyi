@@ -86,7 +86,7 @@ from jaxbiped.sweep._cluster import local_executor as local_executor
 from jaxbiped.sweep._family import Family as Family
 from jaxbiped.sweep._gait_sweep import gait_sweep as gait_sweep
 from jaxbiped.sweep._label_at import label_at as label_at
-from jaxbiped.sweep._labelling import Labelled as Labelled
+from jaxbiped.sweep._labelled import Labelled as Labelled
 from jaxbiped.sweep._labelling import Labelling as Labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure as nearest_failure
 from jaxbiped.sweep._prepare import labelling as labelling

@@ -4,12 +4,15 @@ from jaxbiped.basins._basin_entropy import Entropy as Entropy
 from jaxbiped.basins._basin_entropy import entropy as entropy
 from jaxbiped.basins._boundary_dimension import Dimension as Dimension
 from jaxbiped.basins._boundary_dimension import boundary_dimension as boundary_dimension
+from jaxbiped.basins._doubt import Doubt as Doubt
 from jaxbiped.basins._fractions import Fraction as Fraction
 from jaxbiped.basins._fractions import fractions as fractions
 from jaxbiped.basins._fractions import wilson_interval as wilson_interval
 from jaxbiped.basins._label import Label as Label
 from jaxbiped.basins._label import label_name as label_name
 from jaxbiped.basins._label import label_names as label_names
+from jaxbiped.basins._label_errors import LabelErrors as LabelErrors
+from jaxbiped.basins._label_errors import label_errors as label_errors
 from jaxbiped.basins._minimal_fatal_shock import FatalShock as FatalShock
 from jaxbiped.basins._minimal_fatal_shock import minimal_fatal_shock as minimal_fatal_shock
 from jaxbiped.basins._refined_boundary import RefinedBoundary as RefinedBoundary

@@ -75,19 +75,24 @@ def wilson_interval(
     return np.where(k == 0, 0.0, centre - half), np.where(k == n, 1.0, centre + half)
 
 
-def fractions(labels: npt.ArrayLike, *, confidence: float = 0.95) -> dict[str, Fraction]:
+def fractions(
+    labels: npt.ArrayLike, *, doubt: npt.ArrayLike | None = None, confidence: float = 0.95
+) -> dict[str, Fraction]:
     """The fraction of the starts that has each label, the most frequent first.
 
     Args:
         labels: names (`label_names`) or codes of `Label`, any shape. Pending ones are not counted:
             where all are, no fraction is known and the result is empty.
+        doubt: which labels remain in doubt (booleans), of the labels' shape. Intervals then begin
+            where none of those counts, and end where all of them count.
         confidence: that of the intervals, see `wilson_interval`.
 
     Returns:
         A `Fraction` by the name of each label that occurs.
 
     Raises:
-        ArgumentError: no entry, an unknown code, or a confidence not between 0 and 1.
+        ArgumentError: no entry, an unknown code, doubts of another shape, or a confidence not
+            between 0 and 1.
 
     Examples:
         >>> import jaxbiped as jb
@@ -97,14 +102,28 @@ def fractions(labels: npt.ArrayLike, *, confidence: float = 0.95) -> dict[str, F
     """
     check_confidence(confidence)
     names = _names(np.asarray(labels))
-    distinct, counts = np.unique(names[names != str(Label.PENDING)], return_counts=True)
+    unsure = _in_doubt(labels, doubt)
+    known = names != str(Label.PENDING)
+    distinct, place, counts = np.unique(names[known], return_inverse=True, return_counts=True)
     total = int(counts.sum())
-    low, high = wilson_interval(counts, total, confidence=confidence)
+    own = np.bincount(place, weights=unsure[known], minlength=len(distinct)).astype(int)
+    low, _ = wilson_interval(counts - own, total, confidence=confidence)
+    _, high = wilson_interval(counts + own.sum() - own, total, confidence=confidence)
     order = np.argsort(-counts, kind="stable")
     return {
         str(distinct[k]): Fraction(counts[k] / total, float(low[k]), float(high[k]), int(counts[k]))
         for k in order
     }
+
+
+def _in_doubt(labels: npt.ArrayLike, doubt: npt.ArrayLike | None) -> np.ndarray:
+    shape = np.shape(labels)
+    if doubt is None:
+        return np.zeros(shape, dtype=bool).ravel()
+    found = np.asarray(doubt, dtype=bool)
+    if found.shape != shape:
+        raise ArgumentError(f"doubt has shape {found.shape}: it must be that of labels, {shape}.")
+    return found.ravel()
 
 
 def _names(labels: np.ndarray) -> np.ndarray:

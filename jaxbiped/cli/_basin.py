@@ -3,6 +3,7 @@
 import json
 import math
 import time
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +12,10 @@ import numpy as np
 from jaxbiped import _clock
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
+from jaxbiped.basins._doubt import Doubt
 from jaxbiped.basins._fractions import fractions as fractions_of
 from jaxbiped.basins._label import label_names
+from jaxbiped.basins._label_errors import LabelErrors, label_errors
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli.commands._basin import Basin
 from jaxbiped.dynamics._rigid_state import RigidState
@@ -21,7 +24,9 @@ from jaxbiped.scene._parameters import parameter_values
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.sweep._labelling import Labelling, effort_of
+from jaxbiped.solve._accuracy import accuracy_told
+from jaxbiped.sweep._effort import effort_of
+from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._prepare import labelling
 from jaxbiped.sweep._sweep import sweep
 from jaxbiped.sweep._zarr_store import check_store
@@ -42,7 +47,7 @@ def run(options: Basin) -> int:
     starts = options.starts.chosen(scene)
     how: dict[str, Any] = dict(
         footsteps=options.sweep.footsteps,
-        accuracy=options.sweep.accuracy,
+        accuracy=accuracy_told(options.sweep.accuracy),
         engine=options.sweep.engine,
     )
     effort = effort_of(scene, **how)
@@ -54,16 +59,18 @@ def run(options: Basin) -> int:
         known = labelling(scene, parameters=starts.parameters, **how)
     began = time.perf_counter()
     try:
-        found = sweep(
-            known,
-            starts,
-            store=options.sweep.store,
-            any_version=options.sweep.any_version,
-            chunk=options.sweep.chunk,
-            executor=executor,
-            workers=workers,
-            progress=True,
-        )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # the report says it
+            found = sweep(
+                known,
+                starts,
+                store=options.sweep.store,
+                any_version=options.sweep.any_version,
+                chunk=options.sweep.chunk,
+                executor=executor,
+                workers=workers,
+                progress=True,
+            )
     finally:
         if executor is not None:
             executor.shutdown()
@@ -85,7 +92,8 @@ def run(options: Basin) -> int:
 
 def basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
     """What is known of a basin in SI units, ready for JSON."""
-    fractions = fractions_of(_names(found))
+    doubt = found.doubt.values == int(Doubt.REMAINS) if "doubt" in found else None
+    fractions = fractions_of(_names(found), doubt=doubt)
     fresh = int(found.attrs["labelled_in_this_run"])
     gaits = [
         gait | {"parameters": row["parameters"]}
@@ -101,7 +109,7 @@ def basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
         "mean_footsteps": float(found.footsteps.mean()),
         "solver_steps": int(found.attempted.sum()),
         "gaits": gaits,
-    }
+    } | ({"label_errors": label_errors(found).numbers()} if "doubt" in found else {})
 
 
 def _names(found: "xarray.Dataset") -> np.ndarray:
@@ -114,7 +122,8 @@ def _print(report: Report, numbers: JsonObject) -> None:
         for name, values in numbers["fractions"].items()
     ]
     report.say(table(("label", "starts", "%", "from", "to"), rows, most=_MOST_ROWS))
-    report.say("from, to: 95 % interval by Wilson")
+    told = " and labels in doubt" if "label_errors" in numbers else ""
+    report.say(f"from, to: 95 % interval by Wilson{told}")
     report.say()
     head = ("gait", "period s", "length m", "largest multiplier", "radius")
     rows = [
@@ -135,6 +144,8 @@ def _print(report: Report, numbers: JsonObject) -> None:
         f"and {numbers['solver_steps'] / numbers['starts']:.0f} solver steps a start; "
         f"engine {numbers['engine']}"
     )
+    if "label_errors" in numbers:
+        report.say(LabelErrors(**numbers["label_errors"]).sentence())
 
 
 def _at(parameters: dict[str, float]) -> str:

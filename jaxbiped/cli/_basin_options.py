@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive
-from jaxbiped.cli._choices import ACCURACIES, CHUNK, SAMPLINGS
-from jaxbiped.cli._option_checks import check_engine
+from jaxbiped.cli._choices import CHUNK, SAMPLINGS
+from jaxbiped.cli._option_checks import check_accuracy, check_engine
 from jaxbiped.cli._option_fields import Engine
 
 if TYPE_CHECKING:
@@ -92,7 +92,8 @@ class SweepOptions:
     footsteps: int = 30
     """After which a start that is not certain yet is unresolved."""
     accuracy: str = "draft"
-    """How accurately to solve: draft, balanced or tight."""
+    """How accurately to solve: draft, balanced or tight; or the share of the labels that may be
+    wrong, such as 1e-4."""
     engine: Engine = "auto"
     store: Path | None = None
     """Zarr store for the results; a run that was killed continues there."""
@@ -107,7 +108,7 @@ class SweepOptions:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself."""
-        check_choice("accuracy", self.accuracy, ACCURACIES)
+        check_accuracy(self.accuracy)
         check_engine(self.engine)
         for name in ("footsteps", "chunk", "workers"):
             check_count(name, getattr(self, name))

@@ -1,6 +1,7 @@
 """`jaxbiped walk --model rigid`: footsteps of the rigid walker."""
 
 import time
+import warnings
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,8 @@ from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.solve._accuracy import ACCURACIES
-from jaxbiped.solve._trajectory import Arrivals
+from jaxbiped.solve._error_estimate import error_numbers, error_sentence
+from jaxbiped.solve._trajectory import Arrivals, Trajectory
 
 _MOST_ROWS = 24
 _MOST_STRIKES = 4096
@@ -42,25 +44,25 @@ def run_rigid_walk(
                 f'{name} = {getattr(solve, name)} is not allowed with model = "rigid": its steps '
                 "are dopri8's, with an absolute tolerance of a hundredth of the relative one."
             )
-    if solve.wanted() is not None:
-        raise ArgumentError(
-            f'accuracy = {solve.accuracy} is not allowed with model = "rigid": name one of '
-            f"{', '.join(ACCURACIES)}."
-        )
-    prepared = time.perf_counter()
+    wanted = solve.wanted()
     options: dict[str, Any] = dict(
         duration=solve.duration,
-        **({"rtol": solve.rtol} if solve.accuracy is None else {"accuracy": solve.accuracy}),
         engine=solve.engine,
         max_arrivals=_MOST_STRIKES,
         max_solver_steps=solve.most_steps(),
     )
+    if wanted is not None:
+        options["accuracy"] = wanted
+    elif solve.accuracy is not None:
+        options["accuracy"] = solve.accuracy
+    else:
+        options["rtol"] = solve.rtol
+    prepared = time.perf_counter()
     with stage("compiling the simulation (first time for this kind of scene)"):
-        rigid_walk(scene, state, **options).t.block_until_ready()
+        _walk(scene, state, options)
     compiled = time.perf_counter()
     with stage(f"simulating {solve.duration:g} s"):
-        walk = rigid_walk(scene, state, **options)
-        walk.t.block_until_ready()
+        walk = _walk(scene, state, options)
     assert walk.arrivals is not None
     finished = time.perf_counter()
     # The first run compiles; what a run takes by itself is the second one's.
@@ -78,13 +80,15 @@ def run_rigid_walk(
         "steps": _footsteps(scene, walk.arrivals),
         "solver": {
             "name": "dopri8",
-            "rtol": solve.rtol,
+            "rtol": _tolerance(solve, walk),
             "engine": walk.engine,
             "attempted": int(walk.attempted),
         },
         "wall_s": wall,
         "warnings": cut_short(str(walk.outcome), int(walk.attempted)),
     }
+    if walk.error is not None:
+        numbers["error"] = error_numbers(walk.error)
     cost = walk_cost(scene, walk) if scene.actuation is not None and numbers["steps"] else {}
     numbers |= cost
     if numbers["footsteps"] > len(numbers["steps"]):
@@ -93,6 +97,8 @@ def run_rigid_walk(
     _print(report, numbers)
     if cost:
         report.say(cost_sentence(cost))
+    if walk.error is not None:
+        report.say(error_sentence(walk.error))
     for sentence in numbers["warnings"]:
         report.say(f"WARNING: {sentence}")
     if output.out is not None:
@@ -103,6 +109,21 @@ def run_rigid_walk(
         report.say(f"wrote {path}")
     report.finish(numbers)
     return 1 if walk.outcome is Ending.SOLVER_FAILED else 0
+
+
+def _walk(scene: RigidScene, state: RigidState, options: JsonObject) -> Trajectory[RigidState]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
+        walk = rigid_walk(scene, state, **options)
+    walk.t.block_until_ready()
+    return walk
+
+
+def _tolerance(solve: SolveOptions, walk: Trajectory[RigidState]) -> float:
+    """The relative tolerance that the walk was solved with."""
+    if walk.error is not None:
+        return walk.error.rtol
+    return solve.rtol if solve.accuracy is None else ACCURACIES[solve.accuracy].rigid_walk
 
 
 def _footsteps(scene: RigidScene, strikes: Arrivals[RigidState]) -> list[dict[str, float]]:

@@ -86,7 +86,9 @@ def accurate_walk(run: Simulation, wanted: float) -> Trajectory:
     return dataclasses.replace(walk, error=error)
 
 
-def judge_walk(scene: PyTree, walk: Trajectory, witnesses: tuple[Trajectory, ...]) -> Judged:
+def judge_walk(
+    scene: PyTree, walk: Trajectory[Any], witnesses: tuple[Trajectory[Any], ...]
+) -> Judged:
     """Error bars of a walk from other solves of it: fields `t`, `state` and what else was asked."""
     if walk.outcome in (Ending.OUT_OF_STEPS, Ending.SOLVER_FAILED):
         return _unknown(walk), np.inf, f"the solve ended as {walk.outcome}"
@@ -104,12 +106,12 @@ def judge_walk(scene: PyTree, walk: Trajectory, witnesses: tuple[Trajectory, ...
     return bars, relative, ""
 
 
-def _outputs(walk: Trajectory) -> dict[str, Any]:
+def _outputs(walk: Trajectory[Any]) -> dict[str, Any]:
     found = {name: getattr(walk, name) for name in ("t", "state", "arrivals", "lowest", "highest")}
     return jtu.tree_map(np.asarray, {k: v for k, v in found.items() if v is not None})
 
 
-def _on_times_of(walk: Trajectory, other: Trajectory) -> dict[str, Any]:
+def _on_times_of(walk: Trajectory[Any], other: Trajectory[Any]) -> dict[str, Any]:
     """What another solve tells at a walk's own times; at the end, its own end."""
     found = _outputs(other)
     if walk.dense is None:
@@ -126,12 +128,14 @@ def _on_times_of(walk: Trajectory, other: Trajectory) -> dict[str, Any]:
 
 def _largest_change(told: np.ndarray, *others: np.ndarray) -> np.ndarray:
     # What no arrival filled is infinite in all of them.
-    return np.max([np.where(told == other, 0.0, np.abs(told - other)) for other in others], axis=0)
+    with np.errstate(invalid="ignore"):
+        changes = [np.where(told == other, 0.0, np.abs(told - other)) for other in others]
+    return np.max(changes, axis=0)
 
 
 def _shapes(tree: PyTree) -> list[tuple[int, ...]]:
     return [np.shape(leaf) for leaf in jtu.tree_leaves(tree)]
 
 
-def _unknown(walk: Trajectory) -> dict[str, Any]:
+def _unknown(walk: Trajectory[Any]) -> dict[str, Any]:
     return jtu.tree_map(lambda leaf: np.full(leaf.shape, np.inf), _outputs(walk))

@@ -5,23 +5,23 @@ import jax.tree_util as jtu
 
 from jaxbiped._checks import (
     ArgumentError,
-    check_choice,
     check_count,
     check_positive,
     check_type,
     check_unbatched,
 )
 from jaxbiped._types import as_float
-from jaxbiped.compiler import LANES, XLA, Request
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import check_state
 from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.simulate._accurate_rigid_walk import accurate_rigid_walk
+from jaxbiped.simulate._accurate_walk import check_accurate_walk
+from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._start import check_single_scene, in_one_precision, in_own_precision
 from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._engine import engine_for
-from jaxbiped.solve._rigid_program import rigid_program
 from jaxbiped.solve._rigid_steps import RigidWalk
-from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
+from jaxbiped.solve._trajectory import Trajectory
 
 _PATIENCE = 50.0
 """Time allowed for each footstep, in units of √(l/g)."""
@@ -33,7 +33,7 @@ def rigid_walk(
     *,
     footsteps: int | None = None,
     duration: float | None = None,
-    accuracy: str = "balanced",
+    accuracy: str | float = "balanced",
     rtol: float | None = None,
     max_arrivals: int = 0,
     max_solver_steps: int = 65536,
@@ -51,7 +51,10 @@ def rigid_walk(
         footsteps: heel strikes after which to end; with a `duration`, too, whichever comes first.
         duration: simulated time [s].
         accuracy: "draft" (1e-4), "balanced" (1e-6) or "tight" (1e-11): the relative tolerance; the
-            absolute one (SI) is a hundredth of it.
+            absolute one (SI) is a hundredth of it. Or a number: the relative error wanted of
+            every state and time that is returned, lengths in units of the legs' l, times of
+            √(l/g), angles of 1 rad, as in `simulate`; `error` then has the bars, and a
+            `RuntimeWarning` tells where they cannot meet the number.
         rtol: relative tolerance, in place of the accuracy's.
         max_arrivals: how many heel strikes to keep.
         max_solver_steps: cap on the attempted steps.
@@ -87,8 +90,9 @@ def rigid_walk(
     if max_arrivals:
         check_count("max_arrivals", max_arrivals)
     check_count("max_solver_steps", max_solver_steps)
-    check_choice("accuracy", accuracy, ACCURACIES)
-    tolerance = ACCURACIES[accuracy].rigid_walk if rtol is None else rtol
+    wanted = check_accurate_walk(accuracy, rtol=rtol)
+    named = accuracy if isinstance(accuracy, str) else "balanced"
+    tolerance = ACCURACIES[named].rigid_walk if rtol is None else rtol
     check_positive("rtol", tolerance)
     leaves = jtu.tree_leaves((scene, state))
     narrow = any(jnp.result_type(leaf) != jnp.float64 for leaf in leaves)
@@ -103,20 +107,12 @@ def rigid_walk(
         rtol=as_float(tolerance),
         max_attempts=as_float(max_solver_steps),
     )
-    # In the precision of the start, as `simulate` has it.
-    walk = jtu.tree_map(lambda leaf: leaf.astype(state.theta_1.dtype), walk)
-    program = rigid_program(max_arrivals > 0, duration is None)
-    request = Request(program, walk, room=int(max_arrivals), quick=True)
-    found, recorded, _ = (LANES if chosen == "lanes" else XLA).run(request)
-    no_rows = jnp.zeros((0, 1 + len(state)), state.theta_1.dtype)
-    rows = no_rows if recorded is None else recorded.values
-    t, end = single_time(found.t, found.state)
-    return Trajectory(
-        t=t,
-        state=end,
-        ending=found.ending,
-        accepted=found.accepted,
-        rejected=found.rejected,
-        arrivals=arrivals_among(rows, found.footsteps, state),
+    run = RigidSimulation(
+        # In the precision of the start, as `simulate` has it.
+        jtu.tree_map(lambda leaf: leaf.astype(state.theta_1.dtype), walk),
+        waits=duration is None,
+        embedded=False,
+        max_arrivals=int(max_arrivals),
         engine=chosen,
     )
+    return run() if wanted is None else accurate_rigid_walk(run, wanted)

@@ -1,5 +1,6 @@
 """Rigid walk as a program for either engine."""
 
+import functools
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -30,10 +31,13 @@ class RigidSolved(NamedTuple):
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def rigid_program(records: bool, waits: bool) -> Program:
-    """The program of a `RigidWalk`; it records time and state after each strike, if it does.
+def rigid_program(records: bool, waits: bool, embedded: bool = False) -> Program:
+    """The program of a `RigidWalk`.
 
-    `waits`: whether the duration only bounds the wait for footsteps.
+    Args:
+        records: whether time and state after each strike are recorded.
+        waits: whether the duration only bounds the wait for footsteps.
+        embedded: whether steps go on with the embedded solution; see `rolling_step`.
     """
 
     def finish(walk: RigidWalk, now: RigidProgress) -> RigidSolved:
@@ -41,7 +45,8 @@ def rigid_program(records: bool, waits: bool) -> Program:
         counts = (now.footsteps, now.accepted, now.rejected)
         return RigidSolved(now.t, state_with_hip(walk, now), code, *counts)
 
-    return Program(initial_progress, attempt_step, finish, record=_record if records else None)
+    attempt = functools.partial(attempt_step, embedded=embedded)
+    return Program(initial_progress, attempt, finish, record=_record if records else None)
 
 
 def _record(walk: RigidWalk, now: RigidProgress, time: Scalar) -> tuple[Scalar, list[Scalar]]:

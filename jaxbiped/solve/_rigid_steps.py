@@ -125,9 +125,16 @@ def _rolled_distance(walk: RigidWalk, angle: Scalar) -> Scalar:
     return walker.hip_to_foot * sine_cosine(angle)[0] + walker.r * angle
 
 
-def attempt_step(walk: RigidWalk, now: RigidProgress) -> tuple[RigidProgress, Scalar]:
-    """One attempted step further, and whether the walk is over (boolean)."""
-    trial, error, roughly = rolling_step(walk.scene, now.state, now.rates, now.step, walk.rtol)
+def attempt_step(
+    walk: RigidWalk, now: RigidProgress, *, embedded: bool = False
+) -> tuple[RigidProgress, Scalar]:
+    """One attempted step further, and whether the walk is over (boolean).
+
+    `embedded`: whether it goes on with the embedded solution; see `rolling_step`.
+    """
+    trial, error, roughly = rolling_step(
+        walk.scene, now.state, now.rates, now.step, walk.rtol, embedded=embedded
+    )
     strike = _strike(walk, trial, roughly)
     free, kept = _after_free_step(walk, now, trial, error, roughly, strike)
     landing = now.landing > 0

@@ -26,17 +26,22 @@ def rolling_step(
     at_start: tuple[Scalar, Scalar],
     step: Scalar,
     rtol: Scalar,
+    *,
+    embedded: bool = False,
 ) -> tuple[RigidState, Scalar, Rates]:
     """The state a step further, its error in units of the tolerance, and its rates, roughly.
 
     `at_start` are the angular accelerations at the start. The place along the slope stays. Of the
-    error, the root mean square over the components; infinite where it is no number.
+    error, the root mean square over the components; infinite where it is no number. `embedded`:
+    whether to go on with the embedded solution of order 7, by which the error is estimated: another
+    method of steps, which a witness of errors takes.
     """
     stages: list[Rates] = [(state.omega_1, state.omega_2, *at_start)]
     for row in _TABLEAU.a_lower[:-1]:
         at = advance(state, step, row, stages)
         stages.append((at.omega_1, at.omega_2, *accelerations(scene, at)))
-    end = advance(state, step, _TABLEAU.b_sol[:-1], stages)
+    weights = _TABLEAU.b_sol - _TABLEAU.b_error if embedded else _TABLEAU.b_sol
+    end = advance(state, step, weights[:-1], stages)
     share = jnp.zeros_like(step)
     for i, (a, b) in enumerate(zip(state[1:], end[1:], strict=True)):
         error = step * _weighted(_TABLEAU.b_error[:-1], stages, i)

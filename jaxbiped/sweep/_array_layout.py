@@ -1,5 +1,6 @@
 """Array layout of a sweep's results, and how it is cut into chunks."""
 
+import enum
 import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
@@ -7,8 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from jaxbiped._types import JsonObject
+from jaxbiped.basins._doubt import Doubt, Witness
 from jaxbiped.basins._label import Label
-from jaxbiped.sweep._labelling import Labelled
+from jaxbiped.sweep._labelled import Labelled
 from jaxbiped.sweep.starts._starts import AbstractStarts, Batch
 
 if TYPE_CHECKING:
@@ -26,6 +28,17 @@ FIELDS: dict[str, tuple[str, float, str, str]] = {
     "attempted": ("i4", 0, "", "attempted steps of the solver"),
 }
 """Of each field: dtype, value before it is known, unit, and what it is."""
+DOUBT_FIELDS: dict[str, tuple[str, float, str, str]] = {
+    "doubt": ("i1", int(Doubt.NONE), "", "whether the label was in doubt, and is"),
+    "disagreed": ("i1", 0, "", "which solves gave another label than the first one"),
+    "changed": ("i1", 0, "", "whether finer tolerances gave another label than the first one"),
+}
+"""Further ones, of labels whose accuracy was asked for by a number."""
+_FLAGS: dict[str, tuple[str, type[enum.IntEnum] | type[enum.IntFlag]]] = {
+    "label": ("flag_values", Label),
+    "doubt": ("flag_values", Doubt),
+    "disagreed": ("flag_masks", Witness),
+}
 
 
 class Layout(NamedTuple):
@@ -36,22 +49,35 @@ class Layout(NamedTuple):
         axis: along which it is cut: a chunk has one place of the axes before, all of those after.
         rows: places of that axis in a chunk.
         units: SI units of the starts' coordinates, as far as they are known.
+        doubts: whether `DOUBT_FIELDS` are kept.
     """
 
     starts: AbstractStarts
     axis: int
     rows: int
     units: Mapping[str, str]
+    doubts: bool = False
 
     @staticmethod
-    def of(starts: AbstractStarts, chunk: int, units: Mapping[str, str] | None = None) -> "Layout":
+    def of(
+        starts: AbstractStarts,
+        chunk: int,
+        units: Mapping[str, str] | None = None,
+        *,
+        doubts: bool = False,
+    ) -> "Layout":
         """With at most `chunk` starts in a chunk."""
         shape = starts.shape
         axis, inner = len(shape) - 1, 1
         while axis > 0 and inner * shape[axis] <= chunk:
             inner *= shape[axis]
             axis -= 1
-        return Layout(starts, axis, max(1, min(chunk // inner, shape[axis])), units or {})
+        return Layout(starts, axis, max(1, min(chunk // inner, shape[axis])), units or {}, doubts)
+
+    @property
+    def fields(self) -> dict[str, tuple[str, float, str, str]]:
+        """What is kept of each start beside its own coordinates."""
+        return FIELDS | DOUBT_FIELDS if self.doubts else FIELDS
 
     @property
     def chunks(self) -> int:
@@ -104,7 +130,8 @@ class Layout(NamedTuple):
 
 def fields_of(starts: AbstractStarts, found: Labelled, batch: Batch) -> dict[str, np.ndarray]:
     """What is kept of some starts, flat arrays by name."""
-    fields = {name: getattr(found, name) for name in FIELDS}
+    names = FIELDS if found.doubt is None else FIELDS | DOUBT_FIELDS
+    fields = {name: getattr(found, name) for name in names}
     return fields | {f"start_{name}": batch.columns[name] for name in starts.own_columns}
 
 
@@ -114,7 +141,7 @@ def empty_dataset(layout: Layout) -> "xarray.Dataset":
 
     starts = layout.starts
     dims = tuple(starts.axes)
-    kinds = dict(FIELDS)
+    kinds = dict(layout.fields)
     for name in starts.own_columns:
         kinds[f"start_{name}"] = ("f8", np.nan, layout.units.get(name, ""), f"the start's {name}")
     variables = {}
@@ -122,9 +149,10 @@ def empty_dataset(layout: Layout) -> "xarray.Dataset":
         attributes: JsonObject = {"long_name": what}
         if unit:
             attributes["units"] = unit
-        if name == "label":
-            attributes["flag_values"] = [int(label) for label in Label]
-            attributes["flag_meanings"] = " ".join(str(each).replace(" ", "_") for each in Label)
+        if name in _FLAGS:
+            kind, flags = _FLAGS[name]
+            attributes[kind] = [int(each) for each in flags]
+            attributes["flag_meanings"] = " ".join(str(each.name).lower() for each in flags)
         values = np.broadcast_to(np.asarray(nothing, dtype=dtype), starts.shape)
         variables[name] = (dims, values, attributes)
     coordinates = {

@@ -12,8 +12,8 @@ from jaxbiped.scene._parameters import SomeScene, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._attractor import Attractor, attractor_without_radius, component_scales
+from jaxbiped.sweep._effort import Effort
 from jaxbiped.sweep._family import Family
-from jaxbiped.sweep._follow_start import Effort
 from jaxbiped.sweep._radius import with_radius
 
 _SAME = 1e-5

@@ -1,7 +1,5 @@
 """Following of starts until each is certain, by either engine."""
 
-from typing import NamedTuple
-
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
@@ -17,6 +15,7 @@ from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.sweep._effort import Effort
 from jaxbiped.sweep._goals import Goals
 from jaxbiped.sweep._labelling_loop import (
     AbstractLabellingLoop,
@@ -30,26 +29,6 @@ _LONGEST = 1e6
 """Simulated time [s] that no start takes: its footsteps or its patience end it before."""
 _PATIENCE = 50.0
 """Longest time between two footsteps, in units of √(l/g)."""
-
-
-class Effort(NamedTuple):
-    """How starts are followed. All hashable.
-
-    Attributes:
-        rtol: relative tolerance; the absolute one is a hundredth of it in the scene's units.
-        footsteps: after which a start that is not certain is given up.
-        max_attempts: cap on the solver's attempted steps.
-        gap: see `after_arrival`.
-        solver: of the compliant walker.
-        engine: "lanes" or "xla".
-    """
-
-    rtol: float
-    footsteps: int
-    max_attempts: int
-    gap: float
-    solver: AbstractRosenbrock
-    engine: str
 
 
 def follow_starts(
@@ -85,7 +64,8 @@ def follow_starts(
     starts = Start(solve, goals, same(effort.gap), waits)
     if not count:
         return _empty_outcome(len(states) - 1)
-    program = _program(scene.compliant, effort.solver, cycles, effort.engine)
+    embedded = effort.embedded and not scene.compliant
+    program = _program(scene.compliant, effort.solver, cycles, effort.engine, embedded)
     engine = LANES if effort.engine == "lanes" else XLA
     given = jtu.tree_map(np.asarray, starts)
     outcome: Outcome[np.ndarray] = engine.run(Request(program, given, batch=True)).outputs
@@ -94,9 +74,13 @@ def follow_starts(
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
 def _program(
-    compliant: bool, solver: AbstractRosenbrock, cycles: tuple[int, ...], engine: str
+    compliant: bool,
+    solver: AbstractRosenbrock,
+    cycles: tuple[int, ...],
+    engine: str,
+    embedded: bool,
 ) -> Program:
-    loop: AbstractLabellingLoop = RigidLabelling(cycles)
+    loop: AbstractLabellingLoop = RigidLabelling(cycles, embedded=embedded)
     if compliant:
         loop = CompliantLabelling(solver, cycles, fenced=engine == "xla")
     return Program(loop.begin, loop.attempt, loop.finish)

@@ -1,12 +1,15 @@
 """Labels as a function of coordinates, as the analyses of basins ask for them."""
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped.basins._doubt import Doubt
 from jaxbiped.basins._label import Label
 from jaxbiped.basins._label_oracle import LabelOf
+from jaxbiped.sweep._labelled import Labelled
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._coordinates import check_coordinates
 from jaxbiped.sweep.starts._starts import Completion, batch_at
@@ -29,7 +32,8 @@ def label_at(
         place, follow: as in `grid`.
 
     Returns:
-        A function of points, shape (n, d), to codes of `Label`, shape (n,).
+        A function of points, shape (n, d), to codes of `Label`, shape (n,). Where the labelling's
+        accuracy is a number, labels that remain in doubt are told by a `RuntimeWarning`.
 
     Raises:
         ArgumentError: an unknown coordinate; points of another number of coordinates.
@@ -46,7 +50,21 @@ def label_at(
             )
         columns = {name: points[:, i] for i, name in enumerate(names)}
         batch = batch_at(labelling, columns, place=place, follow=follow)
-        found = labelling(batch.states, parameters=batch.parameters).label.astype(int)
+        labelled = labelling(batch.states, parameters=batch.parameters)
+        _warn_of_doubt(labelled)
+        found = labelled.label.astype(int)
         return (found != int(Label.WALKING)).astype(int) if failing else found
 
     return label_of
+
+
+def _warn_of_doubt(labelled: Labelled) -> None:
+    if labelled.doubt is None:
+        return
+    count = int((labelled.doubt == int(Doubt.REMAINS)).sum())
+    if count:
+        warnings.warn(
+            f"{count} of {len(labelled.label)} labels remain in doubt at the finest tolerance.",
+            RuntimeWarning,
+            stacklevel=3,
+        )

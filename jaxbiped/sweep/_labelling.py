@@ -1,7 +1,7 @@
 """Labelling of starts: what becomes of each."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -10,68 +10,22 @@ import numpy as np
 import numpy.typing as npt
 from jaxtyping import PyTree
 
-from jaxbiped._checks import (
-    ArgumentError,
-    check_choice,
-    check_positive,
-    check_type,
-)
+from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import JsonObject, as_float
-from jaxbiped.basins._arguments import check_whole
-from jaxbiped.basins._label import Label, label_names
+from jaxbiped.basins._label import Label
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._parameters import parameter_values, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._accuracy import ACCURACIES, resolve_slip_speed
-from jaxbiped.solve._engine import engine_for
-from jaxbiped.solve._solvers import solver_named
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._broadcast import broadcast_leaves
+from jaxbiped.sweep._effort import Effort
 from jaxbiped.sweep._family import Family
-from jaxbiped.sweep._follow_start import Effort, follow_starts
+from jaxbiped.sweep._follow_start import follow_starts
 from jaxbiped.sweep._identity import identity
-
-_GAP, _GAP_SHARE = 1e-4, 30.0
-"""Gap between states that repeat each other, at least; and in units of the tolerance."""
-
-
-class Labelled(NamedTuple):
-    """What became of n starts: NumPy's arrays of shape (n,).
-
-    Attributes:
-        label: code of a `Label`.
-        gait: the gait that it converges to, by its position in `Family.cycles`; −1 for none.
-        cycle_footsteps: footsteps in that gait's cycle. Where the label is "unresolved" it is that
-            of a cycle which the last footsteps repeated, of a gait that is not among the
-            attractors.
-        footsteps: heel strikes until the label was certain.
-        time: simulated until then [s].
-        distance: walked along the slope until then [m].
-        rate: share of the distance from the gait that is left after a footstep, over the last
-            cycle; NaN without a cycle, and where nothing but rounding is left of the distance.
-        closest: smallest distance from any of the gaits, in its metric; infinite without arrival.
-        attempted: how many steps the solver attempted.
-        final: last states on the section without hip_x, shape (n, m); infinite without arrival.
-    """
-
-    label: np.ndarray
-    gait: np.ndarray
-    cycle_footsteps: np.ndarray
-    footsteps: np.ndarray
-    time: np.ndarray
-    distance: np.ndarray
-    rate: np.ndarray
-    closest: np.ndarray
-    attempted: np.ndarray
-    final: np.ndarray
-
-    @property
-    def names(self) -> np.ndarray:
-        """The labels in words, "walking period-1" and so on, shape (n,)."""
-        return label_names(self.label, self.cycle_footsteps)
+from jaxbiped.sweep._labelled import Labelled
+from jaxbiped.sweep._settled_labels import settled_labels
 
 
 class Labelling(eqx.Module):
@@ -95,7 +49,7 @@ class Labelling(eqx.Module):
         Each is followed until its label is certain: until it comes within a known gait's radius,
         and nearer than a cycle before; until it falls, stops, stumbles or slides; or until all the
         footsteps are walked. No start's result depends on another's; one that is no number is
-        labelled "solver failed".
+        labelled "solver failed". To an accuracy that is a number, see `settled_labels`.
 
         Args:
             states: leaves of shape (n,).
@@ -111,10 +65,25 @@ class Labelling(eqx.Module):
         count = len(states.hip_x)
         values = {} if parameters is None else dict(parameters)
         given = {name: _column(name, value, count) for name, value in values.items()}
+
+        def follow(places: np.ndarray, effort: Effort) -> Labelled:
+            some = jtu.tree_map(lambda leaf: leaf[places], states)
+            return self._followed(some, {k: v[places] for k, v in given.items()}, effort)
+
+        every = np.arange(count)
+        if self.effort.wanted is None:
+            return follow(every, self.effort)
+        return settled_labels(follow, count, self.effort, self.scene)
+
+    def _followed(
+        self, states: PyTree, given: Mapping[str, np.ndarray], effort: Effort
+    ) -> Labelled:
+        """Labels of starts that are checked, by one solve of each."""
+        count = len(states.hip_x)
         scene = with_parameters(self.scene, {k: jnp.asarray(v) for k, v in given.items()})
         scene = jtu.tree_map(lambda leaf: _spread(leaf, count), scene)
         goals, cycles = self.family.goals(given, count)
-        outcome = follow_starts(scene, states, goals, cycles, self.effort)
+        outcome = follow_starts(scene, states, goals, cycles, effort)
         label = outcome.label.astype(np.int8)
         if given and not self.family.names:
             # No gait is known to compare with: a cycle that repeats itself has to do.
@@ -151,7 +120,9 @@ class Labelling(eqx.Module):
         scene: JsonObject = {k: float(v) for k, v in parameter_values(self.scene).items()}
         effort = self.effort._asdict() | {"solver": type(self.effort.solver).__name__}
         # Both engines give the same labels; the gap follows from the tolerance.
-        del effort["engine"], effort["gap"]
+        del effort["engine"], effort["gap"], effort["embedded"]
+        if effort["wanted"] is None:
+            del effort["wanted"]
         return {
             "model": "compliant" if self.scene.compliant else "rigid",
             "scene": scene,
@@ -159,49 +130,6 @@ class Labelling(eqx.Module):
             "models": {"scene": identity(self.scene), "solver": identity(self.effort.solver)},
             "gaits": self.family.described(),
         }
-
-
-def effort_of(
-    scene: Scene | RigidScene,
-    *,
-    footsteps: int = 30,
-    accuracy: str = "draft",
-    rtol: float | None = None,
-    solver: str | AbstractRosenbrock = "rodas4",
-    max_solver_steps: int = 65536,
-    engine: str = "auto",
-) -> Effort:
-    """How to follow starts, from what a user says.
-
-    Raises:
-        ArgumentError: an argument that is not allowed.
-    """
-    check_type("scene", scene, Scene, RigidScene)
-    check_whole("footsteps", footsteps, 1)
-    check_whole("max_solver_steps", max_solver_steps, 1)
-    if any(np.ndim(leaf) for leaf in jtu.tree_leaves(scene)):
-        raise ArgumentError(
-            "scene has parameters that are arrays: give one scene, and name what differs from "
-            "start to start among the parameters."
-        )
-    check_choice("accuracy", accuracy, ACCURACIES)
-    named = ACCURACIES[accuracy]
-    own = named.walk if scene.compliant else named.rigid_walk
-    tolerance = resolve_slip_speed(own, scene) if rtol is None else rtol
-    check_positive("rtol", tolerance)
-    method = solver_named(solver)
-    if not isinstance(method, AbstractRosenbrock):
-        raise ArgumentError(
-            f"solver = {type(method).__name__} is not allowed: labelling takes rodas3p to rodas5p."
-        )
-    return Effort(
-        rtol=float(tolerance),
-        footsteps=int(footsteps),
-        max_attempts=int(max_solver_steps),
-        gap=max(_GAP, _GAP_SHARE * float(tolerance)),
-        solver=method,
-        engine=engine_for(engine, obstacle=None),
-    )
 
 
 def _check_states(scene: Scene | RigidScene, states: PyTree) -> PyTree:

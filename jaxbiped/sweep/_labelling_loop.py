@@ -209,10 +209,11 @@ class RigidLabelling(AbstractLabellingLoop):
 
     Attributes:
         cycles: footsteps in a cycle of each known gait.
+        embedded: see `rolling_step`.
     """
 
-    def __init__(self, cycles: tuple[int, ...]) -> None:
-        self.cycles = cycles
+    def __init__(self, cycles: tuple[int, ...], *, embedded: bool) -> None:
+        self.cycles, self.embedded = cycles, embedded
 
     def begin(self, start: Start) -> Progress:
         walk: RigidWalk = start.solve
@@ -221,7 +222,7 @@ class RigidLabelling(AbstractLabellingLoop):
         return Progress(initial_progress(walk), trace, zero, None)
 
     def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
-        after, over = attempt_step(start.solve, now.solve)
+        after, over = attempt_step(start.solve, now.solve, embedded=self.embedded)
 
         def on_section() -> ArrivalHistory:
             return after_arrival(

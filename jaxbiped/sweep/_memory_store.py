@@ -9,7 +9,7 @@ import numpy as np
 from jaxbiped._types import JsonObject
 from jaxbiped.sweep._array_layout import Layout, empty_dataset
 from jaxbiped.sweep._same_store import SETTINGS
-from jaxbiped.sweep._store import AbstractStore
+from jaxbiped.sweep._store import COMPLETE, AbstractStore
 
 if TYPE_CHECKING:
     import xarray
@@ -28,10 +28,10 @@ class MemoryStore(AbstractStore):
     def missing(self) -> np.ndarray:
         return np.arange(self.layout.chunks)
 
-    def unsettled(self) -> np.ndarray:
+    def behind(self, mark: int) -> np.ndarray:
         return self.missing()
 
-    def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, settled: bool = False) -> None:
+    def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, mark: int = COMPLETE) -> None:
         region, shape = self.layout.region(chunk), self.layout.shape_of(chunk)
         for name, values in fields.items():
             self._dataset[name].data[region] = np.reshape(values, shape)

@@ -13,8 +13,9 @@ from jaxbiped.scene._parameters import parameter_names, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.sweep._effort import effort_of
 from jaxbiped.sweep._find_family import find_family, with_gaits
-from jaxbiped.sweep._labelling import Labelling, effort_of
+from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._starts import AbstractStarts
 
 _ALIKE = 0.05
@@ -29,7 +30,7 @@ def labelling(
     parameters: Mapping[str, Sequence[float] | np.ndarray] | None = None,
     guess: PyTree = None,
     footsteps: int = 30,
-    accuracy: str = "draft",
+    accuracy: str | float = "draft",
     rtol: float | None = None,
     solver: str | AbstractRosenbrock = "rodas4",
     max_solver_steps: int = 65536,
@@ -42,7 +43,11 @@ def labelling(
         parameters: values of scene parameters for every combination of which the gait is sought.
         guess: where the search begins; the seed's start unless given.
         footsteps: after which a start that is not certain is "unresolved".
-        accuracy: "draft", "balanced" or "tight" (see `ACCURACIES`).
+        accuracy: "draft", "balanced" or "tight" (see `ACCURACIES`). Or a number, the share of the
+            labels that may be wrong: each start is then solved at a looser tolerance and by a
+            second method as well, and where the labels differ again at finer tolerances until they
+            agree. Starts whose label remains in doubt are flagged (`Labelled.doubt`); `sweep`
+            estimates how many of the others are wrong, and tightens until it is the number.
         rtol: relative tolerance, in place of the accuracy's; the absolute one is a hundredth.
         solver: of the compliant walker, "rodas3p" to "rodas5p".
         max_solver_steps: cap on a start's attempted steps.

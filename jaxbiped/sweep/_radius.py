@@ -12,7 +12,8 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._attractor import Attractor, component_scales, section_tangents
 from jaxbiped.sweep._broadcast import broadcast_leaves
-from jaxbiped.sweep._follow_start import Effort, follow_starts
+from jaxbiped.sweep._effort import Effort
+from jaxbiped.sweep._follow_start import follow_starts
 from jaxbiped.sweep._goals import Goals
 
 _SHELLS = 1e-5 * 1.5 ** np.arange(30)

@@ -12,6 +12,13 @@ if TYPE_CHECKING:
     import xarray
 
 
+COMPLETE = 1
+"""Mark of a chunk that was labelled."""
+ALL_GAITS = 2
+"""Mark of a chunk that was gone over again after gaits were found late. Each round of finer
+tolerances after that counts one more."""
+
+
 class AbstractStore(abc.ABC):
     """Fields of all starts, written and read a chunk at a time, and attributes of the whole.
 
@@ -26,12 +33,12 @@ class AbstractStore(abc.ABC):
         """Numbers of the chunks that are not complete."""
 
     @abc.abstractmethod
-    def unsettled(self) -> np.ndarray:
-        """Numbers of the chunks that were not written with all gaits known."""
+    def behind(self, mark: int) -> np.ndarray:
+        """Numbers of the chunks whose mark is below this one."""
 
     @abc.abstractmethod
-    def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, settled: bool = False) -> None:
-        """Writes a chunk, then marks it as complete; `settled` where all gaits are known by now.
+    def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, mark: int = COMPLETE) -> None:
+        """Writes a chunk, then marks how far it is.
 
         Raises:
             ResourceError: it cannot be written; what was written before stays.

@@ -12,13 +12,15 @@ from tqdm import tqdm
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label import Label
-from jaxbiped.sweep._array_layout import FIELDS, Layout, fields_of
+from jaxbiped.basins._label_errors import ERRORS
+from jaxbiped.sweep._array_layout import Layout, fields_of
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._memory_store import MemoryStore
 from jaxbiped.sweep._prepare import Guesses, guesses_among, with_gaits_met, with_guesses
 from jaxbiped.sweep._provenance import provenance
 from jaxbiped.sweep._same_store import GAITS
-from jaxbiped.sweep._store import AbstractStore
+from jaxbiped.sweep._store import ALL_GAITS, AbstractStore
+from jaxbiped.sweep._tighter_labels import tightened
 from jaxbiped.sweep._workers import compute_chunks
 from jaxbiped.sweep._zarr_store import ZarrStore, check_store
 from jaxbiped.sweep.starts._coordinates import coordinate_quantities
@@ -68,7 +70,11 @@ def sweep(
 
     Returns:
         A dataset with the labels and all else of `Labelled`, along the axes of the starts.
-        Its attributes say scene, tolerances, gaits, versions and revision.
+        Its attributes say scene, tolerances, gaits, versions and revision. Where the accuracy was
+        asked for by a number it also tells which labels were and remain in doubt (`doubt`, codes of
+        `jb.basins.Doubt`), and `jb.basins.label_errors` how many were labelled anew, and what share
+        of the others is estimated to be wrong; a `RuntimeWarning` tells where that is more than the
+        number.
 
     Raises:
         ArgumentError: an argument that is not allowed; a store of other settings or another
@@ -86,9 +92,10 @@ def sweep(
     began = time.perf_counter()
     quantities = coordinate_quantities(labelling.scene)
     units = {name: quantity.unit for name, quantity in quantities.items()}
-    layout = Layout.of(starts, int(chunk), units)
+    doubts = labelling.effort.wanted is not None
+    layout = Layout.of(starts, int(chunk), units, doubts=doubts)
     own = {
-        "fields": list(FIELDS),
+        "fields": list(layout.fields),
         "starts": starts.described(),
         "chunk_shape": list(layout.chunk_shape),
     }
@@ -112,8 +119,14 @@ def sweep(
             bar.update(int(sizes[number]))
     if look_for_gaits:
         known = _resolve(known, layout, results)
+    told: dict[str, str | float] = {}
+    if doubts:
+        errors = tightened(known, layout, results, executor, int(workers))
+        errors.warn()
+        told[ERRORS] = json.dumps(errors.numbers())
     results.note(
-        {
+        told
+        | {
             GAITS: json.dumps(known.family.described()),
             "labelled_in_this_run": fresh,
             "chunks_found_complete": layout.chunks - len(missing),
@@ -139,8 +152,9 @@ def _resolve(labelling: Labelling, layout: Layout, results: AbstractStore) -> La
     if [len(row) for row in known.family.rows] == [len(row) for row in labelling.family.rows]:
         return labelling
     moved = labelling.family.places_in(known.family)
-    for chunk in map(int, results.unsettled()):
-        fields = results.read(chunk, (*FIELDS, *(f"start_{x}" for x in layout.starts.own_columns)))
+    for chunk in map(int, results.behind(ALL_GAITS)):
+        own = (f"start_{name}" for name in layout.starts.own_columns)
+        fields = results.read(chunk, (*layout.fields, *own))
         places = np.flatnonzero(fields["label"] == int(Label.UNRESOLVED))
         met = fields["gait"] >= 0
         fields["gait"][met] = moved[fields["gait"][met]]
@@ -150,7 +164,7 @@ def _resolve(labelling: Labelling, layout: Layout, results: AbstractStore) -> La
             for name, values in fields_of(layout.starts, found, batch).items():
                 fields[name][places] = values
         if len(places) or met.any():
-            results.write(chunk, fields, settled=True)
+            results.write(chunk, fields, mark=ALL_GAITS)
     return known
 
 

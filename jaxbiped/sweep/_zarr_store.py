@@ -14,14 +14,12 @@ from jaxbiped._checks import ArgumentError, ResourceError, failure_kind
 from jaxbiped._types import JsonObject
 from jaxbiped.sweep._array_layout import Layout, empty_dataset
 from jaxbiped.sweep._same_store import ALSO, GAITS, SETTINGS, check_same, check_writers
-from jaxbiped.sweep._store import AbstractStore
+from jaxbiped.sweep._store import COMPLETE, AbstractStore
 
 if TYPE_CHECKING:
     import xarray
 
 _DONE = "done"
-_SETTLED = 2
-"""Mark of a chunk that was gone over again after gaits were found late."""
 
 
 class ZarrStore(AbstractStore):
@@ -98,10 +96,10 @@ class ZarrStore(AbstractStore):
     def missing(self) -> np.ndarray:
         return np.flatnonzero(self._done == 0)
 
-    def unsettled(self) -> np.ndarray:
-        return np.flatnonzero(self._done < _SETTLED)
+    def behind(self, mark: int) -> np.ndarray:
+        return np.flatnonzero(self._done < mark)
 
-    def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, settled: bool = False) -> None:
+    def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, mark: int = COMPLETE) -> None:
         region = self.layout.region(chunk)
         shape = self.layout.shape_of(chunk)
         try:
@@ -110,7 +108,7 @@ class ZarrStore(AbstractStore):
                 self._mark(chunk, 0)
             for name, values in fields.items():
                 self._group[name][region] = np.reshape(values, shape)
-            self._mark(chunk, _SETTLED if settled else 1)
+            self._mark(chunk, mark)
         except OSError as error:
             raise unwritable(self.path, error) from None
 
@@ -193,7 +191,8 @@ def _create(
             if not own:
                 array[:] = variable.values
         done: JsonObject = {
-            "long_name": "whether the chunk is complete; 2 after gaits were found late"
+            "long_name": "whether the chunk is complete; 2 after gaits were found late, more after "
+            "rounds of finer tolerances"
         }
         group.create_array(
             _DONE,

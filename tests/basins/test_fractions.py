@@ -83,3 +83,16 @@ def test_bad_arguments_are_named(call, words):
     with pytest.raises(jb.ArgumentError) as caught:
         call()
     assert all(word in str(caught.value) for word in words)
+
+
+def test_labels_in_doubt_widen_the_intervals():
+    codes, doubt = np.array([0] * 60 + [1] * 40), np.zeros(100, dtype=bool)
+    plain = jb.basins.fractions(codes)
+    assert jb.basins.fractions(codes, doubt=doubt) == plain
+    doubt[[0, 1, 99]] = True
+    found = jb.basins.fractions(codes, doubt=doubt)["walking"]
+    assert (found.estimate, found.count) == (0.6, 60)
+    assert found.low == pytest.approx(float(jb.basins.wilson_interval(58, 100)[0]))
+    assert found.high == pytest.approx(float(jb.basins.wilson_interval(61, 100)[1]))
+    with pytest.raises(jb.ArgumentError, match="doubt has shape"):
+        jb.basins.fractions(codes, doubt=doubt[:3])

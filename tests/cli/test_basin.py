@@ -118,6 +118,20 @@ def test_samples_over_a_rigid_walker_and_its_slope(capsys):
     assert set(numbers["fractions"]) > {"fell forward"}
 
 
+def test_the_share_of_wrong_labels_is_asked_for_and_told(tmp_path, capsys):
+    arguments = ("--model", "rigid", "--accuracy", "1e-2", "--store", tmp_path / "store")
+    axes = ("--x", "theta_stance=0.1:0.4:8", "--y", "omega_stance=-2:-1:8")
+    assert _run(*arguments, *axes, "--json", tmp_path / "b.json") == 0
+    errors = json.loads((tmp_path / "b.json").read_text())["label_errors"]
+    assert (errors["starts"], errors["wanted"], errors["met"]) == (64, 1e-2, True)
+    told = capsys.readouterr().out
+    assert f"{errors['relabelled']} of 64 labels were in doubt at a tolerance of 3.0e-05" in told
+    assert "95 % interval by Wilson and labels in doubt" in told
+    found = xr.open_zarr(tmp_path / "store")
+    assert errors["relabelled"] == int((found.doubt > 0).sum())
+    assert jb.basins.label_errors(found).numbers() == errors
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
@@ -133,6 +147,7 @@ def test_samples_over_a_rigid_walker_and_its_slope(capsys):
         (("--starts", "nowhere.csv", "--x", "g=1:2:3"), "name either"),
         (("--formulation", "redundant"), 'formulation = "redundant" is not allowed for a basin'),
         (("--footsteps", "0"), "footsteps = 0"),
+        (("--accuracy", "2"), "accuracy = 2 is not allowed: it is the share of the labels"),
         (("--accuracy", "high"), "accuracy = 'high' is not known"),
         (("--workers", "0"), "workers = 0"),
         (("--chunk", "0"), "chunk = 0"),

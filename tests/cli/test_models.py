@@ -114,6 +114,15 @@ def test_rigid_walk_and_gait(tmp_path, capsys):
     assert numbers["steps"][-1]["period_s"] == pytest.approx(0.4438, abs=2e-4)
     assert numbers["steps"][-1]["length_m"] == pytest.approx(0.1904, abs=2e-4)
     assert (tmp_path / "leg_angles.png").exists()
+    assert numbers["solver"]["rtol"] == 1e-6
+    assert _run("walk", *flags, "--accuracy", "tight", "--json", str(walk)) == 0
+    assert json.loads(walk.read_text())["solver"]["rtol"] == 1e-11
+    assert _run("walk", *flags, "--accuracy", "1e-5", "--json", str(walk)) == 0
+    told = json.loads(walk.read_text())
+    assert told["error"]["met"]
+    assert told["error"]["relative"] <= 1e-5
+    assert told["solver"]["rtol"] == told["error"]["rtol"]
+    assert "of 1e-05 allowed" in capsys.readouterr().out
     gait = tmp_path / "gait.json"
     assert _run("gait", "--model", "rigid", "--json", str(gait)) == 0
     numbers = json.loads(gait.read_text())

@@ -15,4 +15,7 @@ def test_true_errors_lie_within_their_bars(tmp_path):
     state = numbers["coverage"]["state"]
     assert state["resolved"] >= 40
     assert state["covered"] >= 0.9 * state["resolved"]
+    assert numbers["rigid"]["silently_wrong"] == 0
+    rigid = numbers["coverage"]["rigid state"]
+    assert rigid["covered"] >= 0.95 * rigid["resolved"] > 0
     assert set(numbers["coverage"]) >= {"period", "multipliers", "sensitivities"}

@@ -1,0 +1,60 @@
+"""A rigid walk that is ready to run: what to solve, how tightly, by which engine."""
+
+import dataclasses
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._types import Parameter, as_float
+from jaxbiped.compiler import LANES, XLA, Request
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.solve._rigid_program import rigid_program
+from jaxbiped.solve._rigid_steps import RigidWalk
+from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
+
+
+class RigidSimulation(eqx.Module):
+    """A prepared rigid walk. Call it for its trajectory.
+
+    Attributes:
+        walk: the program's inputs.
+        waits: whether the duration only bounds the wait for footsteps.
+        embedded: whether steps go on with the embedded solution, one order lower.
+        max_arrivals: how many heel strikes to keep.
+        engine: "lanes" or "xla".
+    """
+
+    walk: RigidWalk
+    waits: bool = eqx.field(static=True)
+    embedded: bool = eqx.field(static=True)
+    max_arrivals: int = eqx.field(static=True)
+    engine: str = eqx.field(static=True)
+
+    def with_inputs(
+        self, *, embedded: bool | None = None, **inputs: Parameter
+    ) -> "RigidSimulation":
+        """The same with other numbers of `walk`, by name, in its precision."""
+        like = self.walk.duration.dtype
+        new: Any = {name: as_float(value).astype(like) for name, value in inputs.items()}
+        kept = self.embedded if embedded is None else embedded
+        return dataclasses.replace(self, walk=self.walk._replace(**new), embedded=kept)
+
+    def __call__(self) -> Trajectory[RigidState]:
+        """Solves it."""
+        state = self.walk.state
+        program = rigid_program(self.max_arrivals > 0, self.waits, self.embedded)
+        request = Request(program, self.walk, room=self.max_arrivals, quick=True)
+        found, recorded, _ = (LANES if self.engine == "lanes" else XLA).run(request)
+        no_rows = jnp.zeros((0, 1 + len(state)), state.theta_1.dtype)
+        rows = no_rows if recorded is None else recorded.values
+        t, end = single_time(found.t, found.state)
+        return Trajectory(
+            t=t,
+            state=end,
+            ending=found.ending,
+            accepted=found.accepted,
+            rejected=found.rejected,
+            arrivals=arrivals_among(rows, found.footsteps, state),
+            engine=self.engine,
+        )

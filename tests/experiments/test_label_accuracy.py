@@ -1,0 +1,20 @@
+"""Accuracy of labels, at the experiment's quick size."""
+
+import pytest
+
+from tests.drawn import assert_is_drawn
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
+
+
+def test_few_labels_change_and_those_in_doubt_are_told(tmp_path):
+    numbers, figures = quick_run("label_accuracy", tmp_path)
+    assert_is_drawn(figures["label_accuracy.png"])
+    changed = {row["way"]: row["changed"] for row in numbers["named"]["rows"]}
+    assert changed["tight"] <= changed["draft"] <= 0.02 * numbers["starts"]
+    assert numbers["named"]["references_differ"] <= 1
+    for (row,) in numbers["by_number"].values():
+        assert row["truly_wrong"] <= row["wanted"] * numbers["starts"]
+        assert row["within_interval"] == row["draws"] == 1
+        assert 1.0 < row["steps_ratio"] < 3.5
