@@ -201,6 +201,22 @@ def test_the_sensitivity_norm_is_the_response_of_footsteps():
     assert norm == pytest.approx(np.sqrt(np.sum(response**2)), rel=1e-5)
 
 
+def test_a_push_over_a_cycle_of_two_has_the_gradient_of_differences():
+    """It ends with the second impact, which no shift in time carries on."""
+    scene, names = SCENES["rigid"], ("sensitivity_norm",)
+    own, step = float(scene.walker.d), 1e-3
+
+    def told(d):
+        there = jb.with_parameters(scene, {"d": d})
+        state = usual_gait(there).measures.state
+        return jacobian_functionals(there, state, names, footsteps=2)
+
+    place = jb.parameter_names(scene).index("d")
+    f = {k: float(told(own * (1.0 + k * step)).values[0]) for k in (-2, -1, 1, 2)}
+    slope = (8.0 * (f[1] - f[-1]) - (f[2] - f[-2])) / (12.0 * step * own)
+    assert float(told(own).slopes[0, place]) == pytest.approx(slope, rel=1e-6)
+
+
 def test_the_divergence_of_the_foot_strike_is_that_of_its_saltation_matrix():
     """The determinant of one impact, in angles and momenta."""
     scene = SCENES["rigid"]
