@@ -113,7 +113,8 @@ class Optimise:
         report = Report(self.json)
         _print(report, scene, found, certificate, goal)
         report.finish(numbers)
-        return 0 if found.outcome in (Outcome.CONVERGED, Outcome.CORNER) else 1
+        ended = (Outcome.CONVERGED, Outcome.CORNER, Outcome.BEYOND_RANGE)
+        return 0 if found.outcome in ended else 1
 
 
 def _bounds(scene: Scene | RigidScene, text: str) -> dict[str, tuple[float, float]]:
@@ -156,7 +157,11 @@ def optimum_numbers(found: Optimum, certificate: Certificate, goal: str, sense: 
             "unit": OBJECTIVES[goal].quantity.unit,
         },
         "measures": {
-            name: {"value": value, "error": found.known.errors[name]}
+            name: {
+                "value": value,
+                "error": found.known.errors[name],
+                "beyond_range": name in found.known.beyond_range,
+            }
             for name, value in found.known.values.items()
         },
         "history": [each._asdict() for each in found.history],
@@ -222,8 +227,7 @@ def _print(
         (
             name,
             f"{first[name]:.6g}" if name in first else "–",
-            f"{value:.6g}",
-            f"{found.known.errors[name]:.1e}",
+            *_told(found, name, value),
             OBJECTIVES[name].quantity.unit_in_text,
         )
         for name, value in found.known.values.items()
@@ -237,6 +241,13 @@ def _print(
     )
     for line in _certificate_lines(certificate):
         report.say(line)
+
+
+def _told(found: Optimum, name: str, value: float) -> tuple[str, str]:
+    """A measure and its error, or more than what a range holds."""
+    if name in found.known.beyond_range:
+        return f"> {value:.6g}", "–"
+    return f"{value:.6g}", f"{found.known.errors[name]:.1e}"
 
 
 def _bifurcation_line(nearest: NearestBifurcation) -> str:

@@ -11,7 +11,7 @@ from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._bifurcation_distance import bifurcation_distance
+from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
 from jaxbiped.optimise._jacobian_functionals import (
     JACOBIAN_FUNCTIONALS,
@@ -103,8 +103,9 @@ OBJECTIVES = {
 - radius bound: never below the spectral radius, and smooth also where multipliers meet or have
   equal moduli, where that has corners; see `jacobian_functionals`.
 - sensitivity norm, floor sensitivity, strike divergence: see `jacobian_functionals`.
-- fold distance, doubling distance: to the nearest in slope, see `bifurcation_distance`; a design
-  that meets none counts as one without a gait.
+- fold distance, doubling distance: to the nearest in slope, see `bifurcation_distance`. Where none
+  lies in the range that is followed the distance is that of the range's farther end, without
+  derivatives: more than that of any design that has one.
 """
 _OF_THE_GAIT = ("speed", "step_length", "period", "peak_normal")
 _SEARCHED = {
@@ -130,6 +131,8 @@ class Evaluation(NamedTuple):
         slope_errors: their estimated errors.
         state: of the gait, its recurring components, shape (m,).
         state_slopes: derivatives, shape (m, p).
+        beyond_range: distances whose bifurcation does not lie in the range that is followed: their
+            values stand for more than the range holds, and their derivatives are zeros.
     """
 
     values: dict[str, float]
@@ -138,6 +141,7 @@ class Evaluation(NamedTuple):
     slope_errors: dict[str, np.ndarray]
     state: np.ndarray
     state_slopes: np.ndarray
+    beyond_range: tuple[str, ...] = ()
 
 
 def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective") -> None:
@@ -190,9 +194,14 @@ def evaluate(
         )
         rows |= dict(zip(integral_names(scene), _rows_of(second), strict=True))
         rows["cost_of_transport"] = _cost_of_transport(scene, rows)
+    beyond_range = []
     for name in (name for name in wanted if name in _DISTANCES):
         told = bifurcation_distance(scene, gait, _DISTANCES[name], accuracy=accuracy)
         rows[name] = _Row(told.distance, told.error, told.slopes, told.slope_errors)
+        if told.outcome is Sought.NONE_IN_RANGE:
+            none = np.zeros_like(told.slopes)
+            rows[name] = _Row(told.distance, 0.0, none, none)
+            beyond_range.append(name)
     kept = {name: rows[name] for name in dict.fromkeys((*wanted, *of_jacobian, *_OF_THE_GAIT))}
     slopes = gait.sensitivities.state
     return Evaluation(
@@ -202,6 +211,7 @@ def evaluate(
         slope_errors={name: row.slope_errors for name, row in kept.items()},
         state=np.asarray([float(leaf) for leaf in gait.measures.state[1:]]),
         state_slopes=np.stack([np.asarray(leaf) for leaf in slopes[1:]]),
+        beyond_range=tuple(beyond_range),
     )
 
 

@@ -131,9 +131,7 @@ def _program(kind: _Kind, backwards: bool) -> Program:
 class _AdjointSolve:
     """The functions of the program: its input stream's rows are steps, read backwards."""
 
-    def __init__(
-        self, engine: AbstractEngine, flow: Callable[[_Given], Flow], step: Step
-    ) -> None:
+    def __init__(self, engine: AbstractEngine, flow: Callable[[_Given], Flow], step: Step) -> None:
         self.engine, self.flow = engine, flow
         row, self.read = ravel_pytree(step)
         self.size = len(row)

@@ -97,7 +97,6 @@ class RedundantWalking(AbstractSystem):
     `find_gait` tells its returns in minimal coordinates; by itself it is for `return_map`.
     """
 
-
     def vector_field(self, t: Time, y: LegsState, args: RedundantScene) -> LegsState:
         return redundant_field(t, y, args)
 
