@@ -5,6 +5,7 @@ section 10.2.2.
 """
 
 import enum
+from collections.abc import Callable
 from functools import partial
 from itertools import combinations
 from typing import NamedTuple
@@ -12,11 +13,18 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped.continuation._axis import Axis
-from jaxbiped.continuation._branch_point import BranchPoint, branch_point, multipliers_of
-from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, locate
+from jaxbiped.continuation._branch_point import (
+    BranchPoint,
+    branch_point,
+    multipliers_of,
+    witness_curve,
+)
+from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, correct, locate
 
 _REAL = 1e-9
 """Imaginary part up to which a multiplier counts as real."""
+_BESIDE = 1e-3
+"""Arclength to both sides of a bifurcation between which another curve's is looked for."""
 _AT = 1e-3
 """Distance from the unit circle that a located multiplier may have."""
 
@@ -57,12 +65,16 @@ class BifurcationPoint(NamedTuple):
         point: the gait there; at a limit the last before it.
         multiplier: the critical multiplier; at a limit the largest.
         error: its estimated error.
+        value_error: estimated error of the parameter's value, SI units: how far from there the
+            witness of the cycle, ten times looser, has the same; NaN where it has none nearby, and
+            at a limit.
     """
 
     kind: BranchEvent
     point: BranchPoint
     multiplier: complex
     error: float
+    value_error: float = float("nan")
 
     @property
     def value(self) -> float:
@@ -103,7 +115,7 @@ def bifurcations_between(
         # Where the parameter turns back it is a fold, and told by that more exactly.
         if turns and kind is BranchEvent.BRANCH_POINT:
             continue
-        test = _advance if kind is BranchEvent.FOLD else partial(_test_at, kind)
+        test = advance if kind is BranchEvent.FOLD else partial(_test_at, kind)
         place = locate(curve, here, there, test) if test(here) * test(there) < 0.0 else None
         if place is None:
             continue
@@ -111,11 +123,39 @@ def bifurcations_between(
         value, error, distance = critical_multiplier(kind, point)
         # Two real multipliers whose product is 1 cross nothing.
         if distance < _AT:
-            found.append((place, BifurcationPoint(kind, point, value, error)))
+            off = _value_error(curve, axis, place, test)
+            found.append((place, BifurcationPoint(kind, point, value, error, off)))
     return sorted(found, key=lambda each: float((each[0].place - here.place) @ here.tangent))
 
 
-def _advance(found: CurvePoint) -> float:
+def locate_near(
+    curve: Curve, place: np.ndarray, tangent: np.ndarray, test: Callable[[CurvePoint], float]
+) -> CurvePoint | None:
+    """Where a test function vanishes on a curve, between points on both sides of another's place.
+
+    None where the curve is lost, or the test function has one sign at both.
+    """
+    here, there = (
+        correct(curve, place + way * _BESIDE * tangent, tangent, tangent).found
+        for way in (-1.0, 1.0)
+    )
+    if here is None or there is None or test(here) * test(there) >= 0.0:
+        return None
+    return locate(curve, here, there, test)
+
+
+def _value_error(
+    curve: Curve, axis: Axis, place: CurvePoint, test: Callable[[CurvePoint], float]
+) -> float:
+    """By how much the witness of a cycle's error has a bifurcation elsewhere."""
+    other = locate_near(witness_curve(curve, axis), place.place, place.tangent, test)
+    if other is None:
+        return float("nan")
+    ends = [axis.value(float(each.place[-1])) for each in (place, other)]
+    return abs(ends[0] - ends[1])
+
+
+def advance(found: CurvePoint) -> float:
     """How the parameter advances along the curve."""
     return float(found.tangent[-1])
 

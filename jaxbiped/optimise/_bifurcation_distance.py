@@ -14,19 +14,21 @@ from jaxbiped._checks import check_choice
 from jaxbiped._types import as_float
 from jaxbiped.continuation._axis import Axis, axis_of, start_of
 from jaxbiped.continuation._bifurcation_sensitivities import fold_forcing
-from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
+from jaxbiped.continuation._bifurcations import (
+    BifurcationPoint,
+    BranchEvent,
+    advance,
+    locate_near,
+)
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
 from jaxbiped.continuation._nearest_bifurcation import range_of
 from jaxbiped.continuation._trace import LIMITS, Trace, trace
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import LOOSER
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, correct, locate
-from jaxbiped.optimise._jacobian_functionals import (
-    JACOBIAN_FUNCTIONALS,
-    LEADING,
-    jacobian_functionals,
-)
+from jaxbiped.gait._pseudo_arclength import CurvePoint
+from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
+from jaxbiped.optimise._jacobian_weights import MODULI
 from jaxbiped.scene._parameters import (
     parameter_names,
     parameter_values,
@@ -39,8 +41,6 @@ from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
 KINDS = (BranchEvent.FOLD, BranchEvent.PERIOD_DOUBLING)
 """Bifurcations whose distance is told."""
 _LARGEST_STEP, _MOST_POINTS = 0.02, 200
-_BESIDE = 1e-3
-"""Arclength to both sides of a fold between which it is located anew."""
 
 
 _ENDS = (*LIMITS, BranchEnd.REACHED, BranchEnd.CLOSED)
@@ -195,25 +195,13 @@ def _located_fold(setup: ContinuationSetup, event: BifurcationPoint) -> _Located
     for factor in (1.0, LOOSER):
         precision = Precision(*(factor * each for each in problem.precision))
         other = setup._replace(problem=problem._replace(precision=precision))
-        fold = _fold_near(other.curve, event)
+        fold = locate_near(other.curve, event.point.place, event.point.tangent, advance)
         slopes_there = None if fold is None else _fold_slopes(other, fold)
         if slopes_there is None:
             return None
         told.append(slopes_there)
     (value, slopes), (loose_value, loose_slopes) = told
     return _Located(value, abs(value - loose_value), slopes, np.abs(slopes - loose_slopes))
-
-
-def _fold_near(curve: Curve, event: BifurcationPoint) -> CurvePoint | None:
-    """The fold of a curve, between two points to both sides of where it was seen."""
-    place, tangent = event.point.place, event.point.tangent
-    here, there = (
-        correct(curve, place + way * _BESIDE * tangent, tangent, tangent).found
-        for way in (-1.0, 1.0)
-    )
-    if here is None or there is None or here.tangent[-1] * there.tangent[-1] >= 0.0:
-        return None
-    return locate(curve, here, there, lambda found: float(found.tangent[-1]))
 
 
 def _fold_slopes(setup: ContinuationSetup, fold: CurvePoint) -> tuple[float, np.ndarray] | None:
@@ -234,7 +222,7 @@ def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> _Loc
     told = jacobian_functionals(
         scene,
         setup.state_of(event.point.recurring),
-        JACOBIAN_FUNCTIONALS[:LEADING],
+        MODULI,
         footsteps=setup.footsteps,
         accuracy=setup.accuracy,
         engine=setup.problem.spec.engine,
@@ -246,8 +234,9 @@ def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> _Loc
     by_all = -slopes[which] / rate
     off = (slope_errors[which] + np.abs(by_all) * rate_error) / abs(rate)
     by_all[place] = off[place] = 0.0
-    value = event.value - (values[which] - 1.0) / rate
-    return _Located(float(value), float(errors[which] / abs(rate)), by_all, off)
+    move = -(values[which] - 1.0) / rate
+    error = (errors[which] + abs(move) * rate_error) / abs(rate)
+    return _Located(float(event.value + move), float(error), by_all, off)
 
 
 def _with(scene: Scene | RigidScene, axis: Axis, value: float) -> Scene | RigidScene:

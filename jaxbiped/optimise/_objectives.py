@@ -13,11 +13,8 @@ from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
-from jaxbiped.optimise._jacobian_functionals import (
-    JACOBIAN_FUNCTIONALS,
-    LEADING,
-    jacobian_functionals,
-)
+from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
+from jaxbiped.optimise._jacobian_weights import CLEARANCE_NORMS, MODULI
 from jaxbiped.scene._parameters import parameter_names, parameter_values
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -79,6 +76,15 @@ OBJECTIVES = {
     "radius_bound": Objective(Quantity("smooth bound of the spectral radius", "$\\rho_q$")),
     "sensitivity_norm": Objective(Quantity("gait sensitivity norm", "$\\|G\\|$")),
     "floor_sensitivity": Objective(Quantity("gait sensitivity norm to steps", "$\\|G_h\\|$")),
+    "clearance_sensitivity": Objective(
+        Quantity("sensitivity norm of clearance", "$\\|G_c\\|$"), _of_swing
+    ),
+    "floor_clearance_sensitivity": Objective(
+        Quantity("sensitivity norm of clearance to steps", "$\\|G_{hc}\\|$"), _of_swing
+    ),
+    "whole_sensitivity": Objective(
+        Quantity("gait sensitivity norm of all", "$\\|G_a\\|$"), _of_swing
+    ),
     "strike_divergence": Objective(
         Quantity("divergence of foot strike", "$\\ln|\\det S|$"), _of_strike
     ),
@@ -102,7 +108,8 @@ OBJECTIVES = {
 - foot clearance: least height of the swinging foot, negative where it passes underground.
 - radius bound: never below the spectral radius, and smooth also where multipliers meet or have
   equal moduli, where that has corners; see `jacobian_functionals`.
-- sensitivity norm, floor sensitivity, strike divergence: see `jacobian_functionals`.
+- sensitivity norm, floor sensitivity, their norms of clearance, strike divergence: see
+  `jacobian_functionals`; whole sensitivity: the root of the sum of squares of these four norms.
 - fold distance, doubling distance: to the nearest in slope, see `bifurcation_distance`. Where none
   lies in the range that is followed the distance is that of the range's farther end, without
   derivatives: more than that of any design that has one.
@@ -117,7 +124,9 @@ _DISTANCES = {
     "fold_distance": BranchEvent.FOLD,
     "doubling_distance": BranchEvent.PERIOD_DOUBLING,
 }
-CLUSTER = JACOBIAN_FUNCTIONALS[:LEADING]
+_WHOLE = ("sensitivity_norm", "floor_sensitivity", *CLEARANCE_NORMS)
+"""What the whole sensitivity is made of: step length, step time and clearance, by both."""
+CLUSTER = MODULI
 """What is evaluated for the spectral radius: it, and the next moduli."""
 
 
@@ -156,10 +165,12 @@ def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective
 
 def functionals_for(wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
     """Which functionals of the Jacobian these measures need, and whether those of the cycle."""
-    of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in wanted)
+    needed = {*wanted, *(_WHOLE if "whole_sensitivity" in wanted else ())}
+    of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in needed)
     if "spectral_radius" in wanted:
         of_jacobian = (*CLUSTER, *(name for name in of_jacobian if name not in CLUSTER))
-    return of_jacobian, bool(set(wanted) - set(of_jacobian) - set(_OF_THE_GAIT) - set(_DISTANCES))
+    others = {*of_jacobian, *_OF_THE_GAIT, *_DISTANCES, "whole_sensitivity"}
+    return of_jacobian, bool(set(wanted) - others)
 
 
 def evaluate(
@@ -188,6 +199,8 @@ def evaluate(
             name: row._replace(error=max(row.error, abs(row.value) * float(shares[0])))
             for name, row in zip(of_jacobian, _rows_of(first), strict=True)
         }
+    if "whole_sensitivity" in wanted:
+        rows["whole_sensitivity"] = _root_of_squares([rows[name] for name in _WHOLE])
     if of_cycle:
         second = second or cycle_functionals(
             scene, state, footsteps=steps, accuracy=accuracy, engine=engine
@@ -235,6 +248,17 @@ def _rows_of(found: object) -> list[_Row]:
         _Row(float(values[k]), float(errors[k]), parts[0][k], parts[1][k])
         for k in range(len(values))
     ]
+
+
+def _root_of_squares(rows: list[_Row]) -> _Row:
+    value = float(np.sqrt(sum(row.value**2 for row in rows)))
+    shares = [row.value / value for row in rows]
+    each = list(zip(shares, rows, strict=True))
+    slopes, slope_errors = (
+        np.asarray(sum(share * getattr(row, name) for share, row in each))
+        for name in ("slopes", "slope_errors")
+    )
+    return _Row(value, sum(share * row.error for share, row in each), slopes, slope_errors)
 
 
 def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, _Row]) -> _Row:
