@@ -167,6 +167,7 @@ def optimum_numbers(found: Optimum, certificate: Certificate, goal: str, sense: 
         "history": [each._asdict() for each in found.history],
         "evaluations": found.evaluations,
         "lost": found.lost,
+        "unmeasured": found.unmeasured,
         "certificate": certificate_numbers(certificate),
     }
     checked: JsonObject = finite(numbers)
@@ -176,9 +177,8 @@ def optimum_numbers(found: Optimum, certificate: Certificate, goal: str, sense: 
 def certificate_numbers(certificate: Certificate) -> JsonObject:
     """A certificate, ready for JSON."""
     told = certificate.optimality
-    norm, norm_error = certificate.sensitivity_norm
-    basin, walk, other = certificate.basin, certificate.walk, certificate.other_engine
-    push = certificate.fatal_push
+    basin, walk = certificate.basin, certificate.walk
+    other, push = certificate.other_engine, certificate.fatal_push
     return {
         "kkt_residual": told.residual,
         "kkt_residual_error": told.error,
@@ -189,7 +189,9 @@ def certificate_numbers(certificate: Certificate) -> JsonObject:
         "multiplier_errors": np.asarray(certificate.multiplier_errors).tolist(),
         "unit_multiplier_error": certificate.unit_multiplier_error,
         "stable": certificate.stable,
-        "sensitivity_norm": {"value": norm, "error": norm_error},
+        "sensitivity_norm": dict(
+            zip(("value", "error"), certificate.sensitivity_norm, strict=True)
+        ),
         "basin": None if basin is None else dataclasses.asdict(basin),
         "fatal_push": push and {"distance": push.distance, "push": push.push.tolist()},
         "walk": None if walk is None else walk._asdict(),

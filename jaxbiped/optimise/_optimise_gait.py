@@ -51,7 +51,8 @@ class Optimum(NamedTuple):
         optimality: what the conditions of optimality say.
         history: every iterate, of all runs one behind the other.
         evaluations: designs whose gait was found.
-        lost: how often none was.
+        lost: how often none was, or a measure of it was not finite.
+        unmeasured: gaits of the latter kind.
     """
 
     outcome: Outcome
@@ -66,6 +67,7 @@ class Optimum(NamedTuple):
     history: list[Iteration]
     evaluations: int
     lost: int
+    unmeasured: int
 
     def __repr__(self) -> str:
         variables = ", ".join(f"{name}={value:.6g}" for name, value in self.variables.items())
@@ -278,4 +280,5 @@ def _optimum(problem: DesignProblem, runs: Runs) -> Optimum:
         history=runs.history,
         evaluations=problem.evaluations.count,
         lost=problem.lost,
+        unmeasured=problem.unmeasured,
     )
