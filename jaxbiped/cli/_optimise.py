@@ -176,7 +176,7 @@ def optimum_numbers(found: Optimum, certificate: Certificate, goal: str, sense: 
 
 def certificate_numbers(certificate: Certificate) -> JsonObject:
     """A certificate, ready for JSON."""
-    told = certificate.optimality
+    told, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
     basin, walk = certificate.basin, certificate.walk
     other, push = certificate.other_engine, certificate.fatal_push
     return {
@@ -189,9 +189,7 @@ def certificate_numbers(certificate: Certificate) -> JsonObject:
         "multiplier_errors": np.asarray(certificate.multiplier_errors).tolist(),
         "unit_multiplier_error": certificate.unit_multiplier_error,
         "stable": certificate.stable,
-        "sensitivity_norm": dict(
-            zip(("value", "error"), certificate.sensitivity_norm, strict=True)
-        ),
+        "sensitivity_norm": {"value": norm, "error": norm_error},
         "basin": None if basin is None else dataclasses.asdict(basin),
         "fatal_push": push and {"distance": push.distance, "push": push.push.tolist()},
         "walk": None if walk is None else walk._asdict(),
