@@ -66,8 +66,9 @@ class BifurcationPoint(NamedTuple):
         multiplier: the critical multiplier; at a limit the largest.
         error: its estimated error.
         value_error: estimated error of the parameter's value, SI units: how far from there the
-            witness of the cycle, ten times looser, has the same; NaN where it has none nearby, and
-            at a limit.
+            witness of the cycle, ten times looser, has the same, and at least what the errors of
+            the critical multiplier nearby make of it; NaN at a limit, and at a fold where the
+            witness has none nearby.
     """
 
     kind: BranchEvent
@@ -123,7 +124,10 @@ def bifurcations_between(
         value, error, distance = critical_multiplier(kind, point)
         # Two real multipliers whose product is 1 cross nothing.
         if distance < _AT:
-            off = _value_error(curve, axis, place, test)
+            off = _witness_shift(curve, axis, place, test)
+            if kind is not BranchEvent.FOLD:
+                ends = [branch_point(curve, axis, each) for each in (here, there)]
+                off = _with_multiplier_errors(off, kind, point, ends)
             found.append((place, BifurcationPoint(kind, point, value, error, off)))
     return sorted(found, key=lambda each: float((each[0].place - here.place) @ here.tangent))
 
@@ -144,7 +148,7 @@ def locate_near(
     return locate(curve, here, there, test)
 
 
-def _value_error(
+def _witness_shift(
     curve: Curve, axis: Axis, place: CurvePoint, test: Callable[[CurvePoint], float]
 ) -> float:
     """By how much the witness of a cycle's error has a bifurcation elsewhere."""
@@ -153,6 +157,24 @@ def _value_error(
         return float("nan")
     ends = [axis.value(float(each.place[-1])) for each in (place, other)]
     return abs(ends[0] - ends[1])
+
+
+def _with_multiplier_errors(
+    shift: float, kind: BranchEvent, point: BranchPoint, ends: list[BranchPoint]
+) -> float:
+    """Error of a value at which a multiplier is critical.
+
+    The witness's shift may be small by chance: errors of the multiplier at the point and on both
+    sides of it are carried over by its rate, and what it misses the circle by at the point.
+    """
+    (first, *_), (last, *_) = told = [critical_multiplier(kind, each) for each in ends]
+    value, error, distance = critical_multiplier(kind, point)
+    change = abs(last) - abs(first) if value.imag != 0.0 else abs(last - first)
+    along = ends[1].value - ends[0].value
+    if change == 0.0 or along == 0.0:
+        return shift
+    largest = max(error, *(each[1] for each in told))
+    return float(np.nanmax([shift, abs(along / change) * largest])) + abs(along / change) * distance
 
 
 def advance(found: CurvePoint) -> float:
