@@ -38,6 +38,7 @@ NOISY = {
     "spectral_radius": (3e-3, 3e-5),
     "radius_bound": (1e-3, 1e-4),
     "floor_sensitivity": (1e-2, 1e-5),
+    "clearance_sensitivity": (1e-2, 1e-5),
     "floor_clearance_sensitivity": (1e-2, 1e-5),
     "whole_sensitivity": (1e-2, 1e-5),
     "slip_distance": (1e-2, 1e-5),
