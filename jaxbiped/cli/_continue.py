@@ -1,5 +1,6 @@
 """`jaxbiped continue`: follow the periodic gait along a parameter and print its bifurcations."""
 
+import math
 import time
 from pathlib import Path
 
@@ -64,6 +65,7 @@ def branch_numbers(branch: Branch) -> JsonObject:
                 "value": each.value,
                 "multiplier": [each.multiplier.real, each.multiplier.imag],
                 "error": each.error,
+                "value_error": None if math.isnan(each.value_error) else each.value_error,
             }
             for each in branch.bifurcations
         ],
@@ -127,9 +129,15 @@ def _print(report: Report, branch: Branch, wall: dict[str, float]) -> None:
 
 
 def _event_table(branch: Branch, events: tuple[BifurcationPoint, ...]) -> str:
-    head = ("bifurcation", _with_unit(branch), "multiplier", "error")
+    head = ("bifurcation", _with_unit(branch), "error", "multiplier", "error")
     rows = [
-        (str(each.kind), f"{each.value:.10g}", _complex(each), f"{each.error:.1e}")
+        (
+            str(each.kind),
+            f"{each.value:.10g}",
+            "–" if math.isnan(each.value_error) else f"{each.value_error:.1e}",
+            _complex(each),
+            f"{each.error:.1e}",
+        )
         for each in events
     ]
     return table(head, rows, most=_MOST_ROWS)

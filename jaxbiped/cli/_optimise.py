@@ -63,7 +63,8 @@ def run(options: Optimise) -> int:
     report = Report(options.json)
     _print(report, scene, found, certificate, goal)
     report.finish(numbers)
-    return 0 if found.outcome in (Outcome.CONVERGED, Outcome.CORNER) else 1
+    ended = (Outcome.CONVERGED, Outcome.CORNER, Outcome.BEYOND_RANGE)
+    return 0 if found.outcome in ended else 1
 
 
 def _bounds(scene: Scene | RigidScene, text: str) -> dict[str, tuple[float, float]]:
@@ -106,12 +107,17 @@ def optimum_numbers(found: Optimum, certificate: Certificate, goal: str, sense: 
             "unit": OBJECTIVES[goal].quantity.unit,
         },
         "measures": {
-            name: {"value": value, "error": found.known.errors[name]}
+            name: {
+                "value": value,
+                "error": found.known.errors[name],
+                "beyond_range": name in found.known.beyond_range,
+            }
             for name, value in found.known.values.items()
         },
         "history": [each._asdict() for each in found.history],
         "evaluations": found.evaluations,
         "lost": found.lost,
+        "unmeasured": found.unmeasured,
         "certificate": certificate_numbers(certificate),
     }
     checked: JsonObject = finite(numbers)
@@ -120,10 +126,9 @@ def optimum_numbers(found: Optimum, certificate: Certificate, goal: str, sense: 
 
 def certificate_numbers(certificate: Certificate) -> JsonObject:
     """A certificate, ready for JSON."""
-    told = certificate.optimality
-    norm, norm_error = certificate.sensitivity_norm
-    basin, walk, other = certificate.basin, certificate.walk, certificate.other_engine
-    push = certificate.fatal_push
+    told, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
+    basin, walk = certificate.basin, certificate.walk
+    other, push = certificate.other_engine, certificate.fatal_push
     return {
         "kkt_residual": told.residual,
         "kkt_residual_error": told.error,
@@ -172,8 +177,7 @@ def _print(
         (
             name,
             f"{first[name]:.6g}" if name in first else "–",
-            f"{value:.6g}",
-            f"{found.known.errors[name]:.1e}",
+            *_told(found, name, value),
             OBJECTIVES[name].quantity.unit_in_text,
         )
         for name, value in found.known.values.items()
@@ -187,6 +191,13 @@ def _print(
     )
     for line in _certificate_lines(certificate):
         report.say(line)
+
+
+def _told(found: Optimum, name: str, value: float) -> tuple[str, str]:
+    """A measure and its error, or more than what a range holds."""
+    if name in found.known.beyond_range:
+        return f"> {value:.6g}", "–"
+    return f"{value:.6g}", f"{found.known.errors[name]:.1e}"
 
 
 def _bifurcation_line(nearest: NearestBifurcation) -> str:

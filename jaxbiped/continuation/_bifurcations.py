@@ -5,6 +5,7 @@ section 10.2.2.
 """
 
 import enum
+from collections.abc import Callable
 from functools import partial
 from itertools import combinations
 from typing import NamedTuple
@@ -12,11 +13,18 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped.continuation._axis import Axis
-from jaxbiped.continuation._branch_point import BranchPoint, branch_point, multipliers_of
-from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, locate
+from jaxbiped.continuation._branch_point import (
+    BranchPoint,
+    branch_point,
+    multipliers_of,
+    witness_curve,
+)
+from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, correct, locate
 
 _REAL = 1e-9
 """Imaginary part up to which a multiplier counts as real."""
+_BESIDE = 1e-3
+"""Arclength to both sides of a bifurcation between which another curve's is looked for."""
 _AT = 1e-3
 """Distance from the unit circle that a located multiplier may have."""
 
@@ -57,12 +65,17 @@ class BifurcationPoint(NamedTuple):
         point: the gait there; at a limit the last before it.
         multiplier: the critical multiplier; at a limit the largest.
         error: its estimated error.
+        value_error: estimated error of the parameter's value, SI units: how far from there the
+            witness of the cycle, ten times looser, has the same, and at least what the errors of
+            the critical multiplier nearby make of it; NaN at a limit, and at a fold where the
+            witness has none nearby.
     """
 
     kind: BranchEvent
     point: BranchPoint
     multiplier: complex
     error: float
+    value_error: float = float("nan")
 
     @property
     def value(self) -> float:
@@ -103,7 +116,7 @@ def bifurcations_between(
         # Where the parameter turns back it is a fold, and told by that more exactly.
         if turns and kind is BranchEvent.BRANCH_POINT:
             continue
-        test = _advance if kind is BranchEvent.FOLD else partial(_test_at, kind)
+        test = advance if kind is BranchEvent.FOLD else partial(_test_at, kind)
         place = locate(curve, here, there, test) if test(here) * test(there) < 0.0 else None
         if place is None:
             continue
@@ -111,11 +124,60 @@ def bifurcations_between(
         value, error, distance = critical_multiplier(kind, point)
         # Two real multipliers whose product is 1 cross nothing.
         if distance < _AT:
-            found.append((place, BifurcationPoint(kind, point, value, error)))
+            off = _witness_shift(curve, axis, place, test)
+            if kind is not BranchEvent.FOLD:
+                ends = [branch_point(curve, axis, each) for each in (here, there)]
+                off = _with_multiplier_errors(off, kind, point, ends)
+            found.append((place, BifurcationPoint(kind, point, value, error, off)))
     return sorted(found, key=lambda each: float((each[0].place - here.place) @ here.tangent))
 
 
-def _advance(found: CurvePoint) -> float:
+def locate_near(
+    curve: Curve, place: np.ndarray, tangent: np.ndarray, test: Callable[[CurvePoint], float]
+) -> CurvePoint | None:
+    """Where a test function vanishes on a curve, between points on both sides of another's place.
+
+    None where the curve is lost, or the test function has one sign at both.
+    """
+    here, there = (
+        correct(curve, place + way * _BESIDE * tangent, tangent, tangent).found
+        for way in (-1.0, 1.0)
+    )
+    if here is None or there is None or test(here) * test(there) >= 0.0:
+        return None
+    return locate(curve, here, there, test)
+
+
+def _witness_shift(
+    curve: Curve, axis: Axis, place: CurvePoint, test: Callable[[CurvePoint], float]
+) -> float:
+    """By how much the witness of a cycle's error has a bifurcation elsewhere."""
+    other = locate_near(witness_curve(curve, axis), place.place, place.tangent, test)
+    if other is None:
+        return float("nan")
+    ends = [axis.value(float(each.place[-1])) for each in (place, other)]
+    return abs(ends[0] - ends[1])
+
+
+def _with_multiplier_errors(
+    shift: float, kind: BranchEvent, point: BranchPoint, ends: list[BranchPoint]
+) -> float:
+    """Error of a value at which a multiplier is critical.
+
+    The witness's shift may be small by chance: errors of the multiplier at the point and on both
+    sides of it are carried over by its rate, and what it misses the circle by at the point.
+    """
+    (first, *_), (last, *_) = told = [critical_multiplier(kind, each) for each in ends]
+    value, error, distance = critical_multiplier(kind, point)
+    change = abs(last) - abs(first) if value.imag != 0.0 else abs(last - first)
+    along = ends[1].value - ends[0].value
+    if change == 0.0 or along == 0.0:
+        return shift
+    largest = max(error, *(each[1] for each in told))
+    return float(np.nanmax([shift, abs(along / change) * largest])) + abs(along / change) * distance
+
+
+def advance(found: CurvePoint) -> float:
     """How the parameter advances along the curve."""
     return float(found.tangent[-1])
 

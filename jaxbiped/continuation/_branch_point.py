@@ -79,6 +79,16 @@ def gait_curve(problem: CycleProblem, axis: Axis, footsteps: int) -> Curve:
     return Curve(change, sizes, _CONVERGED * float(problem.precision.rtol))
 
 
+def witness_curve(curve: Curve, axis: Axis) -> Curve:
+    """The same gaits as the witness of each cycle's error has them."""
+
+    def change(point: np.ndarray, s: float) -> Change:
+        seen: Cycle = curve.change(point, s).seen
+        return change_of(Cycle(*(leaf[::-1] for leaf in seen)), point, axis.slope(s))
+
+    return curve._replace(change=change)
+
+
 def change_of(seen: Cycle, point: np.ndarray, slope: float) -> Change:
     """What a cycle changes in the point that it began at."""
     m, jacobian = len(point), np.asarray(seen.jacobian[0])

@@ -37,6 +37,19 @@ class NearestBifurcation(NamedTuple):
     error: float
 
 
+def range_of(along: str, own: float, factor: float = FACTOR) -> tuple[float, float]:
+    """The range in which a gait is followed from a parameter's own value.
+
+    Raises:
+        ArgumentError: a parameter other than the slope that is zero.
+    """
+    if own != 0.0:
+        return own / factor, own * factor
+    if along != "slope":
+        raise ArgumentError(f"along = {along!r} is not allowed where {along} is 0: no factor fits.")
+    return -STEEPEST, STEEPEST
+
+
 def nearest_bifurcation(
     scene: Scene | RigidScene, gait: Gait, along: str = "slope", *, factor: float = FACTOR
 ) -> NearestBifurcation:
@@ -58,13 +71,10 @@ def nearest_bifurcation(
     """
     check_choice("along", along, parameter_names(scene))
     own = float(parameter_values(scene)[along])
-    level = own == 0.0 and along == "slope"
-    if own == 0.0 and not level:
-        raise ArgumentError(f"along = {along!r} is not allowed where {along} is 0: no factor fits.")
     if not factor > 1.0:
         raise ArgumentError(f"factor = {factor!r} is not allowed: it must be above 1.")
+    bounds, level = range_of(along, own, factor), own == 0.0
     steps = gait.orbit[0].shape[0]
-    bounds = (-STEEPEST, STEEPEST) if level else (own / factor, own * factor)
     branch = continue_gait(scene, along, bounds=bounds, guess=gait, footsteps=steps)
     seen = [each for each in branch.bifurcations if level or each.value / own > 0.0]
     if not seen:

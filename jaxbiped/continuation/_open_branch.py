@@ -53,13 +53,16 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
     state_type = _STATES[settings["state_type"]]
     special = _points(dataset, state_type, settings["along"], "event_")
     events = [
-        BifurcationPoint(EVENTS[int(kind)], point, complex(real, imaginary), float(error))
-        for kind, point, real, imaginary, error in zip(
+        BifurcationPoint(
+            EVENTS[int(kind)], point, complex(real, imaginary), float(error), float(value_error)
+        )
+        for kind, point, real, imaginary, error, value_error in zip(
             dataset["event_kind"].values,
             special,
             dataset["event_multiplier_real"].values,
             dataset["event_multiplier_imag"].values,
             dataset["event_error"].values,
+            dataset["event_value_error"].values,
             strict=True,
         )
     ]

@@ -82,7 +82,7 @@ def orbit_of(
     errors = jax.tree.map(lambda a, b: jnp.abs(a - b), slopes, looser)
     _, sizes = seed_directions(args, active, m)
     radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
-    if _second_derivatives(spec, active, radius):
+    if radius and active:
         # Lanes take both at once; XLA would compute in lockstep.
         each_of = jax.vmap if spec.engine == "lanes" else _map_over_rows
         radius_slopes, looser_slopes = each_of(
@@ -90,12 +90,6 @@ def orbit_of(
         )(found.both)
         radius_errors = jnp.abs(radius_slopes - looser_slopes)
     return Orbit(found, state, stability, slopes, errors, radius_slopes, radius_errors, sizes)
-
-
-def _second_derivatives(spec: ReturnMapSpec, active: tuple[int, ...], radius: bool) -> bool:
-    """Whether second derivatives are wanted and can be had."""
-    differentiable = spec.steps == 1 or spec.system.reset_is_symmetry
-    return radius and bool(active) and differentiable
 
 
 def slopes_of(last: LinearisedReturn) -> Slopes:

@@ -16,6 +16,7 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.variational._adjoint_solve import carry_tangents, pull_back
 from jaxbiped.variational._adjoint_step import Adjoints
 from jaxbiped.variational._flow import Flow
+from jaxbiped.variational._section_tangents import tangent_on_section
 from jaxbiped.variational._tangents import Seeded, active_leaves
 
 
@@ -63,21 +64,22 @@ def second_variation(
         arrived, steps = carry_tangents(engine, flow, nodes, along)
         carried.append((nodes, arrived, steps))
         if k + 1 < spec.steps:
-            before = flow.earlier(nodes.arrival, parameters)[1:]
-            along = _after_reset(flow, before, parameters, arrived.leading)
+            along = _behind_arrival(flow, nodes.arrival, parameters, arrived.leading)
     if weights.shape[1] != c:
         weights = jnp.zeros((len(weights), c)).at[:, places].set(weights)
     adjoints = Adjoints(weights, jnp.zeros(c), jnp.zeros(p))
-    for k, (nodes, arrived, steps) in reversed(list(enumerate(carried))):
-        final = k + 1 == spec.steps
-        adjoints = pull_back(engine, flow, nodes, arrived, steps, adjoints, final=final)
+    for nodes, arrived, steps in reversed(carried):
+        adjoints = pull_back(engine, flow, nodes, arrived, steps, adjoints)
     return adjoints.family[places] @ tangents + adjoints.parameters * sizes
 
 
-def _after_reset(flow: Flow, state: Scalar, parameters: Scalar, leading: Scalar) -> Scalar:
-    """Leading tangents (v, c) behind the reset of an arrival at a fixed time."""
+def _behind_arrival(flow: Flow, arrival: Scalar, parameters: Scalar, leading: Scalar) -> Scalar:
+    """Leading tangents (v, c) on the section, behind the reset: maps from arrival to arrival are
+    composed, so that the reset need be no symmetry of the motion."""
+    z = jnp.concatenate([flow.earlier(arrival, parameters)[1:], parameters])
 
-    def reset(state: Scalar) -> Scalar:
-        return flow.reset(jnp.concatenate([state, parameters]))
+    def behind(tangent: Scalar) -> Scalar:
+        along = jnp.concatenate([tangent, jnp.zeros_like(parameters)])
+        return jax.jvp(flow.reset, (z,), (tangent_on_section(flow, z, along),))[1]
 
-    return jax.vmap(lambda tangent: jax.jvp(reset, (state,), (tangent,))[1])(leading)
+    return jax.vmap(behind)(leading)

@@ -3,6 +3,7 @@
 from jaxbiped.optimise._bifurcation_distance import (
     BifurcationDistance as BifurcationDistance,
 )
+from jaxbiped.optimise._bifurcation_distance import Sought as Sought
 from jaxbiped.optimise._bifurcation_distance import bifurcation_distance as bifurcation_distance
 from jaxbiped.optimise._certificate import Certificate as Certificate
 from jaxbiped.optimise._certificate import certify as certify

@@ -4,27 +4,31 @@ Its derivatives are those of the bifurcation's value, at a fold as `bifurcation_
 them; at a doubling the modulus that is 1 is held, whichever it is among the leading ones.
 """
 
+import enum
 from typing import NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._checks import check_choice
 from jaxbiped._types import as_float
 from jaxbiped.continuation._axis import Axis, axis_of, start_of
 from jaxbiped.continuation._bifurcation_sensitivities import fold_forcing
-from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
+from jaxbiped.continuation._bifurcations import (
+    BifurcationPoint,
+    BranchEvent,
+    advance,
+    locate_near,
+)
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
-from jaxbiped.continuation._nearest_bifurcation import FACTOR, STEEPEST
-from jaxbiped.continuation._trace import trace
+from jaxbiped.continuation._nearest_bifurcation import range_of
+from jaxbiped.continuation._trace import LIMITS, Trace, trace
+from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import LOOSER
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, correct, locate
-from jaxbiped.optimise._jacobian_functionals import (
-    JACOBIAN_FUNCTIONALS,
-    LEADING,
-    jacobian_functionals,
-)
+from jaxbiped.gait._pseudo_arclength import CurvePoint
+from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
+from jaxbiped.optimise._jacobian_weights import MODULI
 from jaxbiped.scene._parameters import (
     parameter_names,
     parameter_values,
@@ -37,8 +41,24 @@ from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
 KINDS = (BranchEvent.FOLD, BranchEvent.PERIOD_DOUBLING)
 """Bifurcations whose distance is told."""
 _LARGEST_STEP, _MOST_POINTS = 0.02, 200
-_BESIDE = 1e-3
-"""Arclength to both sides of a fold between which it is located anew."""
+
+
+_ENDS = (*LIMITS, BranchEnd.REACHED, BranchEnd.CLOSED)
+"""Ends of a branch that was followed as far as it goes, or to the end of the range."""
+
+
+class Sought(enum.StrEnum):
+    """What came of following a gait's branch to a bifurcation.
+
+    - met: it lies in the range that is followed.
+    - none in range: the branch was followed to the ends of the range, or to its own before them.
+    - unknown: neither; the gait was not found again, or the bifurcation, or the points that a
+      branch may have were used up.
+    """
+
+    MET = "met"
+    NONE_IN_RANGE = "none in range"
+    UNKNOWN = "unknown"
 
 
 class BifurcationDistance(NamedTuple):
@@ -46,21 +66,26 @@ class BifurcationDistance(NamedTuple):
 
     Attributes:
         along: name of that parameter.
-        value: of the parameter at the bifurcation, SI units; NaN, as all else, where none was met.
-        distance: of that from the gait's own value, never negative; of both ways the smaller.
+        outcome: whether one was met; NaN is all that it leaves open.
+        value: of the parameter at the bifurcation, SI units.
+        distance: of that from the gait's own value, never negative; of both ways the smaller. Where
+            none lies in the range, that of the range's farther end, and no derivatives.
         error: estimated, of both.
         value_slopes: derivatives of `value` with respect to the parameters, shape (p,).
         slopes: of `distance`, shape (p,).
         slope_errors: estimated, of both, shape (p,).
+        bounds: the range that was to be followed, (low, high), SI units.
     """
 
     along: str
+    outcome: Sought
     value: float
     distance: float
     error: float
     value_slopes: np.ndarray
     slopes: np.ndarray
     slope_errors: np.ndarray
+    bounds: tuple[float, float]
 
 
 def bifurcation_distance(
@@ -83,7 +108,8 @@ def bifurcation_distance(
 
     Returns:
         The distance to the nearer of both, with respect to all parameters in the order of
-        `parameter_names`; errors are what ten times looser solves change.
+        `parameter_names`; errors are what ten times looser solves change. Its `outcome` tells
+        where there is none.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled; a parameter
@@ -93,40 +119,45 @@ def bifurcation_distance(
     check_choice("along", along, parameter_names(scene))
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     own = float(parameter_values(scene)[along])
-    if own == 0.0 and along != "slope":
-        raise ArgumentError(f"along = {along!r} is not allowed where {along} is 0: no factor fits.")
-    bounds = (own / FACTOR, own * FACTOR) if own != 0.0 else (-STEEPEST, STEEPEST)
+    bounds = range_of(along, own)
     axis = axis_of(scene, along, bounds, None)
     steps = int(gait.orbit[0].shape[0])
     setup = continuation_setup(scene, axis, footsteps=steps, accuracy=accuracy, engine=gait.engine)
-    event = _nearest(setup, gait, BranchEvent(kind))
+    parts = _both_ways(setup, gait, BranchEvent(kind))
+    event = _nearest(parts, BranchEvent(kind), own)
     located = None if event is None else _located(setup, event)
     if located is None:
-        none = np.full(len(parameter_names(scene)), np.nan)
-        return BifurcationDistance(along, np.nan, np.nan, np.nan, none, none, none)
+        none, nowhere = np.nan, np.full(len(parameter_names(scene)), np.nan)
+        outcome, distance = Sought.UNKNOWN, none
+        if event is None and parts and all(part.stop.end in _ENDS for part in parts):
+            outcome, distance = Sought.NONE_IN_RANGE, max(abs(end - own) for end in bounds)
+        return BifurcationDistance(
+            along, outcome, none, distance, none, nowhere, nowhere, nowhere, bounds
+        )
     way = 1.0 if located.value > own else -1.0
     slopes = way * located.slopes
     slopes[parameter_names(scene).index(along)] -= way
     return BifurcationDistance(
         along=along,
+        outcome=Sought.MET,
         value=located.value,
         distance=abs(located.value - own),
         error=located.error,
         value_slopes=located.slopes,
         slopes=slopes,
         slope_errors=located.slope_errors,
+        bounds=bounds,
     )
 
 
-def _nearest(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> BifurcationPoint | None:
-    """Of the first bifurcations of a kind in both ways the nearer."""
+def _both_ways(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> list[Trace]:
+    """The branch down and up to its first bifurcation of a kind; empty where the gait is lost."""
     own = start_of(setup.scene, setup.axis)
     begin = setup.at_value(setup.recurring(gait.measures.state), own).found
     if begin is None:
-        return None
-    found = []
-    for way in (-1.0, 1.0):
-        part = trace(
+        return []
+    return [
+        trace(
             setup.curve,
             setup.axis,
             begin._replace(tangent=way * begin.tangent),
@@ -134,7 +165,13 @@ def _nearest(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> Bifurca
             max_points=_MOST_POINTS,
             until=kind,
         )
-        found += [each for each in part.bifurcations if each.kind is kind]
+        for way in (-1.0, 1.0)
+    ]
+
+
+def _nearest(parts: list[Trace], kind: BranchEvent, own: float) -> BifurcationPoint | None:
+    """Of the bifurcations of a kind in both ways the nearer."""
+    found = [each for part in parts for each in part.bifurcations if each.kind is kind]
     return min(found, key=lambda each: abs(each.value - own), default=None)
 
 
@@ -158,25 +195,13 @@ def _located_fold(setup: ContinuationSetup, event: BifurcationPoint) -> _Located
     for factor in (1.0, LOOSER):
         precision = Precision(*(factor * each for each in problem.precision))
         other = setup._replace(problem=problem._replace(precision=precision))
-        fold = _fold_near(other.curve, event)
+        fold = locate_near(other.curve, event.point.place, event.point.tangent, advance)
         slopes_there = None if fold is None else _fold_slopes(other, fold)
         if slopes_there is None:
             return None
         told.append(slopes_there)
     (value, slopes), (loose_value, loose_slopes) = told
     return _Located(value, abs(value - loose_value), slopes, np.abs(slopes - loose_slopes))
-
-
-def _fold_near(curve: Curve, event: BifurcationPoint) -> CurvePoint | None:
-    """The fold of a curve, between two points to both sides of where it was seen."""
-    place, tangent = event.point.place, event.point.tangent
-    here, there = (
-        correct(curve, place + way * _BESIDE * tangent, tangent, tangent).found
-        for way in (-1.0, 1.0)
-    )
-    if here is None or there is None or here.tangent[-1] * there.tangent[-1] >= 0.0:
-        return None
-    return locate(curve, here, there, lambda found: float(found.tangent[-1]))
 
 
 def _fold_slopes(setup: ContinuationSetup, fold: CurvePoint) -> tuple[float, np.ndarray] | None:
@@ -197,7 +222,7 @@ def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> _Loc
     told = jacobian_functionals(
         scene,
         setup.state_of(event.point.recurring),
-        JACOBIAN_FUNCTIONALS[:LEADING],
+        MODULI,
         footsteps=setup.footsteps,
         accuracy=setup.accuracy,
         engine=setup.problem.spec.engine,
@@ -209,8 +234,9 @@ def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> _Loc
     by_all = -slopes[which] / rate
     off = (slope_errors[which] + np.abs(by_all) * rate_error) / abs(rate)
     by_all[place] = off[place] = 0.0
-    value = event.value - (values[which] - 1.0) / rate
-    return _Located(float(value), float(errors[which] / abs(rate)), by_all, off)
+    move = -(values[which] - 1.0) / rate
+    error = (errors[which] + abs(move) * rate_error) / abs(rate)
+    return _Located(float(event.value + move), float(error), by_all, off)
 
 
 def _with(scene: Scene | RigidScene, axis: Axis, value: float) -> Scene | RigidScene:

@@ -60,8 +60,6 @@ class AbstractIntegrals(AbstractSystem):
 class AbstractWalkingIntegrals(AbstractIntegrals):
     """`Walking` with its integrals; its load is the depth of a foot that swings [m]."""
 
-    reset_is_symmetry: ClassVar[bool] = True
-
     def vector_field(self, t: Time, y: PyTree, args: Scene) -> PyTree:
         state = motion_of(y)
         power = powers(args, state)

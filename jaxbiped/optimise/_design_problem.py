@@ -52,7 +52,8 @@ class DesignProblem:
         evaluations: of all designs so far.
         ensemble: over whose members measures are taken; None for the design alone.
         latest: the last design whose gait was found; `asked` all of them, in order.
-        lost: how often a design had none.
+        lost: how often a design had none, or no measure of it.
+        unmeasured: gaits that were found and have a measure that is not finite.
     """
 
     def __init__(
@@ -73,7 +74,7 @@ class DesignProblem:
         self.wanted = tuple(dict.fromkeys((*told, *(each.name for each in requirements))))
         self.latest: Design | None = None
         self.asked: list[Design] = []
-        self.lost = 0
+        self.lost = self.unmeasured = 0
 
     def begin(self, u: np.ndarray) -> Design:
         """The first design; its gait is found from nothing, or followed from the scene's own.
@@ -191,6 +192,7 @@ class DesignProblem:
                 return None
             known = members
         if not all(np.isfinite(known.values[name]) for name in self.wanted):
+            self.unmeasured += 1
             return None
         self.evaluations.add(u, known)
         return known

@@ -171,4 +171,7 @@ def _together(ensemble: Ensemble, nominal: Evaluation, each: list[Evaluation]) -
         errors={name: number(name, "errors") for name in chosen},
         slopes={name: row(name, "slopes") for name in chosen},
         slope_errors={name: row(name, "slope_errors") for name in chosen},
+        beyond_range=tuple(
+            name for name in chosen if any(name in known.beyond_range for known in chosen[name])
+        ),
     )

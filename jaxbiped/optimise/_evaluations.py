@@ -110,4 +110,4 @@ def _evaluation(told: JsonObject) -> Evaluation:
         told[name] = {key: np.asarray(value) for key, value in told[name].items()}
     for name in ("state", "state_slopes"):
         told[name] = np.asarray(told[name])
-    return Evaluation(**told)
+    return Evaluation(**told | {"beyond_range": tuple(told.get("beyond_range", ()))})

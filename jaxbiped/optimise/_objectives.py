@@ -11,13 +11,10 @@ from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._bifurcation_distance import bifurcation_distance
+from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
-from jaxbiped.optimise._jacobian_functionals import (
-    JACOBIAN_FUNCTIONALS,
-    LEADING,
-    jacobian_functionals,
-)
+from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
+from jaxbiped.optimise._jacobian_weights import CLEARANCE_NORMS, MODULI
 from jaxbiped.scene._parameters import parameter_names, parameter_values
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -79,6 +76,15 @@ OBJECTIVES = {
     "radius_bound": Objective(Quantity("smooth bound of the spectral radius", "$\\rho_q$")),
     "sensitivity_norm": Objective(Quantity("gait sensitivity norm", "$\\|G\\|$")),
     "floor_sensitivity": Objective(Quantity("gait sensitivity norm to steps", "$\\|G_h\\|$")),
+    "clearance_sensitivity": Objective(
+        Quantity("sensitivity norm of clearance", "$\\|G_c\\|$"), _of_swing
+    ),
+    "floor_clearance_sensitivity": Objective(
+        Quantity("sensitivity norm of clearance to steps", "$\\|G_{hc}\\|$"), _of_swing
+    ),
+    "whole_sensitivity": Objective(
+        Quantity("gait sensitivity norm of all", "$\\|G_a\\|$"), _of_swing
+    ),
     "strike_divergence": Objective(
         Quantity("divergence of foot strike", "$\\ln|\\det S|$"), _of_strike
     ),
@@ -102,9 +108,11 @@ OBJECTIVES = {
 - foot clearance: least height of the swinging foot, negative where it passes underground.
 - radius bound: never below the spectral radius, and smooth also where multipliers meet or have
   equal moduli, where that has corners; see `jacobian_functionals`.
-- sensitivity norm, floor sensitivity, strike divergence: see `jacobian_functionals`.
-- fold distance, doubling distance: to the nearest in slope, see `bifurcation_distance`; a design
-  that meets none counts as one without a gait.
+- sensitivity norm, floor sensitivity, their norms of clearance, strike divergence: see
+  `jacobian_functionals`; whole sensitivity: the root of the sum of squares of these four norms.
+- fold distance, doubling distance: to the nearest in slope, see `bifurcation_distance`. Where none
+  lies in the range that is followed the distance is that of the range's farther end, without
+  derivatives: more than that of any design that has one.
 """
 _OF_THE_GAIT = ("speed", "step_length", "period", "peak_normal")
 _SEARCHED = {
@@ -116,7 +124,9 @@ _DISTANCES = {
     "fold_distance": BranchEvent.FOLD,
     "doubling_distance": BranchEvent.PERIOD_DOUBLING,
 }
-CLUSTER = JACOBIAN_FUNCTIONALS[:LEADING]
+_WHOLE = ("sensitivity_norm", "floor_sensitivity", *CLEARANCE_NORMS)
+"""What the whole sensitivity is made of: step length, step time and clearance, by both."""
+CLUSTER = MODULI
 """What is evaluated for the spectral radius: it, and the next moduli."""
 
 
@@ -130,6 +140,8 @@ class Evaluation(NamedTuple):
         slope_errors: their estimated errors.
         state: of the gait, its recurring components, shape (m,).
         state_slopes: derivatives, shape (m, p).
+        beyond_range: distances whose bifurcation does not lie in the range that is followed: their
+            values stand for more than the range holds, and their derivatives are zeros.
     """
 
     values: dict[str, float]
@@ -138,6 +150,7 @@ class Evaluation(NamedTuple):
     slope_errors: dict[str, np.ndarray]
     state: np.ndarray
     state_slopes: np.ndarray
+    beyond_range: tuple[str, ...] = ()
 
 
 def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective") -> None:
@@ -152,10 +165,12 @@ def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective
 
 def functionals_for(wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
     """Which functionals of the Jacobian these measures need, and whether those of the cycle."""
-    of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in wanted)
+    needed = {*wanted, *(_WHOLE if "whole_sensitivity" in wanted else ())}
+    of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in needed)
     if "spectral_radius" in wanted:
         of_jacobian = (*CLUSTER, *(name for name in of_jacobian if name not in CLUSTER))
-    return of_jacobian, bool(set(wanted) - set(of_jacobian) - set(_OF_THE_GAIT) - set(_DISTANCES))
+    others = {*of_jacobian, *_OF_THE_GAIT, *_DISTANCES, "whole_sensitivity"}
+    return of_jacobian, bool(set(wanted) - others)
 
 
 def evaluate(
@@ -184,15 +199,22 @@ def evaluate(
             name: row._replace(error=max(row.error, abs(row.value) * float(shares[0])))
             for name, row in zip(of_jacobian, _rows_of(first), strict=True)
         }
+    if "whole_sensitivity" in wanted:
+        rows["whole_sensitivity"] = _root_of_squares([rows[name] for name in _WHOLE])
     if of_cycle:
         second = second or cycle_functionals(
             scene, state, footsteps=steps, accuracy=accuracy, engine=engine
         )
         rows |= dict(zip(integral_names(scene), _rows_of(second), strict=True))
         rows["cost_of_transport"] = _cost_of_transport(scene, rows)
+    beyond_range = []
     for name in (name for name in wanted if name in _DISTANCES):
         told = bifurcation_distance(scene, gait, _DISTANCES[name], accuracy=accuracy)
         rows[name] = _Row(told.distance, told.error, told.slopes, told.slope_errors)
+        if told.outcome is Sought.NONE_IN_RANGE:
+            none = np.zeros_like(told.slopes)
+            rows[name] = _Row(told.distance, 0.0, none, none)
+            beyond_range.append(name)
     kept = {name: rows[name] for name in dict.fromkeys((*wanted, *of_jacobian, *_OF_THE_GAIT))}
     slopes = gait.sensitivities.state
     return Evaluation(
@@ -202,6 +224,7 @@ def evaluate(
         slope_errors={name: row.slope_errors for name, row in kept.items()},
         state=np.asarray([float(leaf) for leaf in gait.measures.state[1:]]),
         state_slopes=np.stack([np.asarray(leaf) for leaf in slopes[1:]]),
+        beyond_range=tuple(beyond_range),
     )
 
 
@@ -225,6 +248,17 @@ def _rows_of(found: object) -> list[_Row]:
         _Row(float(values[k]), float(errors[k]), parts[0][k], parts[1][k])
         for k in range(len(values))
     ]
+
+
+def _root_of_squares(rows: list[_Row]) -> _Row:
+    value = float(np.sqrt(sum(row.value**2 for row in rows)))
+    shares = [row.value / value for row in rows]
+    each = list(zip(shares, rows, strict=True))
+    slopes, slope_errors = (
+        np.asarray(sum(share * getattr(row, name) for share, row in each))
+        for name in ("slopes", "slope_errors")
+    )
+    return _Row(value, sum(share * row.error for share, row in each), slopes, slope_errors)
 
 
 def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, _Row]) -> _Row:

@@ -13,8 +13,9 @@ from jaxbiped._checks import (
     check_type,
 )
 from jaxbiped._types import JsonObject
+from jaxbiped.continuation._nearest_bifurcation import range_of
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._design_problem import DesignProblem
+from jaxbiped.optimise._design_problem import Design, DesignProblem
 from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, ensemble_of
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._objectives import CLUSTER, Evaluation, check_objective
@@ -41,7 +42,7 @@ class Optimum(NamedTuple):
 
     Attributes:
         outcome: how it ended.
-        message: the optimiser's own words.
+        message: the optimiser's own words; and which fold or doubling does not lie in its range.
         scene: of the best design.
         gait: its gait, with the sensitivities to all parameters.
         variables: its parameters by name.
@@ -51,7 +52,8 @@ class Optimum(NamedTuple):
         optimality: what the conditions of optimality say.
         history: every iterate, of all runs one behind the other.
         evaluations: designs whose gait was found.
-        lost: how often none was.
+        lost: how often none was, or a measure of it was not finite.
+        unmeasured: gaits of the latter kind.
     """
 
     outcome: Outcome
@@ -66,6 +68,7 @@ class Optimum(NamedTuple):
     history: list[Iteration]
     evaluations: int
     lost: int
+    unmeasured: int
 
     def __repr__(self) -> str:
         variables = ", ".join(f"{name}={value:.6g}" for name, value in self.variables.items())
@@ -248,13 +251,28 @@ def _problem_settings(
     }
 
 
+def _message(problem: DesignProblem, best: Design, ended: Ended) -> str:
+    """The optimiser's own words, and which bifurcations the best design does not meet."""
+    own = float(parameter_values(problem.scene_at(best.u))["slope"])
+    low, high = range_of("slope", own)
+    return " ".join(
+        [
+            ended.message,
+            *(
+                f"{name}: none from {low:.6g} to {high:.6g} rad."
+                for name in best.known.beyond_range
+            ),
+        ]
+    )
+
+
 def _optimum(problem: DesignProblem, runs: Runs) -> Optimum:
     best = runs.best
     assert best is not None
     value, _, error = problem.objective(best.known)
     return Optimum(
         outcome=runs.outcome(),
-        message=runs.ended.message,
+        message=_message(problem, best, runs.ended),
         scene=problem.scene_at(best.u),
         gait=problem.gait_of(best),
         variables=problem.variables.named(best.u),
@@ -265,4 +283,5 @@ def _optimum(problem: DesignProblem, runs: Runs) -> Optimum:
         history=runs.history,
         evaluations=problem.evaluations.count,
         lost=problem.lost,
+        unmeasured=problem.unmeasured,
     )

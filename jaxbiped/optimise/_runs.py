@@ -34,6 +34,9 @@ class Outcome(enum.IntEnum):
     - unfinished: the iterations were used up, or the optimiser could not go on.
     - interrupted: by Ctrl-C; the best so far is kept.
     - infeasible: no design was found that keeps the requirements; the nearest to them is told.
+    - beyond range: the best design has a gait whose fold or doubling, the distance of which was to
+      be optimised, does not lie in the range that is followed. There that distance has no
+      derivatives, so that no better design can be told.
     """
 
     CONVERGED = 0
@@ -41,9 +44,10 @@ class Outcome(enum.IntEnum):
     UNFINISHED = 2
     INTERRUPTED = 3
     INFEASIBLE = 4
+    BEYOND_RANGE = 5
 
     def __str__(self) -> str:
-        return self.name.lower()
+        return self.name.lower().replace("_", " ")
 
 
 class Iteration(NamedTuple):
@@ -54,12 +58,15 @@ class Iteration(NamedTuple):
         objective: the sum that was asked for.
         excess: by how much the worst requirement is missed, relative to its bound.
         measures: those that play a part, by name.
+        beyond_range: those of them whose bifurcation does not lie in the range that is followed:
+            the value stands for more than that.
     """
 
     variables: dict[str, float]
     objective: float
     excess: float
     measures: dict[str, float]
+    beyond_range: tuple[str, ...] = ()
 
 
 class Runs:
@@ -115,6 +122,8 @@ class Runs:
         told = optimality_of(self.problem, self.best)
         if told.excess > self.problem.allowance(self.best.known):
             return Outcome.INFEASIBLE
+        if any(self.problem.weights.get(name) for name in self.best.known.beyond_range):
+            return Outcome.BEYOND_RANGE
         optimal = told.residual <= _OPTIMAL
         if not self.ended.converged:
             return Outcome.UNFINISHED
@@ -130,7 +139,8 @@ class Runs:
         value = self.problem.sense * self.problem.objective(known)[0]
         excess = self.problem.excess(known)
         measures = {name: known.values[name] for name in self.problem.wanted}
-        self.history.append(Iteration(self.problem.variables.named(u), value, excess, measures))
+        named, beyond = self.problem.variables.named(u), known.beyond_range
+        self.history.append(Iteration(named, value, excess, measures, beyond))
         self.bar.set_postfix(objective=f"{value:.6g}", excess=f"{excess:.1e}")
 
     def _rank(self, design: Design) -> tuple[float, float]:

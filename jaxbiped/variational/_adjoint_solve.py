@@ -61,7 +61,7 @@ def carry_tangents(
     """Leading tangents (v, c) carried along a motion to its arrival; and the steps of that."""
     count = nodes.steps.astype(leading.dtype)
     request = Request(
-        _program(_Kind.of(engine, flow), None),
+        _program(_Kind.of(engine, flow), False),
         FirstVariationInputs(flow.args.args, nodes.start, nodes.arrival, leading, count),
         room=nodes.ends.room,
         stream=nodes.ends,
@@ -81,8 +81,6 @@ def pull_back(
     leading: FirstVariation,
     steps: Recording | Recorded,
     after: Adjoints,
-    *,
-    final: bool,
 ) -> Adjoints:
     """Adjoints where a motion starts, from those behind its arrival.
 
@@ -91,11 +89,10 @@ def pull_back(
         flow: what moves.
         nodes: of the motion.
         leading, steps: from `carry_tangents` along it.
-        after: adjoints behind the arrival.
-        final: whether the cycle ends there: of that arrival tangents on the section are told.
+        after: adjoints behind the arrival, of tangents on the section.
     """
     given = _Given(flow.args.args, nodes.arrival, leading, after)
-    program = _program(_Kind.of(engine, flow), final)
+    program = _program(_Kind.of(engine, flow), True)
     adjoints: Adjoints = engine.run(Request(program, given, stream=steps, quick=True)).outputs
     return adjoints
 
@@ -115,8 +112,8 @@ class _Kind(NamedTuple):
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
-def _program(kind: _Kind, final: bool | None) -> Program:
-    """The program that carries leading tangents, or where `final` is given, that of adjoints."""
+def _program(kind: _Kind, backwards: bool) -> Program:
+    """The program that carries leading tangents, or that of adjoints."""
     # Compiled by itself, the field is traced once, not at each of its many uses.
     field = jax.jit(kind.system.vector_field)
 
@@ -126,18 +123,16 @@ def _program(kind: _Kind, final: bool | None) -> Program:
         return Flow(kind.system, kind.arrival, field, seeded, kind.state)
 
     c = kind.state.num_leaves
-    if final is None:
+    if not backwards:
         return FirstVariationSolve(kind.engine, flow, 1 + c).program()
-    return _AdjointSolve(kind.engine, flow, Step.zero(c, COUNT), final).program()
+    return _AdjointSolve(kind.engine, flow, Step.zero(c, COUNT)).program()
 
 
 class _AdjointSolve:
     """The functions of the program: its input stream's rows are steps, read backwards."""
 
-    def __init__(
-        self, engine: AbstractEngine, flow: Callable[[_Given], Flow], step: Step, final: bool
-    ) -> None:
-        self.engine, self.flow, self.final = engine, flow, final
+    def __init__(self, engine: AbstractEngine, flow: Callable[[_Given], Flow], step: Step) -> None:
+        self.engine, self.flow = engine, flow
         row, self.read = ravel_pytree(step)
         self.size = len(row)
 
@@ -161,8 +156,7 @@ class _AdjointSolve:
             family, every = jnp.concatenate([before.family, before.parameters]), []
             for leading, second in zip(given.leading.leading, before.second, strict=True):
                 v, q = jnp.concatenate([leading, jnp.zeros_like(parameters)]), family
-                if self.final:
-                    v, q, second = on_section(flow, jacobian, z, v, q, second)
+                v, q, second = on_section(flow, jacobian, z, v, q, second)
                 reached, second = after_reset(flow, z, v, q, second)
                 every.append(second)
             return reached, jnp.stack(every)

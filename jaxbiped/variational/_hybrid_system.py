@@ -39,12 +39,9 @@ class AbstractSystem(eqx.Module):
     Attributes:
         cyclic_coordinates: positions of the leaves that need not return, only advance: no rate may
             depend on them.
-        reset_is_symmetry: whether `reset_map` maps motions to motions, as an exchange of legs does.
-            Second derivatives of cycles of several arrivals need it.
     """
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = ()
-    reset_is_symmetry: ClassVar[bool] = False
 
     @abc.abstractmethod
     def vector_field(self, t: Time, y: PyTree, args: PyTree) -> PyTree:
@@ -76,7 +73,6 @@ class Walking(AbstractSystem):
     """The walker: legs exchanged at each footstep, the place along the slope left out."""
 
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (State._fields.index("hip_x"),)
-    reset_is_symmetry: ClassVar[bool] = True
 
     def vector_field(self, t: Time, y: State, args: Scene) -> State:
         return vector_field(t, y, args)
@@ -100,8 +96,6 @@ class RedundantWalking(AbstractSystem):
 
     `find_gait` tells its returns in minimal coordinates; by itself it is for `return_map`.
     """
-
-    reset_is_symmetry: ClassVar[bool] = True
 
     def vector_field(self, t: Time, y: LegsState, args: RedundantScene) -> LegsState:
         return redundant_field(t, y, args)

@@ -35,6 +35,14 @@ def on_section(
     return v + velocity * by_v, q + velocity * by_q, second + rate * both
 
 
+def tangent_on_section(flow: Flow, z: Scalar, v: Scalar) -> Scalar:
+    """A first tangent at a fixed time made one on the section, as `on_section` does; (c + p,)."""
+    rate = flow.velocity(z)
+    velocity = jnp.concatenate([rate, jnp.zeros(len(z) - len(rate))])
+    gradient = jax.grad(flow.section)(z)
+    return v - velocity * (gradient @ v) / (gradient @ velocity)
+
+
 def after_reset(
     flow: Flow, z: Scalar, v: Scalar, q: Scalar, second: Scalar
 ) -> tuple[Scalar, Scalar]:

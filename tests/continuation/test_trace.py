@@ -27,6 +27,7 @@ def test_a_period_doubling_is_located():
     assert event.kind is BranchEvent.PERIOD_DOUBLING
     assert event.value == pytest.approx(3.0, abs=1e-9)
     assert event.multiplier == pytest.approx(-1.0, abs=1e-9)
+    assert event.value_error < 1e-9
     assert found.stop.end is BranchEnd.REACHED
     assert found.points[-1].value == pytest.approx(4.0, abs=1e-9)
     for point in found.points:
@@ -44,6 +45,24 @@ def test_a_cycle_of_two_doubles_at_one_plus_the_root_of_six():
     (event,) = found.bifurcations
     assert event.kind is BranchEvent.PERIOD_DOUBLING
     assert event.value == pytest.approx(1.0 + np.sqrt(6.0), abs=1e-9)
+
+
+def test_the_value_of_a_bifurcation_is_off_by_where_the_witness_has_it():
+    """A witness whose multiplier is larger by a part of it doubles so much earlier."""
+    curve, axis = logistic((2.0, 4.0))
+    part = 1e-6
+
+    def change(point, s):
+        exact = curve.change(point, s)
+        jacobian = exact.seen.jacobian.copy()
+        jacobian[1, 0, 0] *= 1.0 + part
+        return exact._replace(seen=exact.seen._replace(jacobian=jacobian))
+
+    begin = begin_at(curve, axis, [0.5], 2.0)
+    found = trace(curve._replace(change=change), axis, begin, **USUAL)
+    (event,) = found.bifurcations
+    # The multiplier is 2 − r. Beside the bifurcation it is larger, and its error with it.
+    assert event.value_error == pytest.approx(part, rel=0.1)
 
 
 def test_a_fold_is_passed_and_located():

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.optimise import Sought
+from jaxbiped.optimise._objectives import evaluate
 
 pytestmark = pytest.mark.slow
 STEP = 2e-3
@@ -27,6 +29,7 @@ def test_derivatives_are_those_of_central_differences(which, kind, varied):
     gait, names = gait_of(scene), jb.parameter_names(scene)
     told = jb.optimise.bifurcation_distance(scene, gait, kind)
     own_slope = float(scene.ground.slope)
+    assert told.outcome is Sought.MET
     assert told.distance == pytest.approx(abs(told.value - own_slope))
     way = np.sign(told.value - own_slope)
     assert told.slopes[names.index("slope")] == -way
@@ -57,11 +60,31 @@ def test_the_bifurcations_are_those_of_the_branch():
         assert 0.0 < found.error < 1e-5
 
 
-def test_a_walker_without_a_fold_has_no_distance():
+def test_a_walker_without_a_fold_is_told_from_one_that_is_lost(monkeypatch):
     scene = jb.ladder()["rigid"]
-    found = jb.optimise.bifurcation_distance(scene, gait_of(scene))
-    assert np.isnan(found.distance)
+    gait, own = gait_of(scene), float(scene.ground.slope)
+    found = jb.optimise.bifurcation_distance(scene, gait)
+    assert found.outcome is Sought.NONE_IN_RANGE
+    assert found.bounds == pytest.approx((own / 8.0, own * 8.0))
+    assert found.distance == pytest.approx(7.0 * own)
+    assert np.isnan(found.value)
     assert np.all(np.isnan(found.slopes))
+    assert jb.optimise.bifurcation_distance(scene, gait, "period-doubling").outcome is Sought.MET
+    monkeypatch.setattr("jaxbiped.optimise._bifurcation_distance._MOST_POINTS", 2)
+    lost = jb.optimise.bifurcation_distance(scene, gait)
+    assert lost.outcome is Sought.UNKNOWN
+    assert np.isnan(lost.distance)
+
+
+def test_an_evaluation_tells_what_lies_beyond_the_range():
+    scene = jb.ladder()["rigid"]
+    gait = jb.find_gait(scene, radius_sensitivities=False, engine="lanes")
+    names = ("fold_distance", "doubling_distance")
+    known = evaluate(scene, gait, names, "balanced")
+    assert known.beyond_range == ("fold_distance",)
+    assert known.values["fold_distance"] > known.values["doubling_distance"]
+    assert not np.any(known.slopes["fold_distance"])
+    assert np.any(known.slopes["doubling_distance"])
 
 
 def test_what_is_not_allowed_is_refused_in_a_sentence():

@@ -128,6 +128,23 @@ def test_a_lost_gait_turns_the_search_back(monkeypatch):
         assert best.objective >= best.history[0].objective
 
 
+def test_a_gait_without_a_fold_is_no_lost_gait(tmp_path):
+    """A rigid walker has no fold: a bound is met, and as an objective it is told as what it is."""
+    options = {"vary": {"d": (0.08, 0.12)}, "iterations": 3}
+    bound = best_of(subject_to="fold_distance>0.1", **options)
+    assert bound.lost == 0
+    assert bound.known.beyond_range == ("fold_distance",)
+    assert bound.objective > bound.history[0].objective
+    assert all(each.beyond_range == ("fold_distance",) for each in bound.history)
+    path = tmp_path / "runs.jsonl"
+    for _ in range(2):  # the second time as kept in the store
+        best = best_of(maximise="fold_distance", store=path, **options)
+        assert best.outcome is jb.optimise.Outcome.BEYOND_RANGE
+        assert str(best.outcome) == "beyond range"
+        assert best.message.endswith("fold_distance: none from 0.0025 to 0.16 rad.")
+        assert best.known.beyond_range == ("fold_distance",)
+
+
 def test_restarts_are_searched_as_one_batch():
     best = best_of(restarts=1, seed=3, iterations=8)
     assert best.objective >= best_of().objective - 1e-6

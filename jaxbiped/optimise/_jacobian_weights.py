@@ -1,0 +1,162 @@
+"""Weights of the return map's Jacobian: functions of its entries, and their derivatives.
+
+What `jacobian_functionals` tells are such functions; the weights are what an adjoint starts from.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.linalg._small_matrices import eigenpairs, invert
+
+MODULI = ("spectral_radius", "modulus_2", "modulus_3")
+"""Moduli that are told apart: of a pair of conjugate multipliers once."""
+CLEARANCE_NORMS = ("clearance_sensitivity", "floor_clearance_sensitivity")
+"""Norms of the swinging foot's clearance, by a push and by a step in the ground."""
+SQUARINGS = 6
+"""Of the return map's Jacobian P for its bound ‖P⁶⁴‖^(1/64)."""
+_SIZES = {"hip_z": 0.4, "hip_vx": 2.0, "hip_vz": 2.0, "omega_1": 5.0, "omega_2": 5.0}
+"""Of components (SI units), for that norm: the same for all walkers, so that it is one function."""
+_DOUBLINGS = 24
+"""Of the footsteps over which responses are summed: 2 ** 24 of them."""
+
+
+class Weighed(NamedTuple):
+    """A function of the Jacobian's rows, and of step length and period.
+
+    Attributes:
+        value: the function.
+        by_rows: its derivatives with respect to the rows, shape (d + m, m), of this `rank`: those
+            of d cyclic coordinates come first.
+        by_length: with respect to step length and period, shape (2,).
+    """
+
+    value: Scalar
+    by_rows: Scalar
+    rank: int
+    by_length: Scalar
+
+
+class _Eigen(NamedTuple):
+    """Eigenvalues, right eigenvectors (columns) and left ones (rows), wᵀ v = 1."""
+
+    values: Scalar
+    right: Scalar
+    left: Scalar
+
+
+def _eigen(jacobian: Scalar) -> _Eigen:
+    finite = jnp.all(jnp.isfinite(jacobian))
+    values, right = eigenpairs(jnp.where(finite, jacobian, jnp.eye(len(jacobian))))
+    return _Eigen(
+        values * jnp.where(finite, 1.0, jnp.nan).astype(values.dtype), right, invert(right)
+    )
+
+
+def _by_entries(eigen: _Eigen, shares: Scalar) -> Scalar:
+    """Derivatives Σ Re(share · dλ) with respect to the rows: dλ = wᵀ dP v."""
+    weights = jnp.einsum("i,ia,bi->ab", shares, eigen.left, eigen.right).real
+    return jnp.concatenate([jnp.zeros((2, len(weights))), weights])
+
+
+def leading_multipliers(jacobian: Scalar) -> Scalar:
+    """Of the different multipliers those of largest modulus, of a conjugate pair the upper one."""
+    values = _eigen(jacobian).values
+    sizes = jnp.where(values.imag < 0.0, -1.0, jnp.abs(values))
+    order = jnp.argsort(-sizes)[: len(MODULI)]
+    return jnp.where(sizes[order] > 0.0, values[order], jnp.zeros_like(values[order]))
+
+
+def _modulus(k: int, rows: Scalar, length: Scalar, leading: Scalar) -> Weighed:
+    """Of the multiplier nearest to the k-th leading one: a looser solve may have another order."""
+    eigen = _eigen(rows[2:])
+    place = jnp.argmin(jnp.abs(eigen.values - leading[k]))
+    size = jnp.abs(eigen.values[place])
+    known = (size > 0.0) & (leading[k] != 0.0)
+    divisor = jnp.where(known, size, 1.0).astype(eigen.values.dtype)
+    shares = jnp.zeros_like(eigen.values).at[place].set(jnp.conj(eigen.values[place]) / divisor)
+    value = jnp.where(known, size, 0.0)
+    return Weighed(value, _by_entries(eigen, shares), 2, jnp.zeros_like(length))
+
+
+def _divergence(rows: Scalar, length: Scalar) -> Weighed:
+    """Without the zeros of the push and of the section."""
+    eigen = _eigen(rows[2:])
+    order = jnp.argsort(-jnp.abs(eigen.values))[:-2]
+    leading = eigen.values[order]
+    shares = jnp.zeros_like(eigen.values).at[order].set(1.0 / leading)
+    value = jnp.sum(jnp.log(jnp.abs(leading)))
+    return Weighed(value, _by_entries(eigen, shares), len(order), jnp.zeros_like(length))
+
+
+def _radius_bound(sizes: Scalar, rows: Scalar, length: Scalar) -> Weighed:
+    def bound(rows: Scalar) -> Scalar:
+        # Without the push, which has no response of its own.
+        power, logarithm = rows[3:, 1:] * sizes / sizes[:, None], jnp.zeros(())
+        # Each power is scaled to the order of one, so that small ones do not vanish.
+        for k in range(SQUARINGS):
+            size = jnp.sqrt(jnp.sum(power * power))
+            logarithm = logarithm + jnp.log(size) / 2**k
+            power = (power / size) @ (power / size)
+        return jnp.exp(logarithm + 0.5 * jnp.log(jnp.sum(power * power)) / 2**SQUARINGS)
+
+    value, weights = jax.value_and_grad(bound)(rows)
+    return Weighed(value, weights, rows.shape[1], jnp.zeros_like(length))
+
+
+def _push_norm(rows: Scalar, length: Scalar) -> Weighed:
+    """Of relative changes of step length and step time."""
+    return _norm_of(lambda rows, length: rows[:2] / length[:, None], rows, length)
+
+
+def _clearance_norm(rows: Scalar, length: Scalar) -> Weighed:
+    """Of changes of foot clearance, in leg lengths."""
+    return _norm_of(lambda rows, length: rows[1:2], rows, length)
+
+
+def _norm_of(response: Callable[[Scalar, Scalar], Scalar], rows: Scalar, length: Scalar) -> Weighed:
+    own = rows[-rows.shape[1] :]
+    jacobian = jnp.where(jnp.isfinite(own), own, 0.0)
+    stable = jnp.max(jnp.abs(eigenpairs(jacobian)[0])) < 1.0
+
+    def norm(rows: Scalar, length: Scalar) -> Scalar:
+        return _summed(rows[-rows.shape[1] :], response(rows, length))
+
+    value, (weights, by_length) = jax.value_and_grad(norm, argnums=(0, 1))(
+        jnp.where(stable, rows, rows.at[-rows.shape[1] :].set(0.0)), length
+    )
+    return Weighed(jnp.where(stable, value, jnp.inf), weights, rows.shape[1], by_length)
+
+
+def _summed(power: Scalar, told: Scalar) -> Scalar:
+    """√(Q₀₀), where Q = Σ (Aⁿ)ᵀ CᵀC Aⁿ solves Q = CᵀC + Aᵀ Q A, by doubling."""
+    total = told.T @ told
+    for _ in range(_DOUBLINGS):
+        total, power = total + power.T @ total @ power, power @ power
+    return jnp.sqrt(total[0, 0])
+
+
+def weighed(name: str, y: PyTree, rows: Scalar, length: Scalar, leading: Scalar) -> Weighed:
+    """A functional by name.
+
+    Args:
+        name: one of `jacobian_functionals`.
+        y: a state, whose recurring components the disturbance is the first of.
+        rows: of the Jacobian, shape (d + m, m), those of d cyclic coordinates first.
+        length: step length and period, shape (2,).
+        leading: multipliers that are told apart, of a solve that all others are compared with.
+    """
+    if name == "radius_bound":
+        sizes = jnp.asarray([_SIZES.get(field, 1.0) for field in y._fields[3:]])
+        return _radius_bound(sizes, rows, length)
+    if name in ("sensitivity_norm", "floor_sensitivity"):
+        return _push_norm(rows, length)
+    if name in CLEARANCE_NORMS:
+        return _clearance_norm(rows, length)
+    if name == "strike_divergence":
+        return _divergence(rows, length)
+    return _modulus(MODULI.index(name), rows, length, leading)
