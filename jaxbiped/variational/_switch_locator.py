@@ -18,13 +18,13 @@ from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
+from jaxbiped.variational._step_cubic import StepCubic
 from jaxbiped.variational._tangents import Seeded, Tangents
 
 _OVERSHOOT = 1e-4
 """Largest part of a step that may lie past a switch."""
 MARGIN = 1e-12
 """Time past a switch [s] that a step may always end, and aims at: the side must be beyond doubt."""
-_BISECTIONS = 40
 _ROUNDING = 1e-12
 
 
@@ -154,7 +154,10 @@ class SwitchLocator(AbstractWrappedControl):
     def _crossings(
         self, span: Scalar, scene: PyTree, before: PyTree, after: PyTree, landed: SwitchLocatorState
     ) -> tuple["_Crossed", Scalar]:
-        """Which surfaces a step crosses, and the part of it that lies before the first."""
+        """Which surfaces a step crosses, and the part of it that lies before the first.
+
+        Or before a switch comes so near zero that it may be crossed twice in this step.
+        """
         watch = self.watch
         surfaces = functools.partial(_surfaces, watch, landed.peak, scene)
         at_start, at_end = surfaces(before), surfaces(after)
@@ -167,9 +170,11 @@ class SwitchLocator(AbstractWrappedControl):
             arrives = crossed[-1] & (at_end[-1].value > 0.0) & (landed.accepted > 0)
             crossed[-1] = arrives
         others = (watch.peak is not None) + (watch.section is not None)
-        switching = crossed[: len(crossed) - others]
+        count = len(crossed) - others
+        switching = crossed[:count]
         jumps = [c for c, s in zip(switching, at_end, strict=False) if s.force_jumps]
-        any_crossed = functools.reduce(jnp.logical_or, crossed, jnp.asarray(False))
+        touched, turning = self._turns(span, scene, before, after, at_start[:count], at_end[:count])
+        any_crossed = functools.reduce(jnp.logical_or, crossed + touched, jnp.asarray(False))
 
         def locate() -> Scalar:
             parts = []
@@ -178,8 +183,11 @@ class SwitchLocator(AbstractWrappedControl):
                 values = jnp.stack([s.value for s in found])
                 _, slopes = jax.jvp(lambda y: [s.value for s in surfaces(y)], (state,), (rate,))
                 parts += [values, span * jnp.stack(slopes)]
-            roots = _cubic_root(parts[0], parts[2], parts[1], parts[3])
-            return jnp.min(jnp.where(jnp.stack(crossed), roots, 1.0))
+            roots = StepCubic(parts[0], parts[2], parts[1], parts[3]).sign_change()
+            first = jnp.min(jnp.where(jnp.stack(crossed), roots, 1.0))
+            if not touched:
+                return first
+            return jnp.minimum(first, jnp.min(jnp.where(jnp.stack(touched), turning, 1.0)))
 
         part = jnp.ones_like(span)
         if crossed:
@@ -192,6 +200,29 @@ class SwitchLocator(AbstractWrappedControl):
             arrives,
         )
         return found, part
+
+    def _turns(
+        self,
+        span: Scalar,
+        scene: PyTree,
+        before: PyTree,
+        after: PyTree,
+        at_start: list[Switch],
+        at_end: list[Switch],
+    ) -> tuple[list[Scalar], Scalar]:
+        if not at_start:
+            return [], jnp.zeros(0)
+        ends = []
+        for state, found in ((before, at_start), (after, at_end)):
+            rate = self.watch.field(jnp.zeros_like(span), state, scene)
+            switches = functools.partial(self.watch.switches, scene)
+            _, slopes = jax.jvp(lambda y: [s.value for s in switches(y)], (state,), (rate,))
+            ends.append((jnp.stack([s.value for s in found]), span * jnp.stack(slopes)))
+        (start, start_slope), (end, end_slope) = ends
+        cubic = StepCubic(start, end, start_slope, end_slope)
+        live = jnp.stack([jnp.asarray(a.live & b.live) for a, b in zip(at_start, at_end)])
+        touched = live & cubic.may_touch()
+        return list(touched), cubic.turning_point()
 
     def _landed(
         self,
@@ -257,22 +288,3 @@ def _surfaces(watch: Watch, peak: PyTree, scene: PyTree, state: PyTree) -> list[
     if watch.section is not None:
         found.append(Switch(*watch.section(scene, state)))
     return found
-
-
-def _cubic_root(start: Scalar, end: Scalar, start_slope: Scalar, end_slope: Scalar) -> Scalar:
-    """Where on (0, 1] a cubic with these values and slopes at 0 and 1 changes sign.
-
-    The upper end of the last bracket: the cubic has changed sign there.
-    """
-    second = 3.0 * (end - start) - 2.0 * start_slope - end_slope
-    third = 2.0 * (start - end) + start_slope + end_slope
-
-    def halve(_: Scalar, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
-        lower, upper = ends
-        middle = 0.5 * (lower + upper)
-        value = start + middle * (start_slope + middle * (second + middle * third))
-        unchanged = (value > 0.0) == (start > 0.0)
-        return jnp.where(unchanged, middle, lower), jnp.where(unchanged, upper, middle)
-
-    ends = (jnp.zeros_like(start), jnp.ones_like(start))
-    return jax.lax.fori_loop(0, _BISECTIONS, halve, ends)[1]
