@@ -66,6 +66,7 @@ class SectionArrival(NamedTuple):
             derivatives, shape (n,), where the solve carried columns.
         jumps: steps that ended past a switch where the vector field itself jumps.
         missed: whether the last of them was the last step at all: columns did not jump there.
+        grazes: steps in which a switch was grazed: derivatives are not determined.
         attempted: number of steps attempted.
         nodes: the ends of the accepted steps, where saved.
     """
@@ -78,6 +79,7 @@ class SectionArrival(NamedTuple):
     peak_columns: PyTree
     jumps: Scalar
     missed: Scalar
+    grazes: Scalar
     attempted: Scalar
     nodes: Nodes | None
 
@@ -150,6 +152,7 @@ def solve_to_section(
         peak_columns=peak_columns,
         jumps=landed.jumps,
         missed=landed.saltation_pending,
+        grazes=landed.grazes,
         attempted=solution.stats["num_steps"],
         nodes=_nodes(times[1], states[1], time, y) if save_nodes else None,
     )

@@ -18,7 +18,8 @@ from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
-from jaxbiped.variational._step_cubic import StepCubic
+from jaxbiped.variational._grazing import Turns, turns_of
+from jaxbiped.solve._step_cubic import StepCubic
 from jaxbiped.variational._tangents import Seeded, Tangents
 
 _OVERSHOOT = 1e-4
@@ -57,6 +58,7 @@ class SwitchLocatorState(NamedTuple):
         accepted: number of steps accepted.
         landings: number of them that ended just past a switch.
         jumps: number of them that ended past a switch where the vector field itself jumps.
+        grazes: number of steps in which a switch was grazed: no derivatives are determined then.
         saltation_pending: whether the last accepted step did: columns have yet to jump there.
         peak_saltation_pending: whether the step with the largest value did.
         arrived: whether the section was reached.
@@ -69,6 +71,7 @@ class SwitchLocatorState(NamedTuple):
     accepted: Scalar
     landings: Scalar
     jumps: Scalar
+    grazes: Scalar
     saltation_pending: Scalar
     peak_saltation_pending: Scalar
     arrived: Scalar
@@ -107,7 +110,7 @@ class SwitchLocator(AbstractWrappedControl):
             peak = jax.lax.stop_gradient(self.watch.peak(plain_args(args), plain_state(y0)))
         at_peak = None if peak is None else y0
         no = jnp.asarray(False)
-        return first, SwitchLocatorState(inner, zero, zero, zero, no, no, no, zero, peak, at_peak)
+        return first, SwitchLocatorState(inner, *[zero] * 4, no, no, no, zero, peak, at_peak)
 
     def adapt_step_size(
         self,
@@ -173,8 +176,11 @@ class SwitchLocator(AbstractWrappedControl):
         count = len(crossed) - others
         switching = crossed[:count]
         jumps = [c for c, s in zip(switching, at_end, strict=False) if s.force_jumps]
-        touched, turning = self._turns(span, scene, before, after, at_start[:count], at_end[:count])
-        any_crossed = functools.reduce(jnp.logical_or, crossed + touched, jnp.asarray(False))
+        turns = self._turns(span, scene, before, after) if count else None
+        none = jnp.asarray(False)
+        any_crossed = functools.reduce(jnp.logical_or, crossed, none)
+        if turns is not None:
+            any_crossed = any_crossed | jnp.any(turns.touches)
 
         def locate() -> Scalar:
             parts = []
@@ -185,44 +191,37 @@ class SwitchLocator(AbstractWrappedControl):
                 parts += [values, span * jnp.stack(slopes)]
             roots = StepCubic(parts[0], parts[2], parts[1], parts[3]).sign_change()
             first = jnp.min(jnp.where(jnp.stack(crossed), roots, 1.0))
-            if not touched:
+            if turns is None:
                 return first
-            return jnp.minimum(first, jnp.min(jnp.where(jnp.stack(touched), turning, 1.0)))
+            return jnp.minimum(first, jnp.min(jnp.where(turns.touches, turns.places, 1.0)))
 
         part = jnp.ones_like(span)
         if crossed:
             part = jnp.where(any_crossed, fusion_barrier(any_crossed, locate), part)
-        none = jnp.asarray(False)
         found = _Crossed(
             any_crossed,
             functools.reduce(jnp.logical_or, switching, none),
             functools.reduce(jnp.logical_or, jumps, none),
             arrives,
+            none if turns is None else turns.graze,
         )
         return found, part
 
-    def _turns(
-        self,
-        span: Scalar,
-        scene: PyTree,
-        before: PyTree,
-        after: PyTree,
-        at_start: list[Switch],
-        at_end: list[Switch],
-    ) -> tuple[list[Scalar], Scalar]:
-        if not at_start:
-            return [], jnp.zeros(0)
-        ends = []
-        for state, found in ((before, at_start), (after, at_end)):
-            rate = self.watch.field(jnp.zeros_like(span), state, scene)
-            switches = functools.partial(self.watch.switches, scene)
-            _, slopes = jax.jvp(lambda y: [s.value for s in switches(y)], (state,), (rate,))
-            ends.append((jnp.stack([s.value for s in found]), span * jnp.stack(slopes)))
-        (start, start_slope), (end, end_slope) = ends
-        cubic = StepCubic(start, end, start_slope, end_slope)
-        live = jnp.stack([jnp.asarray(a.live & b.live) for a, b in zip(at_start, at_end)])
-        touched = live & cubic.may_touch()
-        return list(touched), cubic.turning_point()
+    def _turns(self, span: Scalar, scene: PyTree, before: PyTree, after: PyTree) -> Turns:
+        """Where switches turn near zero between the ends of a step."""
+        field, switches = self.watch.field, functools.partial(self.watch.switches, scene)
+
+        def values(y: PyTree) -> Scalar:
+            return jnp.stack([switch.value for switch in switches(y)])
+
+        ends: list[Scalar] = []
+        for state in (before, after):
+            rate = field(jnp.zeros_like(span), state, scene)
+            value, slope = jax.jvp(values, (state,), (rate,))
+            ends += [value, span * slope]
+        live = [a.live & b.live for a, b in zip(switches(before), switches(after), strict=True)]
+        cubic = StepCubic(ends[0], ends[2], ends[1], ends[3])
+        return turns_of(cubic, jnp.stack([jnp.asarray(l) for l in live]), values, after, self.rtol)
 
     def _landed(
         self,
@@ -250,6 +249,7 @@ class SwitchLocator(AbstractWrappedControl):
             accepted=old.accepted + jnp.where(keep, 1, 0),
             landings=old.landings + jnp.where(keep & crossed.switch, 1, 0),
             jumps=old.jumps + jnp.where(keep & crossed.jump, 1, 0),
+            grazes=old.grazes + jnp.where(keep & crossed.graze, 1, 0),
             saltation_pending=jnp.where(keep, crossed.jump, old.saltation_pending),
             peak_saltation_pending=peak_saltation_pending,
             arrived=keep & crossed.section,
@@ -264,6 +264,7 @@ class _Crossed(NamedTuple):
     switch: Scalar
     jump: Scalar
     section: Scalar
+    graze: Scalar
 
 
 def plain_state(y: PyTree) -> PyTree:

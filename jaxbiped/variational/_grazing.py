@@ -1,0 +1,64 @@
+"""Grazing: a switch that a motion touches, or misses, by less than it is known to.
+
+Whether there was a contact is then open, and derivatives differ on both sides: a motion that is a
+little deeper meets forces that the other does not.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.solve._step_cubic import StepCubic
+
+_ERRORS = 3.0
+"""Error of a state that has been solved for a while, in units of its relative tolerance."""
+
+
+class Turns(NamedTuple):
+    """Where switches turn between the ends of a step.
+
+    Attributes:
+        touches: which ones may reach zero there and turn back, so that the step has to end there
+            (booleans), shape (k,).
+        places: the part of the step that lies before, shape (k,).
+        graze: whether one turns so near zero that derivatives are not determined (boolean).
+    """
+
+    touches: Scalar
+    places: Scalar
+    graze: Scalar
+
+
+def turns_of(
+    cubic: StepCubic,
+    live: Scalar,
+    values: Callable[[PyTree], Scalar],
+    state: PyTree,
+    rtol: RealScalarLike,
+) -> Turns:
+    """The turns of k switches.
+
+    Args:
+        cubic: their values over the step, shape (k,).
+        live: whether the field is not smooth there (booleans), shape (k,).
+        values: their values at a state, shape (k,).
+        state: the step's end.
+        rtol: relative tolerance of the state.
+    """
+    places, turning = cubic.turning_point(), cubic.turns() & live
+    leaves, structure = jtu.tree_flatten(state)
+
+    def graze() -> Scalar:
+        normals = jax.jacfwd(lambda y: values(jtu.tree_unflatten(structure, y)))(leaves)
+        sizes = [jnp.abs(normal * leaf) for normal, leaf in zip(normals, leaves, strict=True)]
+        known_to = _ERRORS * rtol * sum(sizes, jnp.zeros(()))
+        return jnp.any(turning & (jnp.abs(cubic.at(places)) <= known_to))
+
+    turns = jnp.any(turning)
+    return Turns(live & cubic.may_touch(), places, turns & fusion_barrier(turns, graze))
