@@ -16,9 +16,6 @@ from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_cubic import StepCubic
 
-_ERRORS = 3.0
-"""Error of a state that has been solved for a while, in units of its relative tolerance."""
-
 
 class Turns(NamedTuple):
     """Where switches turn between the ends of a step.
@@ -57,7 +54,7 @@ def turns_of(
     def graze() -> Scalar:
         normals = jax.jacfwd(lambda y: values(jtu.tree_unflatten(structure, y)))(leaves)
         sizes = [jnp.abs(normal * leaf) for normal, leaf in zip(normals, leaves, strict=True)]
-        known_to = _ERRORS * rtol * sum(sizes, jnp.zeros(()))
+        known_to = rtol * sum(sizes, jnp.zeros(()))
         return jnp.any(turning & (jnp.abs(cubic.at(places)) <= known_to))
 
     turns = jnp.any(turning)

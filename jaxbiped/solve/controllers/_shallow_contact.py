@@ -21,6 +21,11 @@ _OVERSHOOT = 5e-5
 """Part of the way to the ground that a step ends past it."""
 _MARGIN = 1e-12
 """Time that it does besides [s]."""
+_BARELY = 1e-2
+"""Depth and speed in the ground at a step's end, in units of height and speed at its beginning,
+below which a contact is shallow."""
+_ALL = 0.999
+"""Part of a step that is as good as all of it."""
 _REACH = 2.0
 """Way that a foot can sink in a step, in units of the one at the speed it begins with."""
 
@@ -82,19 +87,27 @@ def _touchdown(
 
     part = jnp.where(within_reach, fusion_barrier(within_reach, first), 1.0)
     target = t0 + span * part * (1.0 + _OVERSHOOT) + _MARGIN
-    return (part < 1.0) & (target < t1), target
+    return (part < _ALL) & (target < t1), target
 
 
 def _part_above(span: Scalar, before: Foot, after: Foot) -> Scalar:
-    """The part of a step after which a foot dips into the ground to leave it again; 1 if none."""
+    """The part of a step after which a foot comes into the ground, barely; 1 if it does not.
+
+    Or that after which it is lowest, where it may come into the ground. A step that is tried again
+    to there ends in the air, or in the ground at no speed: then the contact has begun before.
+    """
     rates = span * before.penetration_rate, span * after.penetration_rate
     depth = StepCubic(before.penetration, after.penetration, *rates)
-    off = (depth.start <= 0.0) & (depth.end <= 0.0)
+    off = depth.start <= 0.0
     if before.admitted is not None and after.admitted is not None:
         off = off & before.admitted & after.admitted
-    lowest = depth.turning_point()
+    lowest = jnp.where(depth.may_touch(), depth.turning_point(), 1.0)
     deepest = depth.at(lowest)
+    leaves = (depth.end <= 0.0) & depth.may_touch()
+    stays = (depth.end > 0.0) & (depth.end < -_BARELY * depth.start)
+    stays = stays & (jnp.abs(depth.end_slope) < _BARELY * depth.start_slope)
     # The same cubic up to there, where it has a sign change to be found.
-    down = StepCubic(depth.start, deepest, lowest * depth.start_slope, jnp.zeros_like(span))
-    dips = off & depth.may_touch() & (deepest > 0.0)
-    return jnp.where(dips, lowest * down.sign_change(), 1.0)
+    slope_there = jnp.where(leaves, 0.0, depth.end_slope)
+    down = StepCubic(depth.start, deepest, lowest * depth.start_slope, lowest * slope_there)
+    place = jnp.where(deepest > 0.0, lowest * down.sign_change(), lowest)
+    return jnp.where(off & (leaves | stays), place, 1.0)
