@@ -54,8 +54,8 @@ class LinearisedReturn(NamedTuple):
         attempted: solver steps attempted.
         jumps, missed: crossings where the vector field itself jumped, and how many of them had no
             correction.
-        grazes: switches that were touched, or missed, by less than the state is known to: derivatives
-            are then those of one side.
+        grazes: how often a switch was touched, or missed, by less than the tolerance resolves:
+            derivatives are then those of one side.
         nodes: the ends of the steps of each solve to the section, leaves (steps, …), where saved.
     """
 

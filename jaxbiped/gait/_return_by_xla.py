@@ -74,15 +74,17 @@ def _by_xla_forward_jvp(
         max_solver_steps=spec.max_solver_steps,
     )
     structure = jtu.tree_structure(state)
-    arrived = jtu.tree_unflatten(structure, list(found.y.columns[:, 0]))
+    arrived_row, time_row = jtu.tree_map(
+        lambda row: jnp.where(found.undetermined, jnp.nan, row),
+        (found.y.columns[:, 0], found.time_columns[0]),
+    )
+    arrived = jtu.tree_unflatten(structure, list(arrived_row))
 
     def reset_map(args: PyTree, y: PyTree) -> PyTree:
         return reset_on_arrival(spec, args, y, found.time, found.code)[0]
 
     _, end_dot = jax.jvp(reset_map, (args, found.y.state), (full_tangents(args_dot, args), arrived))
-    end_dot, time_dot = eqxi.nondifferentiable_backward(
-        (end_dot, found.time_columns[0]), msg=NO_REVERSE
-    )
+    end_dot, time_dot = eqxi.nondifferentiable_backward((end_dot, time_row), msg=NO_REVERSE)
     # The values by themselves: they must not depend on what they are differentiated along.
     values = forward_by_xla(spec, precision, args, state)
     return values, (end_dot, time_dot, None)
@@ -105,7 +107,24 @@ def reverse_by_xla(
         max_solver_steps=spec.max_solver_steps,
         columns_only_choose_steps=True,
     )
-    return reset_on_arrival(spec, args, found.y.state, found.time, found.code)
+    y, time = _without_derivatives(found.undetermined, (found.y.state, found.time))
+    return reset_on_arrival(spec, args, y, time, found.code)
+
+
+@jax.custom_jvp
+def _without_derivatives(undetermined: Scalar, values: PyTree) -> PyTree:
+    """The values, whose derivatives are NaN where `undetermined`."""
+    del undetermined
+    return values
+
+
+@_without_derivatives.defjvp
+def _without_derivatives_jvp(
+    primals: tuple[Scalar, PyTree], tangents: tuple[Scalar, PyTree]
+) -> tuple[PyTree, PyTree]:
+    undetermined, values = primals
+    factor = jnp.where(undetermined, jnp.nan, 1.0)
+    return values, jtu.tree_map(lambda dot: dot * factor, tangents[1])
 
 
 def reset_on_arrival(

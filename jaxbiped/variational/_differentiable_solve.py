@@ -62,7 +62,7 @@ def solve_scene(solve: Solve, setting: Setting) -> Solved:
     time; where a simulation ended otherwise, they are at that fixed time. They come from tangent
     columns of exactly the leaves that are differentiated, under a tolerance of their own, in a
     solve of their own: in forward mode one for all directions, in reverse mode its transpose.
-    Where a switch is grazed they are not determined, and NaN.
+    Where a switch is grazed, or the field jumps at the very end, they are NaN.
 
     Raises:
         UnknownPrimitiveError: the scene holds an operation that lanes do not have.
@@ -155,7 +155,7 @@ def _tangents(
     total = [jnp.zeros_like(leaf) for leaf in state]
     if places or active:
         found = _columns(setting, solve, places, active, t)
-        columns = jnp.where(found.grazes > 0, jnp.nan, found.columns)
+        columns = jnp.where(found.undetermined, jnp.nan, found.columns)
         dots = [solve_dot.state[i] for i in places] + [scene_dots[i] for i in active]
         for k, dot in enumerate(dots):
             total = [sum_ + columns[k, i] * dot for i, sum_ in enumerate(total)]

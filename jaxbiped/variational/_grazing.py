@@ -10,9 +10,10 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped._types import Scalar
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_cubic import StepCubic
 
@@ -35,26 +36,28 @@ class Turns(NamedTuple):
 def turns_of(
     cubic: StepCubic,
     live: Scalar,
+    corner: np.ndarray,
     values: Callable[[PyTree], Scalar],
     state: PyTree,
-    rtol: RealScalarLike,
+    errors: PyTree,
 ) -> Turns:
     """The turns of k switches.
 
     Args:
         cubic: their values over the step, shape (k,).
         live: whether the field is not smooth there (booleans), shape (k,).
+        corner: which of them no derivative hangs on where they are touched (booleans), shape (k,).
         values: their values at a state, shape (k,).
-        state: the step's end.
-        rtol: relative tolerance of the state.
+        state: the step's end, and what `errors` it may have.
     """
-    places, turning = cubic.turning_point(), cubic.turns() & live
+    places, turning = cubic.turning_point(), cubic.turns() & live & ~corner
     leaves, structure = jtu.tree_flatten(state)
 
     def graze() -> Scalar:
         normals = jax.jacfwd(lambda y: values(jtu.tree_unflatten(structure, y)))(leaves)
-        sizes = [jnp.abs(normal * leaf) for normal, leaf in zip(normals, leaves, strict=True)]
-        known_to = rtol * sum(sizes, jnp.zeros(()))
+        known_to = jnp.zeros_like(cubic.start)
+        for normal, error in zip(normals, jtu.tree_leaves(errors), strict=True):
+            known_to = known_to + jnp.abs(normal) * error
         return jnp.any(turning & (jnp.abs(cubic.at(places)) <= known_to))
 
     turns = jnp.any(turning)

@@ -15,20 +15,21 @@ from jaxbiped.compiler import Recorded, Recording
 from jaxbiped.solve._accuracy import Precision, rms_norm
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._step_control import first_step, step_control
-from jaxbiped.variational._switch_locator import (
-    SwitchLocator,
-    SwitchLocatorState,
-    Watch,
-    plain_args,
-    plain_state,
-)
+from jaxbiped.variational._switch_locator import SwitchLocator, SwitchLocatorState, Watch
 from jaxbiped.variational._tangent_solver import (
     TangentControl,
     TangentSolver,
     VariationalField,
     worst_norm,
 )
-from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
+from jaxbiped.variational._tangents import (
+    Seeded,
+    Tangents,
+    along_columns,
+    as_columns,
+    plain_args,
+    plain_state,
+)
 
 Along: TypeAlias = Callable[
     [Callable[[PyTree, PyTree], PyTree], Tangents, Seeded], tuple[PyTree, PyTree]
@@ -82,6 +83,11 @@ class SectionArrival(NamedTuple):
     grazes: Scalar
     attempted: Scalar
     nodes: Nodes | None
+
+    @property
+    def undetermined(self) -> Scalar:
+        """Whether derivatives of the arrival are not to be had (boolean)."""
+        return self.missed | (self.grazes > 0)
 
 
 def solve_to_section(

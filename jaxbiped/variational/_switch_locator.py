@@ -12,15 +12,16 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.solve._step_cubic import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
 from jaxbiped.variational._grazing import Turns, turns_of
-from jaxbiped.solve._step_cubic import StepCubic
-from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._tangents import plain_args, plain_state
 
 _OVERSHOOT = 1e-4
 """Largest part of a step that may lie past a switch."""
@@ -58,6 +59,8 @@ class SwitchLocatorState(NamedTuple):
         accepted: number of steps accepted.
         landings: number of them that ended just past a switch.
         jumps: number of them that ended past a switch where the vector field itself jumps.
+        sizes: the largest absolute values of the state's leaves so far: what its error is
+            relative to. None where there are no switches.
         grazes: number of steps in which a switch was grazed: no derivatives are determined then.
         saltation_pending: whether the last accepted step did: columns have yet to jump there.
         peak_saltation_pending: whether the step with the largest value did.
@@ -68,6 +71,7 @@ class SwitchLocatorState(NamedTuple):
     """
 
     inner: PyTree
+    sizes: PyTree
     accepted: Scalar
     landings: Scalar
     jumps: Scalar
@@ -104,13 +108,16 @@ class SwitchLocator(AbstractWrappedControl):
     ) -> tuple[Scalar, SwitchLocatorState]:
         """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(terms, t0, t1, y0, dt0, args, *rest)
-        zero = jnp.asarray(0)
+        zero, no = jnp.asarray(0), jnp.asarray(False)
         peak = None
         if self.watch.peak is not None:
             peak = jax.lax.stop_gradient(self.watch.peak(plain_args(args), plain_state(y0)))
         at_peak = None if peak is None else y0
-        no = jnp.asarray(False)
-        return first, SwitchLocatorState(inner, *[zero] * 4, no, no, no, zero, peak, at_peak)
+        state, sizes = plain_state(y0), None
+        if self.watch.switches(plain_args(args), state):
+            sizes = jax.lax.stop_gradient(jtu.tree_map(jnp.abs, state))
+        counts = zero, zero, zero, zero
+        return first, SwitchLocatorState(inner, sizes, *counts, no, no, no, zero, peak, at_peak)
 
     def adapt_step_size(
         self,
@@ -176,7 +183,7 @@ class SwitchLocator(AbstractWrappedControl):
         count = len(crossed) - others
         switching = crossed[:count]
         jumps = [c for c, s in zip(switching, at_end, strict=False) if s.force_jumps]
-        turns = self._turns(span, scene, before, after) if count else None
+        turns = self._turns(span, scene, before, after, landed.sizes) if count else None
         none = jnp.asarray(False)
         any_crossed = functools.reduce(jnp.logical_or, crossed, none)
         if turns is not None:
@@ -207,7 +214,9 @@ class SwitchLocator(AbstractWrappedControl):
         )
         return found, part
 
-    def _turns(self, span: Scalar, scene: PyTree, before: PyTree, after: PyTree) -> Turns:
+    def _turns(
+        self, span: Scalar, scene: PyTree, before: PyTree, after: PyTree, sizes: PyTree
+    ) -> Turns:
         """Where switches turn near zero between the ends of a step."""
         field, switches = self.watch.field, functools.partial(self.watch.switches, scene)
 
@@ -219,9 +228,12 @@ class SwitchLocator(AbstractWrappedControl):
             rate = field(jnp.zeros_like(span), state, scene)
             value, slope = jax.jvp(values, (state,), (rate,))
             ends += [value, span * slope]
-        live = [a.live & b.live for a, b in zip(switches(before), switches(after), strict=True)]
+        both = list(zip(switches(before), switches(after), strict=True))
+        live = jnp.stack([jnp.asarray(old.live & new.live) for old, new in both])
+        corner = np.array([switch.corner for switch, _ in both])
         cubic = StepCubic(ends[0], ends[2], ends[1], ends[3])
-        return turns_of(cubic, jnp.stack([jnp.asarray(l) for l in live]), values, after, self.rtol)
+        errors = jtu.tree_map(lambda size: self.rtol * size, sizes)
+        return turns_of(cubic, live, corner, values, after, errors)
 
     def _landed(
         self,
@@ -233,7 +245,13 @@ class SwitchLocator(AbstractWrappedControl):
         y1: PyTree,
         old: SwitchLocatorState,
     ) -> SwitchLocatorState:
-        code = old.code
+        code, sizes = old.code, old.sizes
+        if sizes is not None:
+            sizes = jtu.tree_map(
+                lambda size, leaf: jnp.where(keep, jnp.maximum(size, jnp.abs(leaf)), size),
+                sizes,
+                after,
+            )
         if self.watch.ending is not None:
             ending = functools.partial(self.watch.ending, scene, after)
             code = jnp.where(keep, fusion_barrier(keep, ending), 0)
@@ -246,6 +264,7 @@ class SwitchLocator(AbstractWrappedControl):
             at_peak = jtu.tree_map(lambda a, b: jnp.where(record, a, b), y1, at_peak)
         return SwitchLocatorState(
             inner=inner,
+            sizes=sizes,
             accepted=old.accepted + jnp.where(keep, 1, 0),
             landings=old.landings + jnp.where(keep & crossed.switch, 1, 0),
             jumps=old.jumps + jnp.where(keep & crossed.jump, 1, 0),
@@ -265,16 +284,6 @@ class _Crossed(NamedTuple):
     jump: Scalar
     section: Scalar
     graze: Scalar
-
-
-def plain_state(y: PyTree) -> PyTree:
-    """The state without its columns."""
-    return y.state if isinstance(y, Tangents) else y
-
-
-def plain_args(args: PyTree) -> PyTree:
-    """The arguments without their seeds."""
-    return args.args if isinstance(args, Seeded) else args
 
 
 def _surfaces(watch: Watch, peak: PyTree, scene: PyTree, state: PyTree) -> list[Switch]:

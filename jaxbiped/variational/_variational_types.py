@@ -61,3 +61,8 @@ class VariationalSolution(NamedTuple):
     grazes: Scalar
     peak: Scalar
     peak_columns: Scalar
+
+    @property
+    def undetermined(self) -> Scalar:
+        """Whether the columns are not the derivatives of the motion (boolean)."""
+        return self.missed | (self.grazes > 0)

@@ -17,3 +17,4 @@ def test_nothing_is_silently_wrong(tmp_path):
     assert numbers["gaits"]["compared"] >= 2
     (graze,) = numbers["grazing"]
     assert graze["accurate"] >= 6
+    assert graze["silently_wrong"] == 0

@@ -4,7 +4,7 @@ A foot that is off the ground at both ends of a step may touch it in between. No
 sees that where no stage of the step falls on it.
 """
 
-from typing import Any
+from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
@@ -60,7 +60,9 @@ class ShallowContact(AbstractWrappedControl):
         keep, next_t0, next_t1, jump, inner, result = self.controller.adapt_step_size(
             t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state
         )
-        again, target = jax.lax.stop_gradient(_touchdown(args, t0, t1, y0, y1_candidate))
+        start, span = cast(Scalar, t0), cast(Scalar, t1 - t0)
+        found = _touchdown(args, start, span, y0, y1_candidate)
+        again, target = jax.lax.stop_gradient(found)
         next_t1 = jnp.where(again, jnp.where(keep, target, jnp.minimum(next_t1, target)), next_t1)
         next_t0 = jnp.where(again, t0, next_t0)
         inner = jtu.tree_map(lambda a, b: jnp.where(again, a, b), controller_state, inner)
@@ -68,10 +70,9 @@ class ShallowContact(AbstractWrappedControl):
 
 
 def _touchdown(
-    scene: PyTree, t0: Time, t1: Time, y0: PyTree, y1: PyTree
+    scene: PyTree, t0: Scalar, span: Scalar, y0: PyTree, y1: PyTree
 ) -> tuple[Scalar, Scalar]:
     """Whether a step is to end at a contact that it would step over, and when [s]."""
-    span = t1 - t0
     before = feet(scene, y0)
     places = [k for k in range(2) if before[k].admitted is not False]
     within_reach = jnp.zeros_like(span, dtype=bool)
@@ -87,7 +88,7 @@ def _touchdown(
 
     part = jnp.where(within_reach, fusion_barrier(within_reach, first), 1.0)
     target = t0 + span * part * (1.0 + _OVERSHOOT) + _MARGIN
-    return (part < _ALL) & (target < t1), target
+    return (part < _ALL) & (target < t0 + span), target
 
 
 def _part_above(span: Scalar, before: Foot, after: Foot) -> Scalar:
