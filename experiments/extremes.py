@@ -85,6 +85,7 @@ def _grazed(swept: extremes.Grazing) -> dict[str, Any]:
     accurate, flagged = swept.errors <= WITHIN, swept.flagged
     return {
         "law": swept.law,
+        "accuracy": swept.accuracy,
         "derivatives": len(accurate),
         "accurate": int(np.sum(accurate)),
         "flagged": int(np.sum(flagged)),

@@ -336,7 +336,7 @@ def of_extremes(numbers: dict[str, Any]) -> Iterator[str]:
         yield f"{name} {small(median)} (at most {small(gaits['largest_error'][name])})"
     for swept in numbers["grazing"]:
         counted = (str(swept[name]) for name in ("derivatives", *verdicts[1:3], "silently_wrong"))
-        yield row(swept["law"], *counted, small(swept["largest_accurate"]))
+        yield row(swept["law"], swept["accuracy"], *counted, small(swept["largest_accurate"]))
 
 
 QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {

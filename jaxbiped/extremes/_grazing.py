@@ -24,6 +24,7 @@ _POINTS, _SHALLOW = 4000, 1e-6
 """No step of the check is longer than that share of the time, and than a smaller one the shallower
 a contact is below that [m]: it is short."""
 _LAWS = ("ristow-schafer", "kelvin-voigt", "hertz")
+_ACCURACIES = ("balanced", "tight")
 _FINE, _SHARE, _LARGEST = 1e-13, 0.2, 1e-6
 """Tolerance of the check, and its differences: a share of the distance from grazing, at most."""
 
@@ -35,12 +36,14 @@ class Grazing(NamedTuple):
 
     Attributes:
         law: of the normal force.
+        accuracy: that ours were asked for at.
         heights: of the foot's lowest point had there been no ground [m], shape (n,).
         derivatives, differences: by us and by the check, shape (n, 8), in units of the walker's
             state over its leg length.
     """
 
     law: str
+    accuracy: str
     heights: np.ndarray
     derivatives: np.ndarray
     differences: np.ndarray
@@ -64,32 +67,37 @@ def grazing(*, each: int = 25, laws: int = len(_LAWS)) -> list[Grazing]:
     """Sweeps through grazing, `each` heights above and below it, under up to three laws."""
     heights = np.geomspace(1e-9, 1e-3, each)
     heights = np.concatenate([-heights[::-1], heights])
-    return [_swept(name, heights) for name in _LAWS[:laws]]
+    return [swept for name in _LAWS[:laws] for swept in _swept(name, heights)]
 
 
-def _swept(name: str, heights: np.ndarray) -> Grazing:
+def _swept(name: str, heights: np.ndarray) -> list[Grazing]:
     scene = dataclasses.replace(seed_scene(), clearance=AlwaysTouching())
     law = normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
     scene = dataclasses.replace(scene, normal=law)
     p = check_numbers(scene)
     units, touching = scales(p, 8), _START[1] - _lowest(p)
     starts = touching + heights
+    differences = np.array(
+        [_difference(z, h, p) * p[2] / units for z, h in zip(starts, heights, strict=True)]
+    )
 
-    def end(height: Parameter) -> State:
-        return _end(scene, height)
+    def derivatives(accuracy: str) -> np.ndarray:
+        def end(height: Parameter) -> State:
+            return _end(scene, height, accuracy)
 
-    found = jax.vmap(jax.jacfwd(end))(jnp.asarray(starts))
-    derivatives = np.stack([np.asarray(leaf) for leaf in found], axis=1) * p[2] / units
-    differences = [
-        _difference(z, h, p) * p[2] / units for z, h in zip(starts, heights, strict=True)
+        found = jax.vmap(jax.jacfwd(end))(jnp.asarray(starts))
+        return np.stack([np.asarray(leaf) for leaf in found], axis=1) * p[2] / units
+
+    return [
+        Grazing(name, accuracy, heights, derivatives(accuracy), differences)
+        for accuracy in _ACCURACIES
     ]
-    return Grazing(name, heights, derivatives, np.array(differences))
 
 
-def _end(scene: Scene, height: Parameter) -> State:
+def _end(scene: Scene, height: Parameter, accuracy: str) -> State:
     state = State(*map(jnp.asarray, _START))._replace(hip_z=jnp.asarray(height))
     return simulate(
-        scene, state, duration=_TIME, save="end", watch=(), engine="lanes", accuracy="tight"
+        scene, state, duration=_TIME, save="end", watch=(), engine="lanes", accuracy=accuracy
     ).final
 
 

@@ -107,24 +107,28 @@ def reverse_by_xla(
         max_solver_steps=spec.max_solver_steps,
         columns_only_choose_steps=True,
     )
-    y, time = _without_derivatives(found.undetermined, (found.y.state, found.time))
+    known = (found.y.state, found.time)
+    y, time = _without_derivatives(found.undetermined, known, (args, state))
     return reset_on_arrival(spec, args, y, time, found.code)
 
 
 @jax.custom_jvp
-def _without_derivatives(undetermined: Scalar, values: PyTree) -> PyTree:
-    """The values, whose derivatives are NaN where `undetermined`."""
-    del undetermined
+def _without_derivatives(undetermined: Scalar, values: PyTree, given: PyTree) -> PyTree:
+    """The values, whose derivatives are NaN where `undetermined`: by all that was `given`."""
+    del undetermined, given
     return values
 
 
 @_without_derivatives.defjvp
 def _without_derivatives_jvp(
-    primals: tuple[Scalar, PyTree], tangents: tuple[Scalar, PyTree]
+    primals: tuple[Scalar, PyTree, PyTree], tangents: tuple[Scalar, PyTree, PyTree]
 ) -> tuple[PyTree, PyTree]:
-    undetermined, values = primals
-    factor = jnp.where(undetermined, jnp.nan, 1.0)
-    return values, jtu.tree_map(lambda dot: dot * factor, tangents[1])
+    undetermined, values, _ = primals
+    _, dots, given = tangents
+    # Also by what the values do not depend on here, but may on the other side.
+    nothing = jnp.where(undetermined, jnp.nan, 0.0)
+    moved = sum((dot * nothing for dot in jtu.tree_leaves(given)), jnp.zeros(()))
+    return values, jtu.tree_map(lambda dot: dot + moved, dots)
 
 
 def reset_on_arrival(
