@@ -7,7 +7,9 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.gait._orbit import slopes_of
+from jaxbiped.gait._fixed_point_search import Found
+from jaxbiped.gait._orbit import orbit_of, slopes_of
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
 
 pytestmark = pytest.mark.slow
 
@@ -119,3 +121,31 @@ def test_a_linearised_return_counts_its_grazes(engine):
     assert counts[:2].tolist() == [0, 0]
     assert np.all(counts[2:] > 0)
     assert np.all(np.isnan(slopes[2:]))
+
+
+def test_an_orbit_that_grazes_has_no_sensitivities_and_multipliers_of_infinite_error():
+    args = (jnp.asarray(PULL), jnp.asarray(PUSH))
+    how = dict(rtol=1e-9, tangent_rtol=1e-8, section=ABOVE, system=Pulled(), engine="lanes")
+
+    def orbit(depth):
+        once = jb.gait.linearise_return_map(args, start(depth), **how)
+        zero = jnp.asarray(0)
+        found = Found(
+            ending=zero,
+            code=zero,
+            recurring=once.recurring,
+            residual=jnp.zeros(()),
+            both=jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), once),
+            evaluations=zero,
+            history=jnp.zeros(1),
+            sound=jnp.asarray(True),
+        )
+        spec = ReturnMapSpec(Pulled(), ABOVE, jb.solvers.Rodas4(), 10.0, 1, 4096, "lanes")
+        return orbit_of(spec, args, (0, 1), start(depth), found, radius=False)
+
+    known, grazing = orbit(1e-3), orbit(1e-12)
+    assert np.all(np.isfinite(known.stability.errors))
+    assert np.all(np.isfinite(known.slopes.period))
+    assert np.all(np.isinf(grazing.stability.errors))
+    assert np.all(np.isfinite(grazing.stability.multipliers))
+    assert np.all(np.isnan(grazing.slopes.period))
