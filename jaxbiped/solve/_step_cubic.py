@@ -61,11 +61,6 @@ class StepCubic(NamedTuple):
         inside = self.turns() & (below > steep)
         return jnp.where(inside, steep / jnp.where(inside, below, 1.0), 1.0)
 
-    def bend_at(self, place: Scalar) -> Scalar:
-        """Its second derivative at a place."""
-        second, third = self._bends()
-        return 2.0 * second + 6.0 * third * place
-
     def may_touch(self) -> Scalar:
         """Whether, of one sign at both ends, it falls so low that it may reach zero (booleans)."""
         side = jnp.where(self.start > 0.0, 1.0, -1.0)

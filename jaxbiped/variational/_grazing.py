@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_cubic import StepCubic
 
@@ -34,24 +35,36 @@ class Turns(NamedTuple):
 
 
 def turns_of(
-    cubic: StepCubic,
-    live: Scalar,
-    corner: np.ndarray,
-    values: Callable[[PyTree], Scalar],
-    state: PyTree,
+    rates: Callable[[PyTree], PyTree],
+    switches: Callable[[PyTree], tuple[Switch, ...]],
+    span: Scalar,
+    before: PyTree,
+    after: PyTree,
     errors: PyTree,
 ) -> Turns:
-    """The turns of k switches.
+    """The turns of k switches within a step.
 
     Args:
-        cubic: their values over the step, shape (k,).
-        live: whether the field is not smooth there (booleans), shape (k,).
-        corner: which of them no derivative hangs on where they are touched (booleans), shape (k,).
-        values: their values at a state, shape (k,).
-        state: the step's end, and what `errors` it may have.
+        rates: the field at a state.
+        switches: the switches at a state.
+        span: the step's duration [s].
+        before, after: states at its ends.
+        errors: that a state may have.
     """
+
+    def values(y: PyTree) -> Scalar:
+        return jnp.stack([switch.value for switch in switches(y)])
+
+    ends: list[Scalar] = []
+    for state in (before, after):
+        value, slope = jax.jvp(values, (state,), (rates(state),))
+        ends += [value, span * slope]
+    cubic = StepCubic(ends[0], ends[2], ends[1], ends[3])
+    both = list(zip(switches(before), switches(after), strict=True))
+    live = jnp.stack([jnp.asarray(old.live & new.live) for old, new in both])
+    corner = np.array([switch.corner for switch, _ in both])
     places, turning = cubic.turning_point(), cubic.turns() & live & ~corner
-    leaves, structure = jtu.tree_flatten(state)
+    leaves, structure = jtu.tree_flatten(after)
 
     def graze() -> Scalar:
         normals = jax.jacfwd(lambda y: values(jtu.tree_unflatten(structure, y)))(leaves)

@@ -12,7 +12,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
-import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
@@ -20,7 +19,7 @@ from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_cubic import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
-from jaxbiped.variational._grazing import Turns, turns_of
+from jaxbiped.variational._grazing import turns_of
 from jaxbiped.variational._tangents import plain_args, plain_state
 
 _OVERSHOOT = 1e-4
@@ -89,7 +88,8 @@ class SwitchLocator(AbstractWrappedControl):
 
     So no step straddles a jump of the Jacobian, which would ruin derivatives taken through the
     solver long before the state shows it. Where to end comes from the switch functions and their
-    rates at both ends of the step, by a cubic; a few attempts do. The first step of a solve never
+    rates at both ends of the step, by a cubic; a few attempts do. Where a switch comes near zero
+    within a step, that ends there, lest it be crossed twice. The first step of a solve never
     counts as an arrival, so a solve may start on its section.
     """
 
@@ -183,7 +183,16 @@ class SwitchLocator(AbstractWrappedControl):
         count = len(crossed) - others
         switching = crossed[:count]
         jumps = [c for c, s in zip(switching, at_end, strict=False) if s.force_jumps]
-        turns = self._turns(span, scene, before, after, landed.sizes) if count else None
+        turns = None
+        if count:
+            turns = turns_of(
+                lambda y: watch.field(jnp.zeros_like(span), y, scene),
+                functools.partial(watch.switches, scene),
+                span,
+                before,
+                after,
+                errors=jtu.tree_map(lambda size: self.rtol * size, landed.sizes),
+            )
         none = jnp.asarray(False)
         any_crossed = functools.reduce(jnp.logical_or, crossed, none)
         if turns is not None:
@@ -213,27 +222,6 @@ class SwitchLocator(AbstractWrappedControl):
             none if turns is None else turns.graze,
         )
         return found, part
-
-    def _turns(
-        self, span: Scalar, scene: PyTree, before: PyTree, after: PyTree, sizes: PyTree
-    ) -> Turns:
-        """Where switches turn near zero between the ends of a step."""
-        field, switches = self.watch.field, functools.partial(self.watch.switches, scene)
-
-        def values(y: PyTree) -> Scalar:
-            return jnp.stack([switch.value for switch in switches(y)])
-
-        ends: list[Scalar] = []
-        for state in (before, after):
-            rate = field(jnp.zeros_like(span), state, scene)
-            value, slope = jax.jvp(values, (state,), (rate,))
-            ends += [value, span * slope]
-        both = list(zip(switches(before), switches(after), strict=True))
-        live = jnp.stack([jnp.asarray(old.live & new.live) for old, new in both])
-        corner = np.array([switch.corner for switch, _ in both])
-        cubic = StepCubic(ends[0], ends[2], ends[1], ends[3])
-        errors = jtu.tree_map(lambda size: self.rtol * size, sizes)
-        return turns_of(cubic, live, corner, values, after, errors)
 
     def _landed(
         self,

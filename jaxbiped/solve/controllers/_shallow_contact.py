@@ -77,8 +77,10 @@ def _touchdown(
     places = [k for k in range(2) if before[k].admitted is not False]
     within_reach = jnp.zeros_like(span, dtype=bool)
     for k in places:
-        reached = before[k].penetration + _REACH * span * before[k].penetration_rate
-        within_reach = within_reach | ((before[k].penetration <= 0.0) & (reached > 0.0))
+        foot = before[k]
+        reached = foot.penetration + _REACH * span * foot.penetration_rate
+        near = (foot.penetration <= 0.0) & (reached > 0.0)
+        within_reach = within_reach | (near if foot.admitted is None else near & foot.admitted)
 
     def first() -> Scalar:
         after, part = feet(scene, y1), jnp.ones_like(span)
@@ -102,13 +104,17 @@ def _part_above(span: Scalar, before: Foot, after: Foot) -> Scalar:
     off = depth.start <= 0.0
     if before.admitted is not None and after.admitted is not None:
         off = off & before.admitted & after.admitted
-    lowest = jnp.where(depth.may_touch(), depth.turning_point(), 1.0)
-    deepest = depth.at(lowest)
-    leaves = (depth.end <= 0.0) & depth.may_touch()
-    stays = (depth.end > 0.0) & (depth.end < -_BARELY * depth.start)
+    leaves = off & (depth.end <= 0.0) & depth.may_touch()
+    stays = off & (depth.end > 0.0) & (depth.end < -_BARELY * depth.start)
     stays = stays & (jnp.abs(depth.end_slope) < _BARELY * depth.start_slope)
-    # The same cubic up to there, where it has a sign change to be found.
-    slope_there = jnp.where(leaves, 0.0, depth.end_slope)
-    down = StepCubic(depth.start, deepest, lowest * depth.start_slope, lowest * slope_there)
-    place = jnp.where(deepest > 0.0, lowest * down.sign_change(), lowest)
-    return jnp.where(off & (leaves | stays), place, 1.0)
+    lowest = jnp.where(leaves, depth.turning_point(), 1.0)
+    deepest = depth.at(lowest)
+    contact = (leaves | stays) & (deepest > 0.0)
+
+    def touchdown() -> Scalar:
+        # The same cubic up to there, where it has a sign change to be found.
+        slope_there = jnp.where(leaves, 0.0, depth.end_slope)
+        down = StepCubic(depth.start, deepest, lowest * depth.start_slope, lowest * slope_there)
+        return lowest * down.sign_change()
+
+    return jnp.where(contact, fusion_barrier(contact, touchdown), lowest)
