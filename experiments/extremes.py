@@ -82,13 +82,16 @@ def _merged(groups: dict[str, dict[str, int]]) -> dict[str, dict[str, int]]:
 
 def _grazed(swept: extremes.Grazing) -> dict[str, Any]:
     """How derivatives about a graze compare with differences of the check."""
-    wrong = ~(swept.errors <= WITHIN)
+    accurate, flagged = swept.errors <= WITHIN, swept.flagged
     return {
         "law": swept.law,
-        "derivatives": len(wrong),
-        "accurate": int(np.sum(~wrong)),
-        "deepest_wrong_m": float(np.max(-swept.heights[wrong], initial=0.0)),
-        "largest_accurate": float(np.max(swept.errors[~wrong], initial=0.0)),
+        "accuracy": swept.accuracy,
+        "derivatives": len(accurate),
+        "accurate": int(np.sum(accurate)),
+        "flagged": int(np.sum(flagged)),
+        "silently_wrong": int(np.sum(~accurate & ~flagged)),
+        "farthest_flagged_m": float(np.max(np.abs(swept.heights[flagged]), initial=0.0)),
+        "largest_accurate": float(np.max(swept.errors[accurate], initial=0.0)),
     }
 
 

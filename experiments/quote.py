@@ -362,8 +362,8 @@ def of_extremes(numbers: dict[str, Any]) -> Iterator[str]:
     for name, median in gaits["median_error"].items():
         yield f"{name} {small(median)} (at most {small(gaits['largest_error'][name])})"
     for swept in numbers["grazing"]:
-        counted = (str(swept["derivatives"]), str(swept["accurate"]))
-        yield row(swept["law"], *counted, small(swept["deepest_wrong_m"]))
+        counted = (str(swept[name]) for name in ("derivatives", *verdicts[1:3], "silently_wrong"))
+        yield row(swept["law"], swept["accuracy"], *counted, small(swept["largest_accurate"]))
 
 
 QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {

@@ -30,7 +30,8 @@ class BranchPoint(NamedTuple):
         step_length: advance along the slope in it [m].
         peak_normal: largest normal force on a foot [N].
         multipliers: Floquet multipliers, largest first, without the trivial one, shape (m − 1,).
-        multiplier_errors: their estimated errors, shape (m − 1,).
+        multiplier_errors: their estimated errors, shape (m − 1,); infinite where the gait grazes a
+            switch.
         unit_multiplier_error: distance from 1 of the multiplier that must be 1.
         bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
         residual: largest change of a component over the cycle, SI units.
@@ -115,7 +116,7 @@ def branch_point(curve: Curve, axis: Axis, found: CurvePoint) -> BranchPoint:
         step_length=float(cycle.advance[0]),
         peak_normal=float(cycle.peak[0]),
         multipliers=values,
-        multiplier_errors=errors,
+        multiplier_errors=np.where(cycle.grazes[0] > 0, np.inf, errors),
         unit_multiplier_error=_unit_error(cycle),
         bifurcation=int(_bifurcation(values, errors)),
         residual=float(np.max(np.abs(found.change.value))),

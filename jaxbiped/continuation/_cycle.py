@@ -37,6 +37,7 @@ class Cycle(NamedTuple):
         advance: along the slope [m].
         peak: largest force on a foot [N].
         code: 0 or that of the `Ending` that came instead.
+        grazes: how often a switch was touched or missed by less than the tolerance resolves.
         sound: whether every footstep goes downhill and on the ground (see `is_sound`).
     """
 
@@ -48,6 +49,7 @@ class Cycle(NamedTuple):
     advance: Numbers
     peak: Numbers
     code: Numbers
+    grazes: Numbers
     sound: Numbers
 
 
@@ -131,6 +133,7 @@ def _chain(
             advance=before.advance + once.advance[0],
             peak=jnp.maximum(before.peak, once.peak),
             code=jnp.where(before.code != 0, before.code, once.code),
+            grazes=before.grazes + once.grazes,
             sound=before.sound & is_sound(scene, y, once.advance[0], once.period),
         )
 
@@ -144,6 +147,7 @@ def _chain(
         advance=zero,
         peak=zero,
         code=jnp.asarray(0),
+        grazes=jnp.asarray(0),
         sound=jnp.asarray(True),
     )
     return jax.lax.fori_loop(0, footsteps, add, begin)

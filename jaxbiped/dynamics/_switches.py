@@ -21,11 +21,14 @@ class Switch(NamedTuple):
             corner under a foot that carries nothing.
         force_jumps: whether the field itself jumps, not its Jacobian alone. Known before
             anything runs.
+        corner: whether the force is there on both sides and only its slope jumps, as where
+            friction peaks: a touch of it changes no derivative. Known before anything runs.
     """
 
     value: Scalar
     live: Scalar | bool
     force_jumps: bool = False
+    corner: bool = False
 
 
 def switches(scene: CompliantScene, state: CompliantState) -> tuple[Switch, ...]:
@@ -57,8 +60,9 @@ def _foot_switches(scene: CompliantScene, foot: Foot, rate: Scalar) -> list[Swit
     carries = foot_force(scene, foot).normal > 0.0
     found = [Switch(foot.penetration, admitted, force_jumps=scene.normal.jumps_at_touchdown)]
     reaction = scene.normal.switches(foot.penetration, foot.penetration_rate)
-    found += [Switch(value, touching) for value in reaction]
-    found += [Switch(value, carries) for value in scene.friction.switches(foot.slip_speed)]
+    found += [Switch(value, touching, corner=True) for value in reaction]
+    slips = scene.friction.switches(foot.slip_speed)
+    found += [Switch(value, carries, corner=True) for value in slips]
     if foot.admitted is not None:
         pressed = below & (scene.normal.force(foot.penetration, foot.penetration_rate) > 0.0)
         found.append(Switch(rate, pressed, force_jumps=True))

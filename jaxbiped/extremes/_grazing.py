@@ -20,9 +20,11 @@ from jaxbiped.simulate._simulate import simulate
 _START = np.array([0.0, 0.8, -0.5, -1.2, 0.3, 1.0, 10.0, 0.0])
 """A walker in flight: leg 1 swings past the vertical, leg 2 is held high."""
 _TIME = 0.08
-_POINTS = 4000
-"""No step of the check is longer than that share of the time: shallow contacts are short."""
+_POINTS, _SHALLOW = 4000, 1e-6
+"""No step of the check is longer than that share of the time, and than a smaller one the shallower
+a contact is below that [m]: it is short."""
 _LAWS = ("ristow-schafer", "kelvin-voigt", "hertz")
+_ACCURACIES = ("balanced", "tight")
 _FINE, _SHARE, _LARGEST = 1e-13, 0.2, 1e-6
 """Tolerance of the check, and its differences: a share of the distance from grazing, at most."""
 
@@ -30,55 +32,72 @@ _FINE, _SHARE, _LARGEST = 1e-13, 0.2, 1e-6
 class Grazing(NamedTuple):
     """Derivatives of the final state with respect to the start's height, about grazing.
 
+    Where ours are NaN they are told as not determined.
+
     Attributes:
         law: of the normal force.
+        accuracy: that ours were asked for at.
         heights: of the foot's lowest point had there been no ground [m], shape (n,).
         derivatives, differences: by us and by the check, shape (n, 8), in units of the walker's
             state over its leg length.
     """
 
     law: str
+    accuracy: str
     heights: np.ndarray
     derivatives: np.ndarray
     differences: np.ndarray
 
     @property
+    def flagged(self) -> np.ndarray:
+        """Of which heights we tell that the derivatives are not determined (booleans), (n,)."""
+        return np.any(np.isnan(self.derivatives), axis=1)
+
+    @property
     def errors(self) -> np.ndarray:
-        """Largest differences over the largest derivative of that height or 1, shape (n,)."""
+        """Largest differences over the largest derivative of that height or 1, shape (n,).
+
+        NaN where there is a flag.
+        """
         apart = np.max(np.abs(self.derivatives - self.differences), axis=1)
         return apart / np.maximum(1.0, np.max(np.abs(self.differences), axis=1))
 
 
-def grazing(*, each: int = 20, laws: int = len(_LAWS)) -> list[Grazing]:
+def grazing(*, each: int = 25, laws: int = len(_LAWS)) -> list[Grazing]:
     """Sweeps through grazing, `each` heights above and below it, under up to three laws."""
-    heights = np.geomspace(1e-7, 1e-3, each)
+    heights = np.geomspace(1e-9, 1e-3, each)
     heights = np.concatenate([-heights[::-1], heights])
-    return [_swept(name, heights) for name in _LAWS[:laws]]
+    return [swept for name in _LAWS[:laws] for swept in _swept(name, heights)]
 
 
-def _swept(name: str, heights: np.ndarray) -> Grazing:
+def _swept(name: str, heights: np.ndarray) -> list[Grazing]:
     scene = dataclasses.replace(seed_scene(), clearance=AlwaysTouching())
     law = normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
     scene = dataclasses.replace(scene, normal=law)
     p = check_numbers(scene)
     units, touching = scales(p, 8), _START[1] - _lowest(p)
     starts = touching + heights
+    differences = np.array(
+        [_difference(z, h, p) * p[2] / units for z, h in zip(starts, heights, strict=True)]
+    )
 
-    def end(height: Parameter) -> State:
-        return _end(scene, height)
+    def derivatives(accuracy: str) -> np.ndarray:
+        def end(height: Parameter) -> State:
+            return _end(scene, height, accuracy)
 
-    found = jax.vmap(jax.jacfwd(end))(jnp.asarray(starts))
-    derivatives = np.stack([np.asarray(leaf) for leaf in found], axis=1) * p[2] / units
-    differences = [
-        _difference(z, h, p) * p[2] / units for z, h in zip(starts, heights, strict=True)
+        found = jax.vmap(jax.jacfwd(end))(jnp.asarray(starts))
+        return np.stack([np.asarray(leaf) for leaf in found], axis=1) * p[2] / units
+
+    return [
+        Grazing(name, accuracy, heights, derivatives(accuracy), differences)
+        for accuracy in _ACCURACIES
     ]
-    return Grazing(name, heights, derivatives, np.array(differences))
 
 
-def _end(scene: Scene, height: Parameter) -> State:
+def _end(scene: Scene, height: Parameter, accuracy: str) -> State:
     state = State(*map(jnp.asarray, _START))._replace(hip_z=jnp.asarray(height))
     return simulate(
-        scene, state, duration=_TIME, save="end", watch=(), engine="lanes", accuracy="tight"
+        scene, state, duration=_TIME, save="end", watch=(), engine="lanes", accuracy=accuracy
     ).final
 
 
@@ -93,9 +112,11 @@ def _lowest(p: np.ndarray) -> float:
 
 def _difference(height: float, above: float, p: np.ndarray) -> np.ndarray:
     step = min(_LARGEST, _SHARE * abs(above))
+    # A contact's duration goes with the root of its depth.
+    points = int(_POINTS * np.sqrt(max(1.0, _SHALLOW / abs(above))))
     ends = []
     for sign in (1.0, -1.0):
         start = _START.copy()
         start[1] = height + sign * step
-        ends.append(states_of(start, p, _TIME, _FINE, points=_POINTS)[-1])
+        ends.append(states_of(start, p, _TIME, _FINE, points=points)[-1])
     return (ends[0] - ends[1]) / (2.0 * step)

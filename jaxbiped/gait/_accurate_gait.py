@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped.gait._explain_search import grazing_sentence
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._solver import orbit_solver
@@ -74,7 +75,13 @@ def accurate_gait(
             return gait, ({}, np.inf, f"the search ended as {gait.outcome}")
         near = gait.measures.state
         witness = find(near, accuracy=precision, solver=other)
-        return gait, judge_gait(scene.minimal, gait, witness, radius)
+        judged = judge_gait(scene.minimal, gait, witness, radius)
+        if int(gait.grazes):  # which a finer tolerance may resolve
+            return gait, (judged[0], np.inf, grazing_sentence(gait) if finest(tolerance) else "")
+        return gait, judged
+
+    def finest(tolerance: float) -> bool:
+        return tolerance < (1.0 + 1e-6) * _FINEST
 
     first = min(max(_FIRST * wanted, _FINEST), 1e-5)
     dtype = np.dtype(jnp.result_type(*jtu.tree_leaves(scene)))

@@ -1,5 +1,7 @@
 """Explanation of a search for a gait, in a sentence."""
 
+import warnings
+
 from jaxbiped._ending import Ending
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
@@ -32,7 +34,24 @@ def explain_search(scene: AbstractScene, gait: Gait) -> str:
         text += f"; other gaits seen: {seen}"
     if not bool(gait.stable) and int(gait.origin.branch_end) != int(BranchEnd.NOT_FOLLOWED):
         text += f"; no stable one was seen{_branch(scene, gait)}"
+    if int(gait.grazes):
+        text += f"; {grazing_sentence(gait)}"
     return text
+
+
+def grazing_sentence(gait: Gait) -> str:
+    """What a grazed switch makes of a gait's derivatives, without a full stop."""
+    return (
+        f"the gait grazes a switch {int(gait.grazes)} times, as a foot that barely touches the "
+        "ground or misses it, by less than the tolerance resolves: its multipliers are those of "
+        "one side, its sensitivities not known"
+    )
+
+
+def warn_of_grazing(gait: Gait) -> None:
+    """Warns of a gait whose derivatives are not determined."""
+    if gait.outcome is Search.FOUND and int(gait.grazes):
+        warnings.warn(grazing_sentence(gait) + ".", RuntimeWarning, stacklevel=3)
 
 
 def _search_sentence(gait: Gait) -> str:

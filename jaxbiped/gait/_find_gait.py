@@ -27,6 +27,7 @@ from jaxbiped.dynamics._state import check_state
 from jaxbiped.gait._accurate_gait import accurate_gait
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._engine import orbit_engine
+from jaxbiped.gait._explain_search import warn_of_grazing
 from jaxbiped.gait._fixed_point_search import Found, Search, SearchArguments, search, walks_only
 from jaxbiped.gait._gait import Described, Gait, summarise_gait
 from jaxbiped.gait._newton import Method
@@ -105,7 +106,8 @@ def find_gait(
 
     Returns:
         The gait, or the best that was found instead: look at its `ending`. `found_by`, `others` and
-        `explain_search` tell how it was found.
+        `explain_search` tell how it was found. A `RuntimeWarning` tells where it grazes a switch,
+        so that derivatives are not determined.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
@@ -187,7 +189,9 @@ def find_gait(
         found = walks_only(found)
     elif not _is_stable(found):
         found, origin = _search_on(searching, modelled, found, engine)
-    return summarise_gait(spec, scene, start, found, *describing, origin)
+    gait = summarise_gait(spec, scene, start, found, *describing, origin)
+    warn_of_grazing(gait)
+    return gait
 
 
 def _is_stable(found: Found) -> bool:

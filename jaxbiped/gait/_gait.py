@@ -83,6 +83,9 @@ class Gait(eqx.Module):
         evaluations: evaluations of the return map that the search took.
         history: residual of each of them, NaN beyond the last.
         solver_steps: solver steps attempted in the last cycle.
+        grazes: how often the cycle touches a switch, as a foot the ground, or misses it, by less
+            than the tolerance resolves. Derivatives differ on both sides: multipliers are then
+            those of one side and their errors infinite, and sensitivities NaN.
         sound: whether the orbit is a walk: no foot deep underground, a step downhill,
             and more than a fraction of a swing between crossings (boolean).
         origin: how the search came to it, which other gaits it saw, and where the seed's gait
@@ -113,6 +116,7 @@ class Gait(eqx.Module):
     evaluations: Scalar
     history: Scalar
     solver_steps: Scalar
+    grazes: Scalar
     sound: Scalar
     origin: Origin
     orbit: tuple[Scalar, PyTree]
@@ -219,6 +223,7 @@ def summarise_gait(
         evaluations=found.evaluations,
         history=found.history,
         solver_steps=last.attempted,
+        grazes=last.grazes,
         sound=found.sound,
         origin=jtu.tree_map(jnp.asarray, origin),
         orbit=_path(last, start),

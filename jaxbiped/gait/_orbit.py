@@ -76,6 +76,8 @@ def orbit_of(
     last, coarse = found.last, found.coarse
     monodromy, witness = last.monodromy[:, :m], coarse.monodromy[:, :m]
     stability = stability_of(monodromy, witness, last.velocity, CLOSENESS)
+    unknown = jnp.where(last.grazes > 0, jnp.inf, stability.errors)
+    stability = stability._replace(errors=unknown)
     slopes, looser = (slopes_of(each) for each in (last, coarse))
     # Where the force itself jumped on the section, columns lack the jump's own correction.
     slopes = jax.tree.map(lambda leaf: jnp.where(last.missed > 0, jnp.nan, leaf), slopes)
@@ -99,11 +101,13 @@ def slopes_of(last: LinearisedReturn) -> Slopes:
         last: a return to where it began, with p directions of parameters.
 
     Returns:
-        Derivatives of the orbit, in units of the parameters' sizes.
+        Derivatives of the orbit, in units of the parameters' sizes; NaN where it grazes a switch,
+        for they differ on both sides.
     """
     m = last.recurring.shape[0]
     by_state, by_parameter = last.jacobian[:, :m], last.jacobian[:, m:]
     recurring = solve(jnp.eye(m) - by_state, by_parameter)
+    recurring = jnp.where(last.grazes > 0, jnp.nan, recurring)
 
     def total(rows: Scalar) -> Scalar:
         return rows[..., m:] + rows[..., :m] @ recurring

@@ -54,6 +54,8 @@ class LinearisedReturn(NamedTuple):
         attempted: solver steps attempted.
         jumps, missed: crossings where the vector field itself jumped, and how many of them had no
             correction.
+        grazes: how often a switch was touched, or missed, by less than the tolerance resolves:
+            derivatives are then those of one side.
         nodes: the ends of the steps of each solve to the section, leaves (steps, …), where saved.
     """
 
@@ -71,6 +73,7 @@ class LinearisedReturn(NamedTuple):
     attempted: Scalar
     jumps: Scalar
     missed: Scalar
+    grazes: Scalar
     nodes: Nodes | None
 
 
@@ -260,5 +263,6 @@ def _chain_arrivals(
         attempted=jnp.sum(arrivals.attempted),
         jumps=jnp.sum(arrivals.jumps),
         missed=jnp.sum(arrivals.missed),
+        grazes=jnp.sum(arrivals.grazes),
         nodes=arrivals.nodes,
     )

@@ -129,7 +129,10 @@ def _solve(
     places: tuple[int, ...],
     active: tuple[int, ...],
 ) -> VariationalSolution:
-    """Columns by these leaves of the state, then by the logarithms of these of the arguments."""
+    """Columns by these leaves of the state, then by the logarithms of these of the arguments.
+
+    NaN where they are not determined.
+    """
     m, p = len(places), len(active)
     columns = np.zeros((len(jtu.tree_leaves(state)), m + p))
     columns[list(places), range(m)] = 1.0
@@ -145,7 +148,8 @@ def _solve(
         max_time=spec.max_time,
         max_solver_steps=spec.max_solver_steps,
     )
-    return found
+    nan = jnp.where(found.undetermined, jnp.nan, 0.0)
+    return found._replace(columns=found.columns + nan, time_columns=found.time_columns + nan)
 
 
 def _sizes(args: PyTree, active: tuple[int, ...]) -> list[Scalar]:

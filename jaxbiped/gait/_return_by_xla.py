@@ -74,15 +74,17 @@ def _by_xla_forward_jvp(
         max_solver_steps=spec.max_solver_steps,
     )
     structure = jtu.tree_structure(state)
-    arrived = jtu.tree_unflatten(structure, list(found.y.columns[:, 0]))
+    arrived_row, time_row = jtu.tree_map(
+        lambda row: jnp.where(found.undetermined, jnp.nan, row),
+        (found.y.columns[:, 0], found.time_columns[0]),
+    )
+    arrived = jtu.tree_unflatten(structure, list(arrived_row))
 
     def reset_map(args: PyTree, y: PyTree) -> PyTree:
         return reset_on_arrival(spec, args, y, found.time, found.code)[0]
 
     _, end_dot = jax.jvp(reset_map, (args, found.y.state), (full_tangents(args_dot, args), arrived))
-    end_dot, time_dot = eqxi.nondifferentiable_backward(
-        (end_dot, found.time_columns[0]), msg=NO_REVERSE
-    )
+    end_dot, time_dot = eqxi.nondifferentiable_backward((end_dot, time_row), msg=NO_REVERSE)
     # The values by themselves: they must not depend on what they are differentiated along.
     values = forward_by_xla(spec, precision, args, state)
     return values, (end_dot, time_dot, None)
@@ -105,7 +107,28 @@ def reverse_by_xla(
         max_solver_steps=spec.max_solver_steps,
         columns_only_choose_steps=True,
     )
-    return reset_on_arrival(spec, args, found.y.state, found.time, found.code)
+    known = (found.y.state, found.time)
+    y, time = _without_derivatives(found.undetermined, known, (args, state))
+    return reset_on_arrival(spec, args, y, time, found.code)
+
+
+@jax.custom_jvp
+def _without_derivatives(undetermined: Scalar, values: PyTree, given: PyTree) -> PyTree:
+    """The values, whose derivatives are NaN where `undetermined`: by all that was `given`."""
+    del undetermined, given
+    return values
+
+
+@_without_derivatives.defjvp
+def _without_derivatives_jvp(
+    primals: tuple[Scalar, PyTree, PyTree], tangents: tuple[Scalar, PyTree, PyTree]
+) -> tuple[PyTree, PyTree]:
+    undetermined, values, _ = primals
+    _, dots, given = tangents
+    # Also by what the values do not depend on here, but may on the other side.
+    nothing = jnp.where(undetermined, jnp.nan, 0.0)
+    moved = sum((dot * nothing for dot in jtu.tree_leaves(given)), jnp.zeros(()))
+    return values, jtu.tree_map(lambda dot: dot + moved, dots)
 
 
 def reset_on_arrival(

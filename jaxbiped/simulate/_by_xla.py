@@ -20,6 +20,7 @@ from jaxbiped.solve._solvers import with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.controllers._extremes import Extremes
 from jaxbiped.solve.controllers._footstep_limit import PATIENCE, FootstepLimit
+from jaxbiped.solve.controllers._shallow_contact import ShallowContact
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 def by_xla(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`. A trajectory saved step by step keeps its full length."""
     solver: diffrax.AbstractSolver[PyTree] = run.solver
-    controller: PyTree = step_control(run.rtol, run.atol, rms_norm, run.units)
+    controller: PyTree = ShallowContact(step_control(run.rtol, run.atol, rms_norm, run.units))
     if run.dt is not None:
         controller = diffrax.ConstantStepSize()
         solver = with_root_tolerances(solver, run.rtol, run.atol)

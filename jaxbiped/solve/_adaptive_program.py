@@ -24,6 +24,7 @@ from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve._saved_outputs import LastStep, Saved
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
+from jaxbiped.solve.controllers._shallow_contact import ShallowContact
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.controllers._wrapped_control import StepControl
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, step_of
@@ -223,7 +224,8 @@ class AdaptiveSolve:
         return chosen(jnp.minimum, low), chosen(jnp.maximum, high)
 
     def _controller(self, solve: Solve) -> StepControl:
-        control = step_control(solve.rtol, solve.atol, rms_norm, solve.units)
+        control: StepControl = step_control(solve.rtol, solve.atol, rms_norm, solve.units)
+        control = ShallowContact(control)
         if not self.counting:
             return control
         return FootstepLimit(control, solve.footsteps)

@@ -62,6 +62,7 @@ def solve_scene(solve: Solve, setting: Setting) -> Solved:
     time; where a simulation ended otherwise, they are at that fixed time. They come from tangent
     columns of exactly the leaves that are differentiated, under a tolerance of their own, in a
     solve of their own: in forward mode one for all directions, in reverse mode its transpose.
+    Where a switch is grazed, or the field jumps at the very end, they are NaN.
 
     Raises:
         UnknownPrimitiveError: the scene holds an operation that lanes do not have.
@@ -153,7 +154,8 @@ def _tangents(
     active = tuple(i for i, dot in enumerate(scene_dots) if not _is_zero(dot))
     total = [jnp.zeros_like(leaf) for leaf in state]
     if places or active:
-        columns = _columns(setting, solve, places, active, t).columns
+        found = _columns(setting, solve, places, active, t)
+        columns = jnp.where(found.undetermined, jnp.nan, found.columns)
         dots = [solve_dot.state[i] for i in places] + [scene_dots[i] for i in active]
         for k, dot in enumerate(dots):
             total = [sum_ + columns[k, i] * dot for i, sum_ in enumerate(total)]

@@ -49,6 +49,7 @@ def solve_to_section_by_lanes(
         peak_columns=found.peak_columns,
         jumps=found.jumps,
         missed=found.missed,
+        grazes=found.grazes,
         attempted=found.attempted,
         nodes=None if recording is None else _nodes(y0.state, found, recording),
     )

@@ -15,20 +15,21 @@ from jaxbiped.compiler import Recorded, Recording
 from jaxbiped.solve._accuracy import Precision, rms_norm
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._step_control import first_step, step_control
-from jaxbiped.variational._switch_locator import (
-    SwitchLocator,
-    SwitchLocatorState,
-    Watch,
-    plain_args,
-    plain_state,
-)
+from jaxbiped.variational._switch_locator import SwitchLocator, SwitchLocatorState, Watch
 from jaxbiped.variational._tangent_solver import (
     TangentControl,
     TangentSolver,
     VariationalField,
     worst_norm,
 )
-from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
+from jaxbiped.variational._tangents import (
+    Seeded,
+    Tangents,
+    along_columns,
+    as_columns,
+    plain_args,
+    plain_state,
+)
 
 Along: TypeAlias = Callable[
     [Callable[[PyTree, PyTree], PyTree], Tangents, Seeded], tuple[PyTree, PyTree]
@@ -66,6 +67,7 @@ class SectionArrival(NamedTuple):
             derivatives, shape (n,), where the solve carried columns.
         jumps: steps that ended past a switch where the vector field itself jumps.
         missed: whether the last of them was the last step at all: columns did not jump there.
+        grazes: steps in which a switch was grazed: derivatives are not determined.
         attempted: number of steps attempted.
         nodes: the ends of the accepted steps, where saved.
     """
@@ -78,8 +80,14 @@ class SectionArrival(NamedTuple):
     peak_columns: PyTree
     jumps: Scalar
     missed: Scalar
+    grazes: Scalar
     attempted: Scalar
     nodes: Nodes | None
+
+    @property
+    def undetermined(self) -> Scalar:
+        """Whether derivatives of the arrival are not to be had (boolean)."""
+        return self.missed | (self.grazes > 0)
 
 
 def solve_to_section(
@@ -150,6 +158,7 @@ def solve_to_section(
         peak_columns=peak_columns,
         jumps=landed.jumps,
         missed=landed.saltation_pending,
+        grazes=landed.grazes,
         attempted=solution.stats["num_steps"],
         nodes=_nodes(times[1], states[1], time, y) if save_nodes else None,
     )

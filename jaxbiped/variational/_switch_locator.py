@@ -17,14 +17,15 @@ from jaxtyping import PyTree
 from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.solve._step_cubic import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
-from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._grazing import turns_of
+from jaxbiped.variational._tangents import plain_args, plain_state
 
 _OVERSHOOT = 1e-4
 """Largest part of a step that may lie past a switch."""
 MARGIN = 1e-12
 """Time past a switch [s] that a step may always end, and aims at: the side must be beyond doubt."""
-_BISECTIONS = 40
 _ROUNDING = 1e-12
 
 
@@ -57,6 +58,9 @@ class SwitchLocatorState(NamedTuple):
         accepted: number of steps accepted.
         landings: number of them that ended just past a switch.
         jumps: number of them that ended past a switch where the vector field itself jumps.
+        sizes: the largest absolute values of the state's leaves so far: what its error is
+            relative to. None where there are no switches.
+        grazes: number of steps in which a switch was grazed: no derivatives are determined then.
         saltation_pending: whether the last accepted step did: columns have yet to jump there.
         peak_saltation_pending: whether the step with the largest value did.
         arrived: whether the section was reached.
@@ -66,9 +70,11 @@ class SwitchLocatorState(NamedTuple):
     """
 
     inner: PyTree
+    sizes: PyTree
     accepted: Scalar
     landings: Scalar
     jumps: Scalar
+    grazes: Scalar
     saltation_pending: Scalar
     peak_saltation_pending: Scalar
     arrived: Scalar
@@ -82,7 +88,8 @@ class SwitchLocator(AbstractWrappedControl):
 
     So no step straddles a jump of the Jacobian, which would ruin derivatives taken through the
     solver long before the state shows it. Where to end comes from the switch functions and their
-    rates at both ends of the step, by a cubic; a few attempts do. The first step of a solve never
+    rates at both ends of the step, by a cubic; a few attempts do. Where a switch comes near zero
+    within a step, that ends there, lest it be crossed twice. The first step of a solve never
     counts as an arrival, so a solve may start on its section.
     """
 
@@ -101,13 +108,16 @@ class SwitchLocator(AbstractWrappedControl):
     ) -> tuple[Scalar, SwitchLocatorState]:
         """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(terms, t0, t1, y0, dt0, args, *rest)
-        zero = jnp.asarray(0)
+        zero, no = jnp.asarray(0), jnp.asarray(False)
         peak = None
         if self.watch.peak is not None:
             peak = jax.lax.stop_gradient(self.watch.peak(plain_args(args), plain_state(y0)))
         at_peak = None if peak is None else y0
-        no = jnp.asarray(False)
-        return first, SwitchLocatorState(inner, zero, zero, zero, no, no, no, zero, peak, at_peak)
+        state, sizes = plain_state(y0), None
+        if self.watch.switches(plain_args(args), state):
+            sizes = jax.lax.stop_gradient(jtu.tree_map(jnp.abs, state))
+        counts = zero, zero, zero, zero
+        return first, SwitchLocatorState(inner, sizes, *counts, no, no, no, zero, peak, at_peak)
 
     def adapt_step_size(
         self,
@@ -154,7 +164,10 @@ class SwitchLocator(AbstractWrappedControl):
     def _crossings(
         self, span: Scalar, scene: PyTree, before: PyTree, after: PyTree, landed: SwitchLocatorState
     ) -> tuple["_Crossed", Scalar]:
-        """Which surfaces a step crosses, and the part of it that lies before the first."""
+        """Which surfaces a step crosses, and the part of it that lies before the first.
+
+        Or before a switch comes so near zero that it may be crossed twice in this step.
+        """
         watch = self.watch
         surfaces = functools.partial(_surfaces, watch, landed.peak, scene)
         at_start, at_end = surfaces(before), surfaces(after)
@@ -167,9 +180,23 @@ class SwitchLocator(AbstractWrappedControl):
             arrives = crossed[-1] & (at_end[-1].value > 0.0) & (landed.accepted > 0)
             crossed[-1] = arrives
         others = (watch.peak is not None) + (watch.section is not None)
-        switching = crossed[: len(crossed) - others]
+        count = len(crossed) - others
+        switching = crossed[:count]
         jumps = [c for c, s in zip(switching, at_end, strict=False) if s.force_jumps]
-        any_crossed = functools.reduce(jnp.logical_or, crossed, jnp.asarray(False))
+        turns = None
+        if count:
+            turns = turns_of(
+                lambda y: watch.field(jnp.zeros_like(span), y, scene),
+                functools.partial(watch.switches, scene),
+                span,
+                before,
+                after,
+                errors=jtu.tree_map(lambda size: self.rtol * size, landed.sizes),
+            )
+        none = jnp.asarray(False)
+        any_crossed = functools.reduce(jnp.logical_or, crossed, none)
+        if turns is not None:
+            any_crossed = any_crossed | jnp.any(turns.touches)
 
         def locate() -> Scalar:
             parts = []
@@ -178,18 +205,21 @@ class SwitchLocator(AbstractWrappedControl):
                 values = jnp.stack([s.value for s in found])
                 _, slopes = jax.jvp(lambda y: [s.value for s in surfaces(y)], (state,), (rate,))
                 parts += [values, span * jnp.stack(slopes)]
-            roots = _cubic_root(parts[0], parts[2], parts[1], parts[3])
-            return jnp.min(jnp.where(jnp.stack(crossed), roots, 1.0))
+            roots = StepCubic(parts[0], parts[2], parts[1], parts[3]).sign_change()
+            first = jnp.min(jnp.where(jnp.stack(crossed), roots, 1.0))
+            if turns is None:
+                return first
+            return jnp.minimum(first, jnp.min(jnp.where(turns.touches, turns.places, 1.0)))
 
         part = jnp.ones_like(span)
         if crossed:
             part = jnp.where(any_crossed, fusion_barrier(any_crossed, locate), part)
-        none = jnp.asarray(False)
         found = _Crossed(
             any_crossed,
             functools.reduce(jnp.logical_or, switching, none),
             functools.reduce(jnp.logical_or, jumps, none),
             arrives,
+            none if turns is None else turns.graze,
         )
         return found, part
 
@@ -203,7 +233,13 @@ class SwitchLocator(AbstractWrappedControl):
         y1: PyTree,
         old: SwitchLocatorState,
     ) -> SwitchLocatorState:
-        code = old.code
+        code, sizes = old.code, old.sizes
+        if sizes is not None:
+            sizes = jtu.tree_map(
+                lambda size, leaf: jnp.where(keep, jnp.maximum(size, jnp.abs(leaf)), size),
+                sizes,
+                after,
+            )
         if self.watch.ending is not None:
             ending = functools.partial(self.watch.ending, scene, after)
             code = jnp.where(keep, fusion_barrier(keep, ending), 0)
@@ -216,9 +252,11 @@ class SwitchLocator(AbstractWrappedControl):
             at_peak = jtu.tree_map(lambda a, b: jnp.where(record, a, b), y1, at_peak)
         return SwitchLocatorState(
             inner=inner,
+            sizes=sizes,
             accepted=old.accepted + jnp.where(keep, 1, 0),
             landings=old.landings + jnp.where(keep & crossed.switch, 1, 0),
             jumps=old.jumps + jnp.where(keep & crossed.jump, 1, 0),
+            grazes=old.grazes + jnp.where(keep & crossed.graze, 1, 0),
             saltation_pending=jnp.where(keep, crossed.jump, old.saltation_pending),
             peak_saltation_pending=peak_saltation_pending,
             arrived=keep & crossed.section,
@@ -233,16 +271,7 @@ class _Crossed(NamedTuple):
     switch: Scalar
     jump: Scalar
     section: Scalar
-
-
-def plain_state(y: PyTree) -> PyTree:
-    """The state without its columns."""
-    return y.state if isinstance(y, Tangents) else y
-
-
-def plain_args(args: PyTree) -> PyTree:
-    """The arguments without their seeds."""
-    return args.args if isinstance(args, Seeded) else args
+    graze: Scalar
 
 
 def _surfaces(watch: Watch, peak: PyTree, scene: PyTree, state: PyTree) -> list[Switch]:
@@ -257,22 +286,3 @@ def _surfaces(watch: Watch, peak: PyTree, scene: PyTree, state: PyTree) -> list[
     if watch.section is not None:
         found.append(Switch(*watch.section(scene, state)))
     return found
-
-
-def _cubic_root(start: Scalar, end: Scalar, start_slope: Scalar, end_slope: Scalar) -> Scalar:
-    """Where on (0, 1] a cubic with these values and slopes at 0 and 1 changes sign.
-
-    The upper end of the last bracket: the cubic has changed sign there.
-    """
-    second = 3.0 * (end - start) - 2.0 * start_slope - end_slope
-    third = 2.0 * (start - end) + start_slope + end_slope
-
-    def halve(_: Scalar, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
-        lower, upper = ends
-        middle = 0.5 * (lower + upper)
-        value = start + middle * (start_slope + middle * (second + middle * third))
-        unchanged = (value > 0.0) == (start > 0.0)
-        return jnp.where(unchanged, middle, lower), jnp.where(unchanged, upper, middle)
-
-    ends = (jnp.zeros_like(start), jnp.ones_like(start))
-    return jax.lax.fori_loop(0, _BISECTIONS, halve, ends)[1]

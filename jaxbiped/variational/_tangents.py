@@ -73,3 +73,13 @@ def along_columns(
 def as_columns(tangents: PyTree) -> Scalar:
     """Derivatives with leaves of shape (n,) as one matrix of shape (c, n)."""
     return jnp.stack(jtu.tree_leaves(tangents))
+
+
+def plain_state(y: PyTree) -> PyTree:
+    """The state without its columns."""
+    return y.state if isinstance(y, Tangents) else y
+
+
+def plain_args(args: PyTree) -> PyTree:
+    """The arguments without their seeds."""
+    return args.args if isinstance(args, Seeded) else args

@@ -160,6 +160,7 @@ class AdaptiveColumns:
             accepted=now.landed.accepted,
             jumps=now.landed.jumps,
             missed=now.landed.saltation_pending,
+            grazes=now.landed.grazes,
             peak=peak,
             peak_columns=peak_columns,
         )

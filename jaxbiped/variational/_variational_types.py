@@ -45,7 +45,7 @@ class VariationalSolution(NamedTuple):
 
     Attributes:
         t, state, columns, time_columns: on the section.
-        code, attempted, jumps, missed, peak, peak_columns: see there.
+        code, attempted, jumps, missed, grazes, peak, peak_columns: see there.
         accepted: number of steps accepted.
     """
 
@@ -58,5 +58,11 @@ class VariationalSolution(NamedTuple):
     accepted: Scalar
     jumps: Scalar
     missed: Scalar
+    grazes: Scalar
     peak: Scalar
     peak_columns: Scalar
+
+    @property
+    def undetermined(self) -> Scalar:
+        """Whether the columns are not the derivatives of the motion (boolean)."""
+        return self.missed | (self.grazes > 0)

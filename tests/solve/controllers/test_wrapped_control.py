@@ -9,6 +9,7 @@ import pytest
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._extremes import Extremes
 from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
+from jaxbiped.solve.controllers._shallow_contact import ShallowContact
 from jaxbiped.solve.controllers._step_control import InUnits
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
 from jaxbiped.variational._switch_locator import SwitchLocator
@@ -18,6 +19,7 @@ WRAPPERS = {
     Extremes: (lambda args, y: y,),
     FootstepLimit: (3,),
     InUnits: (1.0,),
+    ShallowContact: (),
     SwitchLocator: (None,),
     TangentControl: (1e-5, jnp.ones(1)),
 }

@@ -1,0 +1,120 @@
+"""Shallow contact: a step that would step over one ends just past its beginning instead.
+
+A foot that is off the ground at both ends of a step may touch it in between. No error estimate
+sees that where no stage of the step falls on it.
+"""
+
+from typing import Any, cast
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import RealScalarLike, Scalar, Time
+from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.solve._step_cubic import StepCubic
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
+
+_OVERSHOOT = 5e-5
+"""Part of the way to the ground that a step ends past it."""
+_MARGIN = 1e-12
+"""Time that it does besides [s]."""
+_BARELY = 1e-2
+"""Depth and speed in the ground at a step's end, in units of height and speed at its beginning,
+below which a contact is shallow."""
+_ALL = 0.999
+"""Part of a step that is as good as all of it."""
+_REACH = 2.0
+"""Way that a foot can sink in a step, in units of the one at the speed it begins with."""
+
+
+class ShallowContact(AbstractWrappedControl):
+    """Wraps a controller; a step within which a foot dips into the ground is tried again, to there.
+
+    The solve's `args` must be the scene. Nothing else changes the steps.
+
+    Attributes:
+        controller: decides every step's size.
+    """
+
+    controller: StepControl
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        """The first step's end and the controller's state, as diffrax asks."""
+        return self.controller.init(*request)
+
+    def adapt_step_size(
+        self,
+        t0: Time,
+        t1: Time,
+        y0: PyTree,
+        y1_candidate: PyTree,
+        args: PyTree,
+        y_error: PyTree,
+        error_order: RealScalarLike | None,
+        controller_state: Any,
+    ) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does, but for shallow contacts."""
+        keep, next_t0, next_t1, jump, inner, result = self.controller.adapt_step_size(
+            t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state
+        )
+        start, span = cast(Scalar, t0), cast(Scalar, t1 - t0)
+        found = _touchdown(args, start, span, y0, y1_candidate)
+        again, target = jax.lax.stop_gradient(found)
+        next_t1 = jnp.where(again, jnp.where(keep, target, jnp.minimum(next_t1, target)), next_t1)
+        next_t0 = jnp.where(again, t0, next_t0)
+        inner = jtu.tree_map(lambda a, b: jnp.where(again, a, b), controller_state, inner)
+        return keep & ~again, next_t0, next_t1, jump, inner, result
+
+
+def _touchdown(
+    scene: PyTree, t0: Scalar, span: Scalar, y0: PyTree, y1: PyTree
+) -> tuple[Scalar, Scalar]:
+    """Whether a step is to end at a contact that it would step over, and when [s]."""
+    before = feet(scene, y0)
+    places = [k for k in range(2) if before[k].admitted is not False]
+    within_reach = jnp.zeros_like(span, dtype=bool)
+    for k in places:
+        foot = before[k]
+        reached = foot.penetration + _REACH * span * foot.penetration_rate
+        near = (foot.penetration <= 0.0) & (reached > 0.0)
+        within_reach = within_reach | (near if foot.admitted is None else near & foot.admitted)
+
+    def first() -> Scalar:
+        after, part = feet(scene, y1), jnp.ones_like(span)
+        for k in places:
+            part = jnp.minimum(part, _part_above(span, before[k], after[k]))
+        return part
+
+    part = jnp.where(within_reach, fusion_barrier(within_reach, first), 1.0)
+    target = t0 + span * part * (1.0 + _OVERSHOOT) + _MARGIN
+    return (part < _ALL) & (target < t0 + span), target
+
+
+def _part_above(span: Scalar, before: Foot, after: Foot) -> Scalar:
+    """The part of a step after which a foot comes into the ground, barely; 1 if it does not.
+
+    Or that after which it is lowest, where it may come into the ground. A step that is tried again
+    to there ends in the air, or in the ground at no speed: then the contact has begun before.
+    """
+    rates = span * before.penetration_rate, span * after.penetration_rate
+    depth = StepCubic(before.penetration, after.penetration, *rates)
+    off = depth.start <= 0.0
+    if before.admitted is not None and after.admitted is not None:
+        off = off & before.admitted & after.admitted
+    leaves = off & (depth.end <= 0.0) & depth.may_touch()
+    stays = off & (depth.end > 0.0) & (depth.end < -_BARELY * depth.start)
+    stays = stays & (jnp.abs(depth.end_slope) < _BARELY * depth.start_slope)
+    lowest = jnp.where(leaves, depth.turning_point(), 1.0)
+    deepest = depth.at(lowest)
+    contact = (leaves | stays) & (deepest > 0.0)
+
+    def touchdown() -> Scalar:
+        # The same cubic up to there, where it has a sign change to be found.
+        slope_there = jnp.where(leaves, 0.0, depth.end_slope)
+        down = StepCubic(depth.start, deepest, lowest * depth.start_slope, lowest * slope_there)
+        return lowest * down.sign_change()
+
+    return jnp.where(contact, fusion_barrier(contact, touchdown), lowest)

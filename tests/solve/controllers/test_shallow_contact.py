@@ -1,0 +1,55 @@
+"""Shallow contact: plain steps that would step over one, against equations written anew."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.extremes._case import check_numbers
+from jaxbiped.extremes._check_solve import scales, states_of
+from jaxbiped.extremes._grazing import _START, _TIME, _lowest
+from jaxbiped.scene._clearance import AlwaysTouching
+
+pytestmark = pytest.mark.slow
+
+DEPTHS = np.array([1e-5, 1e-6, 1e-7, 1e-8])
+"""Of the contact that a swinging foot would come to had there been no ground [m]."""
+LAW = jb.laws.normal_law_like("kelvin-voigt", K=1e6, c=1e7, n=1.5, mass=2.0)
+SCENE = dataclasses.replace(
+    jb.seed_scene(), normal=LAW, clearance=AlwaysTouching()
+)  # its force jumps at touchdown, so that even a shallow contact is felt
+
+
+@pytest.fixture(scope="module")
+def ends():
+    """Starts, and the states at the end with a contact and with none."""
+    p = check_numbers(SCENE)
+    touching = _START[1] - _lowest(p)
+
+    def end(height, points):
+        start = _START.copy()
+        start[1] = height
+        return states_of(start, p, _TIME, 1e-13, points=points)[-1]
+
+    heights = touching - DEPTHS
+    points = (4000 * np.sqrt(1e-6 / np.minimum(DEPTHS, 1e-6))).astype(int)
+    return heights, np.array([end(z, n) for z, n in zip(heights, points, strict=True)])
+
+
+@pytest.mark.parametrize("engine", ["lanes", "xla"])
+@pytest.mark.parametrize(("accuracy", "within"), [("balanced", 1e-5), ("tight", 1e-7)])
+def test_a_shallow_contact_is_not_stepped_over(ends, engine, accuracy, within):
+    heights, expected = ends
+
+    def end(height):
+        start = jb.State(*map(jnp.asarray, _START))._replace(hip_z=height)
+        return jb.simulate(
+            SCENE, start, duration=_TIME, save="end", watch=(), engine=engine, accuracy=accuracy
+        ).final
+
+    found = np.stack(jax.vmap(end)(jnp.asarray(heights)), axis=1)
+    error = np.max(np.abs(found - expected) / scales(check_numbers(SCENE), 8), axis=1)
+    assert np.all(error < within)
