@@ -48,7 +48,11 @@ def main() -> None:
     walks, gaits = (_many(store, options, one, kind) for kind, one in KINDS.items())
     names = dict.fromkeys(name for each in (*walks, *gaits) for name in each["pairs"])
     pairs = {
-        name: [np.array(each["pairs"][name]) for each in (*walks, *gaits) if name in each["pairs"]]
+        name: [
+            np.reshape(each["pairs"][name], (-1, 3))
+            for each in (*walks, *gaits)
+            if name in each["pairs"]
+        ]
         for name in names
     }
     numbers = {

@@ -264,9 +264,37 @@ def of_accuracy_coverage(numbers: dict[str, Any]) -> Iterator[str]:
     walks, gaits = numbers["walks"], numbers["gaits"]
     yield f"{walks['met']} of {walks['run']} walks and {gaits['met']} of {gaits['run']} gaits"
     for name, found in numbers["coverage"].items():
-        ratio = f"{found['median_ratio']:.1f}"
+        # Zeros have no relative error.
+        ratio = "–" if name == "multipliers of zero" else f"{found['median_ratio']:.1f}"
         counts = ("numbers", "resolved", "covered", "scenes", "scenes_all_covered")
         yield row(name, *(str(found[each]) for each in counts), ratio)
+
+
+def of_footstep_truth(numbers: dict[str, Any]) -> Iterator[str]:
+    """How exact the truth is, and errors of each way and setting, with what it says of them."""
+    problem = numbers["problem"]
+    yield f"changes it by {small(problem['coarser_collocation'])}"
+    yield f"finest solve differs by {small(problem['our_finest'])}"
+    for each in numbers["rows"]:
+        said = "nothing" if each["said"] is None else small(each["said"])
+        setting = f"{each['setting']} = {small(each['value'], 0)}"
+        errors = small(each["state_error"]), small(each["gradient_error"])
+        yield row(each["way"], setting, *errors, UNKNOWN, said)
+
+
+def of_vector_widths(numbers: dict[str, Any]) -> Iterator[str]:
+    """How many walks end in the same bits on other vectors and in other batches."""
+    for engine in ("lanes", "xla"):
+        for each in numbers[engine]:
+            yield row(
+                engine, each["instructions"], str(each["batch"]), str(each["walks"]),
+                str(each["identical"]), str(each["other_steps"]), small(each["largest"]),
+                small(each["median"]),
+            )  # fmt: skip
+    for key, said in (("between_engines", "the two engines"), ("error", "a solve at 1e-10")):
+        found = numbers[key]
+        if found is not None:
+            yield f"{said}: {small(found['median'])} in the median, {small(found['largest'])} at most"
 
 
 def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
@@ -345,6 +373,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "basin_simplest": of_basin_simplest,
     "bifurcation_elasticities": of_bifurcation_elasticities,
     "extremes": of_extremes,
+    "footstep_truth": of_footstep_truth,
     "force_models": of_force_models,
     "gradient_accuracy": of_gradient_accuracy,
     "gradient_truth": of_gradient_truth,
@@ -356,6 +385,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "search_robustness": of_search_robustness,
     "slope_branch": of_slope_branch,
     "trade": of_trade,
+    "vector_widths": of_vector_widths,
 }
 """Of each experiment: the phrases and rows that the pages quote."""
 
