@@ -294,7 +294,8 @@ def of_vector_widths(numbers: dict[str, Any]) -> Iterator[str]:
     for key, said in (("between_engines", "the two engines"), ("error", "a solve at 1e-10")):
         found = numbers[key]
         if found is not None:
-            yield f"{said}: {small(found['median'])} in the median, {small(found['largest'])} at most"
+            median, largest = small(found["median"]), small(found["largest"])
+            yield f"{said}: {median} in the median, at most {largest}"
 
 
 def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
