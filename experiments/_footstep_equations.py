@@ -98,19 +98,6 @@ NAMES = (
 
 
 @compiled
-def rates_of(y, laws):
-    """Rates of the state, as any solver sees them: the pieces are where the state is."""
-    pressing, band = np.zeros(2, np.int64), np.zeros(2, np.int64)
-    for leg in range(2):
-        depth, sinking, slip = foot(y, leg)
-        if depth > 0.0 and y[6 + leg] < 0.0:
-            pressing[leg] = int(laws[0] * np.sqrt(depth) + laws[1] * sinking > 0.0)
-        for edge in (-V0, 0.0, V0):
-            band[leg] += int(slip > edge)
-    return field(y, laws, pressing, band)
-
-
-@compiled
 def slopes(y, laws, pressing, band):
     """Derivative of the field with respect to state and logarithms of the laws, (8, 12)."""
     found = np.empty((8, 12))

@@ -1,8 +1,8 @@
 """Truth of a footstep's gradients: the walker's own, beside that of the ball.
 
-Writes footstep_truth.png. Ways differentiate the time and the end of one footstep with respect to
+Writes footstep_truth.png. Ours differentiates the time and the end of one footstep with respect to
 its start, stiffness, damping and friction. The truth is by collocation on one smooth piece of the
-laws at a time (`_footstep_collocation.py`), which shares nothing with any of them.
+laws at a time (`_footstep_collocation.py`), which shares nothing with ours.
 """
 
 import time
@@ -21,8 +21,7 @@ from tqdm import tqdm
 def main() -> None:
     options = parse(__doc__ or "")
     truth, change, apart = references()
-    ways = [way for way in WAYS if not options.quick or way[0] == "jaxbiped"]
-    work = [(way, value) for way in ways for value in way[2]]
+    work = [(way, value) for way in WAYS for value in way[2]]
     rows = [_row(way, value, truth) for way, value in tqdm(work, desc="ways")]
     problem = {
         "start": START.tolist(),

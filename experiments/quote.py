@@ -270,34 +270,6 @@ def of_accuracy_coverage(numbers: dict[str, Any]) -> Iterator[str]:
         yield row(name, *(str(found[each]) for each in counts), ratio)
 
 
-def of_footstep_truth(numbers: dict[str, Any]) -> Iterator[str]:
-    """How exact the truth is, and errors of each way and setting, with what it says of them."""
-    problem = numbers["problem"]
-    yield f"changes it by {small(problem['coarser_collocation'])}"
-    yield f"finest solve differs by {small(problem['our_finest'])}"
-    for each in numbers["rows"]:
-        said = "nothing" if each["said"] is None else small(each["said"])
-        setting = f"{each['setting']} = {small(each['value'], 0)}"
-        errors = small(each["state_error"]), small(each["gradient_error"])
-        yield row(each["way"], setting, *errors, UNKNOWN, said)
-
-
-def of_vector_widths(numbers: dict[str, Any]) -> Iterator[str]:
-    """How many walks end in the same bits on other vectors and in other batches."""
-    for engine in ("lanes", "xla"):
-        for each in numbers[engine]:
-            yield row(
-                engine, each["instructions"], str(each["batch"]), str(each["walks"]),
-                str(each["identical"]), str(each["other_steps"]), small(each["largest"]),
-                small(each["median"]),
-            )  # fmt: skip
-    for key, said in (("between_engines", "the two engines"), ("error", "a solve at 1e-10")):
-        found = numbers[key]
-        if found is not None:
-            median, largest = small(found["median"]), small(found["largest"])
-            yield f"{said}: {median} in the median, at most {largest}"
-
-
 def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
     """Floors, errors of the named accuracies, and what ways cost at equal errors."""
     floors, counts = numbers["floors"], numbers["counts"]
@@ -374,7 +346,6 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "basin_simplest": of_basin_simplest,
     "bifurcation_elasticities": of_bifurcation_elasticities,
     "extremes": of_extremes,
-    "footstep_truth": of_footstep_truth,
     "force_models": of_force_models,
     "gradient_accuracy": of_gradient_accuracy,
     "gradient_truth": of_gradient_truth,
@@ -386,7 +357,6 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "search_robustness": of_search_robustness,
     "slope_branch": of_slope_branch,
     "trade": of_trade,
-    "vector_widths": of_vector_widths,
 }
 """Of each experiment: the phrases and rows that the pages quote."""
 
