@@ -83,3 +83,18 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
     if _independent.lsoda_address() is None:
         missing = lambda: failed_row("numbalsoda", "rtol=1e-6", "not installed")  # noqa: E731
         yield Case("batch", "numbalsoda", "rtol=1e-6", missing)
+        return
+
+    def measure_peer(rtol: float) -> Row:
+        batch, starts = _independent.lsoda_batch(), starts_of(count)
+        times = np.array([0.0, walk.duration])
+        batch(starts[:2], times, rtol, 1e-2 * rtol)  # numba compiles apart
+        repeats = 1 if quick else 3
+        found, work = work_of(lambda: batch(starts, times, rtol, 1e-2 * rtol), repeats)
+        failed = int(np.sum(~np.isfinite(found).all(axis=1)))
+        outcome = "ok" if failed == 0 else f"{failed} of {count} failed"
+        values = {"state": found[:checked] / walk.units()}
+        return row_of("numbalsoda", f"rtol={rtol:g}", outcome, truth(), values, work)
+
+    for rtol in tolerances(quick, -3, -8):
+        yield Case("batch", "numbalsoda", f"rtol={rtol:g}", lambda r=rtol: measure_peer(r))

@@ -268,7 +268,8 @@ def of_accuracy_coverage(numbers: dict[str, Any]) -> Iterator[str]:
         f"{gaits['met']} of {gaits['run']} gaits"
     )
     for name, found in numbers["coverage"].items():
-        ratio = f"{found['median_ratio']:.1f}"
+        # Zeros have no relative error.
+        ratio = "–" if name == "multipliers of zero" else f"{found['median_ratio']:.1f}"
         counts = ("numbers", "resolved", "covered", "scenes", "scenes_all_covered")
         yield row(name, *(str(found[each]) for each in counts), ratio)
 

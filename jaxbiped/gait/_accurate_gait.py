@@ -31,9 +31,12 @@ _FINEST = 1e-9
 """Finest tolerance of gaits, that of "tight": Newton's method comes to no finer residual."""
 _COLUMNS = 10.0
 """Tolerance of the columns over that of the state, as in the named accuracies."""
-_SAFETY = 2.0
-"""Error bars over the larger change of both witnesses. Without it a derivative of the spectral
-radius lay beyond its bar by an eighth (the seed's gait at an accuracy of 1e-2)."""
+_LOOSER_SHARE, _OTHER_SHARE = 0.65, 1.4
+"""What an error bar has of the change by a ten times looser tolerance, and of another method's.
+
+Chosen on the gaits of 400 random scenes (draw 23 of `experiments/accuracy_coverage.py`): the larger
+of both changes held 99.3 % of the sensitivities, twice that 99.8 % at bars 50 times the error in
+the median, this sum 99.6 % at 29 times."""
 _NUMBERS = ("period", "step_length", "speed", "peak_normal")
 
 
@@ -98,10 +101,10 @@ def judge_gait(scene: AbstractScene, gait: Gait, other: Gait, radius: bool) -> J
     if other.outcome is not Search.FOUND:
         return {}, np.inf, f"another method's search ended as {other.outcome}"
     bars = {
-        "measures": jtu.tree_map(_larger, gait.measure_errors, gait.measures, other.measures),
-        "multipliers": _larger(gait.multiplier_errors, gait.multipliers, other.multipliers),
+        "measures": jtu.tree_map(_bar, gait.measure_errors, gait.measures, other.measures),
+        "multipliers": _bar(gait.multiplier_errors, gait.multipliers, other.multipliers),
         "sensitivities": jtu.tree_map(
-            _larger, gait.sensitivity_errors, gait.sensitivities, other.sensitivities
+            _bar, gait.sensitivity_errors, gait.sensitivities, other.sensitivities
         ),
     }
     of, found = bars["measures"], gait.measures
@@ -139,10 +142,10 @@ def _elasticity_shares(
     return shares, f"derivatives of the {told} are unknown: the law's force jumps there"
 
 
-def _larger(estimate: Any, told: Any, other: Any) -> np.ndarray:
-    """The larger of an estimated error and what another method changes, with a safety factor."""
+def _bar(estimate: Any, told: Any, other: Any) -> np.ndarray:
+    """Error bars from what a looser tolerance changes, and what another method does."""
     change = np.abs(np.asarray(told) - np.asarray(other))
-    return _SAFETY * np.maximum(np.asarray(estimate), change)
+    return _LOOSER_SHARE * np.asarray(estimate) + _OTHER_SHARE * change
 
 
 def _ratio(error: Any, value: Any) -> float:

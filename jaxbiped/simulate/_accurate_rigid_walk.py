@@ -11,7 +11,7 @@ import jax.tree_util as jtu
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.simulate._accurate_walk import judge_walk
+from jaxbiped.simulate._accurate_walk import Witness, judge_walk
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._error_estimate import LOOSER, Judged, refine
@@ -49,7 +49,7 @@ def accurate_rigid_walk(run: RigidSimulation, wanted: float) -> Trajectory[Rigid
         walk = run.with_inputs(rtol=tolerance)()
         looser = run.with_inputs(rtol=LOOSER * tolerance)
         other = run.with_inputs(rtol=_EMBEDDED * tolerance, embedded=True)
-        witnesses = tuple(_as_long(each, walk) for each in (looser, other))
+        witnesses = tuple(Witness(_as_long(each, walk), 1.0) for each in (looser, other))
         return walk, judge_walk(run.walk.scene, walk, witnesses)
 
     first = min(_FIRST * wanted, _LOOSEST)

@@ -27,8 +27,9 @@ _ROUNDINGS = 32.0
 class ErrorEstimate(eqx.Module):
     """Estimated errors of a result that was asked for by a number.
 
-    Each error bar is the larger of two changes of the result: under a ten times looser tolerance,
-    and under another method of steps.
+    An error bar comes from two changes of the result: under a ten times looser tolerance, and under
+    another method of steps. A walk's is the larger of both, the other method's counted twice where
+    that is as fine; a gait's is a weighted sum of both.
 
     Attributes:
         bars: error bars, shaped and named like what they belong to, SI units.

@@ -80,6 +80,24 @@ def _length_and_time(args: AbstractScene) -> tuple[Scalar, Scalar]:
     return found if known else jax.lax.stop_gradient(found)
 
 
+def sizes_of(args: PyTree, states: PyTree) -> tuple[float, PyTree]:
+    """What counts as 1 in times, √(l/g) [s], and in each leaf of a state, SI units.
+
+    Args:
+        args: a scene with a walker's leg length and gravity, numbers.
+        states: whose leaves they are for; where it has None there is none.
+    """
+    length, gravity = float(args.walker.l), float(args.ground.g)
+    time = float(np.sqrt(length / gravity)) if gravity > 0.0 else 1.0
+    by_name = dict.fromkeys(_LENGTHS, length) | dict.fromkeys(_SPEEDS, length / time)
+    by_name |= dict.fromkeys(_RATES, 1.0 / time)
+    sizes = {
+        name: None if leaf is None else by_name.get(name, 1.0)
+        for name, leaf in states._asdict().items()
+    }
+    return time, type(states)(**sizes)
+
+
 def relative_to_scene(args: PyTree, times: Numbers, states: PyTree) -> float:
     """The largest of errors of times and states, told in l, √(l/g) and their quotients [–].
 
@@ -90,15 +108,10 @@ def relative_to_scene(args: PyTree, times: Numbers, states: PyTree) -> float:
         times: errors of times [s], of any shape.
         states: errors of states, SI units, leaves of any shape.
     """
-    length, gravity = float(args.walker.l), float(args.ground.g)
-    time = np.sqrt(length / gravity) if gravity > 0.0 else 1.0
-    by_name = dict.fromkeys(_LENGTHS, length) | dict.fromkeys(_SPEEDS, length / time)
-    by_name |= dict.fromkeys(_RATES, 1.0 / time)
+    time, sizes = sizes_of(args, states)
     shares = [np.max(np.asarray(times), initial=0.0) / time]
-    shares += [
-        np.max(np.asarray(leaf), initial=0.0) / by_name.get(name, 1.0)
-        for name, leaf in states._asdict().items()
-        if leaf is not None
-    ]
+    shares += jtu.tree_leaves(
+        jtu.tree_map(lambda leaf, size: np.max(np.asarray(leaf), initial=0.0) / size, states, sizes)
+    )
     worst = float(np.max(shares))
     return worst if np.isfinite(worst) else np.inf

@@ -45,6 +45,16 @@ def test_every_step_has_its_bar():
     assert all(float(bar[0]) == 0.0 for bar in bars)
 
 
+def test_no_bar_lies_far_below_the_others_of_its_moment():
+    """In units of l, √(l/g) and their quotients; a witness's difference may vanish by accident."""
+    walk = jb.simulate(SCENE, STATE, duration=0.1, accuracy=1e-3, engine="lanes")
+    unit = np.sqrt(0.4 / 9.8)
+    sizes = np.array([0.4, 0.4, 1.0, 1.0, 0.4 / unit, 0.4 / unit, 1.0 / unit, 1.0 / unit])
+    bars = np.stack(walk.error.bars["state"]) / sizes[:, None]
+    assert np.all(bars.min(axis=0) >= 0.05 * bars.max(axis=0) * (1.0 - 1e-12))
+    assert np.any(bars.min(axis=0) > 0.0)
+
+
 def test_what_cannot_be_met_is_told_with_what_was_reached():
     with pytest.warns(RuntimeWarning, match="accuracy = 1e-16 is not met"):
         walk = jb.simulate(SCENE, STATE, duration=0.1, accuracy=1e-16, save="end", engine="lanes")
