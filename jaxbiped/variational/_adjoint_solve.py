@@ -138,7 +138,7 @@ class _AdjointSolve:
 
     def __fingerprint__(self) -> object:
         """See `jaxbiped._fingerprint`: a row is read as one of a step of this size."""
-        return self.engine, self.flow, self.size, self.final
+        return self.engine, self.flow, self.size
 
     def program(self) -> Program:
         """The program."""
