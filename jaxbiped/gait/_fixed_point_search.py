@@ -6,6 +6,7 @@ from typing import NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
@@ -79,12 +80,19 @@ class Found(NamedTuple):
     @property
     def last(self) -> LinearisedReturn:
         """The return from the fixed point."""
-        return jax.tree.map(lambda leaf: leaf[0], self.both)
+        return self._one_of_both(0)
 
     @property
     def coarse(self) -> LinearisedReturn:
         """The looser one."""
-        return jax.tree.map(lambda leaf: leaf[1], self.both)
+        return self._one_of_both(1)
+
+    def _one_of_both(self, place: int) -> LinearisedReturn:
+        known: LinearisedReturn = self.both
+        if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(known)):
+            # By NumPy: JAX would compile a program for every shape.
+            known = jax.tree.map(np.asarray, known)
+        return jax.tree.map(lambda leaf: leaf[place], known)
 
 
 Run = Callable[[Scalar, Scalar, Scalar], LinearisedReturn]

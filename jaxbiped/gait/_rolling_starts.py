@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import check_positive, check_type
 from jaxbiped._types import as_float
 from jaxbiped.dynamics._bristle_state import state_for
@@ -38,9 +39,13 @@ def rolling_starts(
     check_type("scene", scene, Scene, RigidScene)
     check_positive("count", count)
     check_positive("spread", spread)
-    scene = jtu.tree_map(as_float, scene)
+    return _scatter(jtu.tree_map(as_float, scene), int(count), float(spread), int(seed))
+
+
+@cached_jit  # many small operations
+def _scatter(scene: Scene | RigidScene, count: int, spread: float, seed: int) -> WalkerState:
     middle = default_guess(scene)
-    scatter = jax.random.uniform(jax.random.key(seed), (4, int(count)), minval=-1.0, maxval=1.0)
+    scatter = jax.random.uniform(jax.random.key(seed), (4, count), minval=-1.0, maxval=1.0)
     factors = 1.0 + spread * scatter.at[:, 0].set(0.0)
     theta_1, theta_2 = middle.theta_1 * factors[0], middle.theta_2 * factors[1]
     omega_1, omega_2 = middle.omega_1 * factors[2], middle.omega_2 * factors[3]
