@@ -151,8 +151,8 @@ def test_the_share_of_wrong_labels_is_asked_for_and_told(tmp_path, capsys):
         (("--accuracy", "high"), "accuracy = 'high' is not known"),
         (("--workers", "0"), "workers = 0"),
         (("--chunk", "0"), "chunk = 0"),
-        (("--samples", "0"), "count = 0"),
-        (("--sampling", "dice", "--samples", "4"), "method = 'dice' is not known"),
+        (("--samples", "0"), "samples = 0"),
+        (("--sampling", "dice", "--samples", "4"), "sampling = 'dice' is not known"),
         (("--store", "/dev/null"), "store = '/dev/null' is a file"),
     ],
 )

@@ -17,5 +17,7 @@ def test_true_errors_lie_within_their_bars(tmp_path):
     assert state["covered"] >= 0.9 * state["resolved"]
     assert numbers["rigid"]["silently_wrong"] == 0
     rigid = numbers["coverage"]["rigid state"]
-    assert rigid["covered"] >= 0.95 * rigid["resolved"] > 0
+    # Components of one walk err together: at most one of these few scenes lies beyond its bars.
+    assert rigid["scenes_all_covered"] >= rigid["scenes"] - 1 > 0
+    assert rigid["worst_ratio"] < 4.0
     assert set(numbers["coverage"]) >= {"period", "multipliers", "sensitivities"}
