@@ -70,7 +70,7 @@ def _parts(thing: Any, depth: int) -> Iterator[bytes]:
     """What tells a thing from others, piece by piece."""
     if depth > _MOST_NESTED:
         raise UnknownMeaningError("nested too deeply, or within itself")
-    yield _name(type(thing)).encode()
+    yield _class_name(type(thing)).encode()
     own = getattr(thing, "__fingerprint__", None)
     if own is not None and not isinstance(thing, type):
         yield from _parts(own(), depth + 1)
@@ -83,7 +83,7 @@ def _parts(thing: Any, depth: int) -> Iterator[bytes]:
     elif isinstance(thing, np.ndarray | jax.Array):
         yield from _array_parts(thing)
     elif isinstance(thing, type):
-        yield _name(thing).encode()
+        yield _class_name(thing).encode()
     else:
         for each in _members(thing):
             yield from _parts(each, depth + 1)
@@ -152,6 +152,16 @@ def _attributes(thing: object) -> dict[str, object]:
 def _is_wrapper(thing: object) -> bool:
     """Whether it is a function under a transformation such as `jax.jit`."""
     return callable(thing) and callable(getattr(thing, "__wrapped__", None))
+
+
+def _class_name(kind: type) -> str:
+    """The name of a class; one made in a call has none, for another call may make another."""
+    name, found = _name(kind), sys.modules.get(kind.__module__)
+    for part in kind.__qualname__.split("."):
+        found = getattr(found, part, None)
+    if found is not kind and kind.__module__.split(".")[0] == _PACKAGE:
+        raise UnknownMeaningError(f"a class {name} that its module does not have")
+    return name
 
 
 def _name(thing: Any) -> str:

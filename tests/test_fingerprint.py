@@ -13,6 +13,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped import _fingerprint
 from jaxbiped._fingerprint import Leaf, as_leaves, fingerprint
+from jaxbiped.optimise._augmented_state import augment
 from jaxbiped.solve._ending import WATCHES, ending_events
 
 SCENE = as_leaves(jb.seed_scene())
@@ -73,6 +74,14 @@ class _OfATest:
 )
 def test_what_could_change_unseen_has_none(thing):
     assert fingerprint(thing) is None
+
+
+def test_classes_made_in_a_call_have_none():
+    """Two of one name may have other fields."""
+    states = [augment(jb.seed_state(), names) for names in (("a",), ("b",))]
+    assert type(states[0]) is not type(states[1])
+    assert [fingerprint(type(each)) for each in states] == [None, None]
+    assert [fingerprint(as_leaves(each)) for each in states] == [None, None]
 
 
 def test_what_is_within_itself_has_none():

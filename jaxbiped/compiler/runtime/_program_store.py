@@ -3,6 +3,7 @@
 With it, a program that some process had traced runs in another one that never traces it.
 """
 
+import contextlib
 import pickle
 from typing import Any, NamedTuple
 
@@ -69,16 +70,19 @@ def read_signature(digest: str) -> Signature | None:
     content = read_entry(_KIND, digest)
     if content is None:
         return None
-    *parts, inputs, outputs, recorded = pickle.loads(content)
-    outline = Outline(_with_shapes(*outputs), recorded)
-    return Signature(_with_shapes(*inputs), outline, *parts)
+    with contextlib.suppress(Exception):  # whatever is amiss with it, the program is traced again
+        *parts, inputs, outputs, recorded = pickle.loads(content)
+        outline = Outline(_with_shapes(*outputs), recorded)
+        return Signature(_with_shapes(*inputs), outline, *parts)
+    return None
 
 
 def write_signature(digest: str, signature: Signature) -> None:
     """Keeps it."""
     inputs, outline, *parts = signature
     content = (*parts, _as_plain(inputs), _as_plain(outline.outputs), outline.recorded)
-    write_entry(_KIND, digest, pickle.dumps(content))
+    with contextlib.suppress(Exception):  # what cannot be pickled stays in this process
+        write_entry(_KIND, digest, pickle.dumps(content))
 
 
 def read_code(digest: str, width: int, host: Host, *, maps: bool) -> MachineCode | None:
