@@ -50,7 +50,7 @@ class Leaf:
     """
 
     shape: tuple[int, ...]
-    dtype: str
+    dtype: Any
     weak: bool
 
 
@@ -156,7 +156,8 @@ def _is_wrapper(thing: object) -> bool:
 
 def _class_name(kind: type) -> str:
     """The name of a class; one made in a call has none, for another call may make another."""
-    name, found = _name(kind), sys.modules.get(kind.__module__)
+    name = _name(kind)
+    found: Any = sys.modules.get(kind.__module__)
     for part in kind.__qualname__.split("."):
         found = getattr(found, part, None)
     if found is not kind and kind.__module__.split(".")[0] == _PACKAGE:
@@ -215,4 +216,4 @@ def as_leaves(tree: Any) -> Any:
 def leaf_of(array: Any) -> Leaf:
     """Of an array."""
     weak = bool(getattr(array, "weak_type", False))
-    return Leaf(tuple(np.shape(array)), str(array.dtype), weak)
+    return Leaf(tuple(array.shape), array.dtype, weak)

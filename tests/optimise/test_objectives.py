@@ -45,7 +45,7 @@ NOISY = {
     "friction_loss": (1e-3, 1e-5),
 }
 """The same for what differences themselves have no better, or the tight accuracy."""
-COARSE = {"radius_bound": 2e-4}
+COARSE = {"radius_bound": 2e-4, "motor_work": 3e-5}
 """Where the balanced accuracy is farther than usual from the tight one."""
 
 
