@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import diffrax
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
