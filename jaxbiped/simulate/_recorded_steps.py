@@ -33,11 +33,11 @@ def recorded_steps(start: State, rows: np.ndarray, solver: AbstractRosenbrock) -
     infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
     groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
     # One transfer for all of them: each costs as much as several steps.
-    parts = times, groups, ends[0], kind(*ends[1:]), np.int64(len(rows) + 1), np.float64(0.0)
-    times, groups, t, states, count, zero = jax.device_put(parts)
+    parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0)
+    times, groups, t, states, zero = jax.device_put(parts)
     dense = diffrax.DenseInterpolation(
         ts=times,
-        ts_size=count,
+        ts_size=jnp.asarray(len(rows) + 1),
         infos=dict(y0=groups[0], y1=groups[1], coefficients=tuple(groups[2:])),
         interpolation_cls=solver.interpolation_cls,
         direction=jnp.asarray(1),
