@@ -11,14 +11,13 @@ from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 import equinox as eqx
 import jax
-import jax.tree_util as jtu
 from jax._src.core import trace_state_clean
 
 from jaxbiped import _caches
 from jaxbiped._caches import Once, register_programs
-from jaxbiped._compiled_store import CompiledCall, read_call, trace_call
+from jaxbiped._compiled_store import CompiledCall, Skeleton, read_call, trace_call
 from jaxbiped._disk_cache import cache_folder
-from jaxbiped._fingerprint import Leaf, fingerprint, leaf_of, settings
+from jaxbiped._fingerprint import fingerprint, settings
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -28,22 +27,13 @@ class _Arguments(NamedTuple):
     """Arguments of a call that nothing traces.
 
     Attributes:
-        arrays: those among them.
-        leaves: all, with a `Leaf` for each array; `structure` their tree.
+        arrays: those among them; `skeleton` the rest.
         kind: what decides which program runs.
     """
 
     arrays: list[Any]
-    leaves: list[Any]
-    structure: jtu.PyTreeDef
+    skeleton: Skeleton
     kind: Hashable
-
-    def filled(self, arrays: Sequence[Any]) -> Any:
-        """The arguments with these arrays."""
-        rest = iter(arrays)
-        return self.structure.unflatten(
-            [next(rest) if isinstance(leaf, Leaf) else leaf for leaf in self.leaves]
-        )
 
 
 class cached_jit(Generic[_P, _T]):  # noqa: N801
@@ -124,7 +114,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
 
     def _trace(self, arguments: _Arguments, key: str) -> Callable[[], CompiledCall]:
         def function(arrays: Sequence[Any]) -> Any:
-            args, kwargs = arguments.filled(arrays)
+            args, kwargs = arguments.skeleton.filled(arrays)
             return self._function(*args, **kwargs)
 
         functools.update_wrapper(function, self._function, assigned=("__name__", "__qualname__"))
@@ -134,8 +124,8 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         """By what its program is found on disk; None where it is not to be kept."""
         if cache_folder() is None:
             return None
-        leaves = [leaf for leaf in arguments.leaves if isinstance(leaf, Leaf)]
-        return fingerprint(self._function, arguments.filled(leaves))
+        skeleton = arguments.skeleton
+        return fingerprint(self._function, skeleton.filled(skeleton.places))
 
     def _make_room(self) -> None:
         if self._count() >= _caches.PROGRAMS:
@@ -149,22 +139,16 @@ def _arguments_of(given: Any) -> _Arguments | None:
     """Arguments of a program that can be kept; None where something traces or watches the call."""
     if not trace_state_clean() or _is_watched():
         return None
-    leaves, structure = jtu.tree_flatten(given)
-    arrays, known = [], []
-    for leaf in leaves:
-        if not eqx.is_array(leaf):
-            known.append(leaf)
-        elif isinstance(leaf, jax.core.Tracer) or getattr(leaf, "committed", False):
-            return None
-        else:
-            arrays.append(leaf)
-            known.append(leaf_of(leaf))
-    kind = structure, tuple((type(leaf), leaf) for leaf in known), settings()
+    skeleton, arrays = Skeleton.of(given)
+    if any(isinstance(x, jax.core.Tracer) or getattr(x, "committed", False) for x in arrays):
+        return None
+    leaves = tuple((type(leaf), leaf) for leaf in skeleton.leaves)
+    kind = skeleton.structure, leaves, settings()
     try:
         hash(kind)
     except TypeError:
         return None
-    return _Arguments(arrays, known, structure, kind)
+    return _Arguments(arrays, skeleton, kind)
 
 
 def _is_watched() -> bool:

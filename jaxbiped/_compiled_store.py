@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.tree_util as jtu
 import numpy as np
@@ -27,29 +28,31 @@ _NOISE = b"cpu_aot_loader.cc"
 _LOADING = threading.Lock()
 
 
-class ResultStructure(NamedTuple):
-    """What a function gives besides arrays.
+class Skeleton(NamedTuple):
+    """What arguments or results are besides arrays.
 
     Attributes:
-        leaves: of its result, with a `Leaf` for each array.
-        structure: their tree.
+        leaves: of their tree, with a `Leaf` for each array.
+        structure: the tree.
     """
 
     leaves: list[Any]
     structure: jtu.PyTreeDef
 
     @staticmethod
-    def of(result: Any) -> tuple["ResultStructure", list[Any]]:
-        """Of a result, and the arrays in it."""
-        leaves, structure = jtu.tree_flatten(result)
-        arrays = [isinstance(x, jax.Array | np.ndarray | np.generic) for x in leaves]
-        known = [leaf_of(x) if so else x for x, so in zip(leaves, arrays, strict=True)]
-        return ResultStructure(known, structure), [
-            x for x, so in zip(leaves, arrays, strict=True) if so
-        ]
+    def of(tree: Any) -> tuple["Skeleton", list[Any]]:
+        """Of a tree, and the arrays in it."""
+        leaves, structure = jtu.tree_flatten(tree)
+        known = [leaf_of(leaf) if eqx.is_array(leaf) else leaf for leaf in leaves]
+        return Skeleton(known, structure), [leaf for leaf in leaves if eqx.is_array(leaf)]
+
+    @property
+    def places(self) -> list[Leaf]:
+        """Where arrays belong."""
+        return [leaf for leaf in self.leaves if isinstance(leaf, Leaf)]
 
     def filled(self, arrays: Sequence[Any]) -> Any:
-        """The result with these arrays."""
+        """The tree with these arrays."""
         rest = iter(arrays)
         return self.structure.unflatten(
             [next(rest) if isinstance(leaf, Leaf) else leaf for leaf in self.leaves]
@@ -66,7 +69,7 @@ class CompiledCall(NamedTuple):
     """
 
     compiled: jax.stages.Compiled
-    result: ResultStructure
+    result: Skeleton
     host_calls: list[HostCall]
 
     def __call__(self, arrays: Sequence[Any]) -> Any:
@@ -74,9 +77,9 @@ class CompiledCall(NamedTuple):
 
     def shapes(self) -> Any:
         """The result with shapes instead of arrays."""
-        leaves = [leaf for leaf in self.result.leaves if isinstance(leaf, Leaf)]
+        places = self.result.places
         return self.result.filled(
-            [jax.ShapeDtypeStruct(x.shape, np.dtype(x.dtype), weak_type=x.weak) for x in leaves]
+            [jax.ShapeDtypeStruct(x.shape, x.dtype, weak_type=x.weak) for x in places]
         )
 
 
@@ -84,10 +87,10 @@ def trace_call(
     function: Callable[[Sequence[Any]], Any], arrays: Sequence[Any], key: str
 ) -> Callable[[], CompiledCall]:
     """Traces a function of arrays; what then compiles it, and keeps it by its key."""
-    results: list[ResultStructure] = []
+    results: list[Skeleton] = []
 
     def flat(*given: Any) -> list[Any]:
-        result, found = ResultStructure.of(function(given))
+        result, found = Skeleton.of(function(given))
         results.append(result)
         return found
 
@@ -122,13 +125,12 @@ def read_call(key: str) -> CompiledCall | None:
             initialize: Any = lapack.prepare_lapack_call
             initialize("geev", np.dtype(np.float64))
         taken = jtu.tree_structure((tuple(range(count)), {}))
-        arrays = [leaf for leaf in leaves if isinstance(leaf, Leaf)]
-        given = jtu.tree_structure(list(range(len(arrays))))
+        result = Skeleton(leaves, jtu.tree_structure(skeleton))
+        given = jtu.tree_structure(list(range(len(result.places))))
         with _LOADING, _without_noise():
             compiled = serialize_executable.deserialize_and_load(
                 code, taken, given, execution_devices=jax.devices()[:1]
             )
-        result = ResultStructure(leaves, jtu.tree_structure(skeleton))
         return CompiledCall(compiled, result, calls)
     return None
 

@@ -46,6 +46,9 @@ class HostFunction(Protocol):
     def __fingerprint__(self) -> object:
         """See `jaxbiped._fingerprint`."""
 
+    def ready(self) -> bool:
+        """Whether it runs without compiling anything first."""
+
 
 class HostCall:
     """A function that compiled programs of XLA call by its key, as long as somebody keeps this."""

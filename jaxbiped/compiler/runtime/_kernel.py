@@ -69,7 +69,7 @@ class Kernel:
         if signature is None:
             raise KeyError(digest)
         kernel = Kernel(None, signature.inputs, digest)
-        kernel.__dict__["signature"] = signature
+        kernel.__dict__["_kept_signature"] = signature
         return kernel
 
     def trace_from(self, other: "Kernel") -> None:
@@ -77,11 +77,15 @@ class Kernel:
         self._program = self._program or other._program
 
     @functools.cached_property
+    def _kept_signature(self) -> Signature | None:
+        """What the disk knew of it when it was first asked."""
+        return None if self.digest is None else read_signature(self.digest)
+
+    @functools.cached_property
     def signature(self) -> Signature:
         """What its callers have to know of its operations."""
-        kept = None if self.digest is None else read_signature(self.digest)
-        if kept is not None:
-            return kept
+        if self._kept_signature is not None:
+            return self._kept_signature
         program = self._own_program()
         found = signature_of(self.graph, self.inputs, self.outline, backwards=program.backwards)
         if self.digest is not None:
@@ -91,7 +95,7 @@ class Kernel:
     @functools.cached_property
     def outline(self) -> Outline:
         """What leaves the program: known before its operations are."""
-        kept = None if self.digest is None else read_signature(self.digest)
+        kept = self._kept_signature
         return outline_of(self._own_program(), self.inputs) if kept is None else kept.outline
 
     @property
@@ -132,7 +136,7 @@ class Kernel:
     def _read_code(self, width: int) -> MachineCode | None:
         if self.digest is None or self._graph is not None:
             return None
-        kept = self.__dict__.get("signature") or read_signature(self.digest)
+        kept = self._kept_signature
         return None if kept is None else read_code(self.digest, width, host(), maps=kept.maps)
 
     def _make_code(self, width: int) -> MachineCode:

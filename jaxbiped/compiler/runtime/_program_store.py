@@ -44,11 +44,6 @@ class Signature(NamedTuple):
     maps: bool
     backwards: bool
 
-    @property
-    def size(self) -> int:
-        """How many numbers the inputs of one simulation are."""
-        return sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(self.inputs))
-
 
 def signature_of(graph: Graph, inputs: Any, outline: Outline, *, backwards: bool) -> Signature:
     """Of a program that was traced."""
