@@ -17,10 +17,15 @@ from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
 
 
-@cached_jit  # many small operations
 def default_guess(scene: AbstractScene) -> WalkerState:
     """The seed's start, fitted to the scene's legs and gravity; bristles, where any, straight."""
-    seed, own = _seed()
+    dtype = jnp.result_type(scene.walker.l, float)
+    return _fitted(scene, *jax.tree.map(dtype.type, _seed()))
+
+
+@cached_jit  # many small operations
+def _fitted(scene: AbstractScene, seed: State, own: Scene) -> WalkerState:
+    """`own` is the seed's scene. As constants XLA would divide by its numbers by reciprocals."""
     if not scene.compliant:
         pace = jnp.sqrt(scene.ground.g / scene.walker.l * own.walker.l / own.ground.g)
         rates = dict(omega_1=seed.omega_1 * pace, omega_2=seed.omega_2 * pace)

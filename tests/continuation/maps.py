@@ -34,6 +34,7 @@ def curve_of(step, jacobian, bounds, *, footsteps=1, code=lambda point, value: 0
             peak=0.0,
             code=code(x, value),
             sound=True,
+            grazes=0,
         )
 
     def change(point, s):
