@@ -123,6 +123,14 @@ def of_bifurcation_elasticities(numbers: dict[str, Any]) -> Iterator[str]:
         yield row(name, *cells)
 
 
+def of_gradient_cost(numbers: dict[str, Any]) -> Iterator[str]:
+    """CPU time over the number of parameters."""
+    costs = ("return_ms", "return_with_columns_ms", "radius_by_adjoint_ms")
+    for each in numbers["rows"]:
+        times = (f"{each[name]:.1f}" for name in costs)
+        yield row(str(each["parameters"]), *times, f"{each['radius_by_differences_ms']:.0f}")
+
+
 def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
     """Errors of state and gradient of each way and setting, and what it says of them."""
     for each in numbers["rows"]:
@@ -216,6 +224,21 @@ def of_long_walks(numbers: dict[str, Any]) -> Iterator[str]:
     yield f"from {small(spread[0] / period)} in the first tenth to {small(spread[-1] / period)}"
     low, high = numbers["peak_MiB"]
     yield f"{low:.0f} MiB after a tenth and {high:.0f} MiB at the end"
+
+
+def of_optimise_speed(numbers: dict[str, Any]) -> Iterator[str]:
+    """Optimisers on one problem, designs at no loss of speed, and what descents took."""
+    for name, each in numbers["fastest"].items():
+        best, seconds = f"{each['objective']:.4f}", f"{each['wall_s']:.1f}"
+        yield row(name, best, each["outcome"], str(each["evaluations"]), seconds)
+    for name, each in numbers["designs"].items():
+        measures, told = each["measures"], each["certificate"]
+        sizes = (f"{measures['spectral_radius']:.4f}", f"{measures['speed']:.4f}")
+        basin, norm = f"{told['basin'][0]:.3f}", f"{told['sensitivity_norm']:.2f}"
+        yield row(name, *sizes, norm, basin)
+    for name, each in numbers["descents"].items():
+        seconds = (f"{each[key]:.1f}" for key in ("warm_wall_s", "warm_cpu_s"))
+        yield row(name, str(each["iterations"]), str(each["evaluations"]), *seconds)
 
 
 def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
@@ -375,12 +398,14 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "extremes": of_extremes,
     "force_models": of_force_models,
     "gradient_accuracy": of_gradient_accuracy,
+    "gradient_cost": of_gradient_cost,
     "gradient_truth": of_gradient_truth,
     "identify": of_identify,
     "label_accuracy": of_label_accuracy,
     "ladder": of_ladder,
     "level_ground": of_level_ground,
     "long_walks": of_long_walks,
+    "optimise_speed": of_optimise_speed,
     "period_doubling": of_period_doubling,
     "search_robustness": of_search_robustness,
     "slope_branch": of_slope_branch,

@@ -37,7 +37,7 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
         The branch.
 
     Raises:
-        ArgumentError: a dataset of something else, or of another scene.
+        ArgumentError: a dataset of something else, of another scene, or that lacks a variable.
     """
     check_type("scene", scene, Scene, RigidScene)
     if "branch" not in dataset.attrs:
@@ -57,12 +57,12 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
             EVENTS[int(kind)], point, complex(real, imaginary), float(error), float(value_error)
         )
         for kind, point, real, imaginary, error, value_error in zip(
-            dataset["event_kind"].values,
+            _column(dataset, "event_kind"),
             special,
-            dataset["event_multiplier_real"].values,
-            dataset["event_multiplier_imag"].values,
-            dataset["event_error"].values,
-            dataset["event_value_error"].values,
+            _column(dataset, "event_multiplier_real"),
+            _column(dataset, "event_multiplier_imag"),
+            _column(dataset, "event_error"),
+            _column(dataset, "event_value_error"),
             strict=True,
         )
     ]
@@ -80,11 +80,19 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
     )
 
 
+def _column(dataset: "xarray.Dataset", name: str) -> np.ndarray:
+    if name not in dataset.variables:
+        raise ArgumentError(
+            f"dataset is not allowed: it has no variable {name!r}, as branches of this version do."
+        )
+    return np.asarray(dataset[name].values)
+
+
 def _points(
     dataset: "xarray.Dataset", state_type: Any, along: str, before: str
 ) -> list[BranchPoint]:
     def column(name: str) -> np.ndarray:
-        return np.asarray(dataset[before + name].values)
+        return _column(dataset, before + name)
 
     recurring = np.stack([column(f"state_{name}") for name in state_type._fields[1:]], axis=1)
     values = column("multipliers_real") + 1j * column("multipliers_imag")

@@ -35,6 +35,8 @@ _COMPLIANT = {"balanced": Precision(2e-8, 2e-7)}
 """How exactly functionals of a compliant orbit are solved where that is not as the gait is: the
 errors of derivatives of the spectral radius, of slip and of losses are then below 1e-5 of the
 elasticity, as those of the gait's own measures are; it doubles what an evaluation costs."""
+_DRIVEN, _BOUND = 0.3, 0.1
+"""Shares of these tolerances that keep the motors' work, and the bound of the radius, to 1e-5."""
 _PATIENCE = 50.0
 """Time allowed to the next arrival, in units of √(l/g)."""
 
@@ -105,12 +107,15 @@ def cycle_spec(
     )
 
 
-def functional_precision(accuracy: str, scene: Scene | RigidScene) -> Precision:
+def functional_precision(
+    accuracy: str, scene: Scene | RigidScene, names: tuple[str, ...] = ()
+) -> Precision:
     """How exactly functionals are solved, as arrays: one program serves every accuracy."""
-    found = precision_of(accuracy, scene)
-    if scene.compliant:
-        found = _COMPLIANT.get(accuracy, found)
-    return Precision(*(jnp.asarray(tolerance) for tolerance in found))
+    found, share = precision_of(accuracy, scene), 1.0
+    if scene.compliant and accuracy in _COMPLIANT:
+        found, share = _COMPLIANT[accuracy], 1.0 if scene.actuation is None else _DRIVEN
+        share = _BOUND if "radius_bound" in names else share
+    return Precision(*(jnp.asarray(share * tolerance) for tolerance in found))
 
 
 @cached_jit

@@ -123,7 +123,8 @@ def jacobian_functionals(
             )
         arrivals = 2 * footsteps if has_clearance else footsteps
         spec = cycle_spec(scene, system, section, arrivals, engine)
-        told.append(_functionals(spec, scene, y, group, functional_precision(accuracy, scene)))
+        precision = functional_precision(accuracy, scene, group)
+        told.append(_functionals(spec, scene, y, group, precision))
     if len(told) == 1:
         return told[0]
     every = [name for group in groups.values() for name in group]

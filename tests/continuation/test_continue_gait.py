@@ -1,5 +1,8 @@
 """Branches of rigid walkers against what was published and what `find_gait` says."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray
@@ -197,6 +200,8 @@ def test_a_dataset_says_what_is_in_it(rigid):
         open_branch(data, jb.with_parameters(rigid_seed(), {"r": 0.09}))
     with pytest.raises(jb.ArgumentError, match="must be that of a branch"):
         open_branch(xarray.Dataset(), rigid_seed())
+    with pytest.raises(jb.ArgumentError, match="it has no variable 'event_value_error'"):
+        open_branch(data.drop_vars("event_value_error"), rigid_seed())
 
 
 def test_a_curve_of_doublings_passes_through_that_of_another_scene(rigid):
@@ -229,6 +234,23 @@ def test_the_compliant_branch_turns_at_a_fold():
     assert str(inside.outcome) == "found"
     assert str(outside.outcome) != "found"
     assert {True, False} <= set(branch.stable)
+    assert abs(folds[0].value - bisected_slope("fold")) <= folds[0].value_error
+
+
+def bisected_slope(kind):
+    """Where bisection by `find_gait` at the tight accuracy saw the seed's stability end [rad]."""
+    results = Path(__file__).parents[2] / "experiments" / "results" / "slope_branch.json"
+    losses = json.loads(results.read_text())["scenes"]["stribeck"]["losses"]
+    (bracket,) = (loss["bisection"] for loss in losses if loss["kind"] == kind)
+    return 0.5 * sum(bracket)
+
+
+def test_the_compliant_doubling_lies_within_its_bar_of_the_bisected_one():
+    scene = jb.seed_scene(slope=0.097)
+    branch = jb.continue_gait(scene, bounds=(0.096, 0.104), largest_step=0.1, max_points=30)
+    (event,) = branch.bifurcations
+    assert event.kind is BranchEvent.PERIOD_DOUBLING
+    assert abs(event.value - bisected_slope("period-doubling")) <= event.value_error < 3e-5
 
 
 @pytest.mark.parametrize(

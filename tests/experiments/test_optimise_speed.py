@@ -26,3 +26,6 @@ def test_the_radius_is_halved_at_no_loss_of_speed(tmp_path):
     fast = numbers["fastest"]["trust-region"]["measures"]
     assert fast["speed"] > seed["speed"]
     assert fast["spectral_radius"] <= 0.4 * (1.0 + 1e-4)
+    descent = numbers["descents"]["minimise spectral_radius"]
+    assert descent["objective"] < seed["spectral_radius"]
+    assert descent["evaluations"] >= descent["iterations"] > 1

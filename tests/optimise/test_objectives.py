@@ -45,9 +45,6 @@ NOISY = {
     "friction_loss": (1e-3, 1e-5),
 }
 """The same for what differences themselves have no better, or the tight accuracy."""
-COARSE = {"radius_bound": 2e-4, "motor_work": 3e-5}
-"""Where the balanced accuracy is farther than usual from the tight one."""
-
 
 FOLLOWED = ("fold_distance", "doubling_distance")
 """For which branches are followed: see `test_bifurcation_distance`."""
@@ -101,7 +98,7 @@ def test_gradients_are_those_of_central_differences(which):
                     for each, known in (("balanced", told), ("tight", tight))
                 }
                 apart = abs(told.slopes[name][place] - tight.slopes[name][place]) * own / size
-                assert apart <= COARSE.get(name, USUAL[1]) * max(1.0, abs(slope)), (name, varied)
+                assert apart <= USUAL[1] * max(1.0, abs(slope)), (name, varied)
                 if name not in noisy:
                     # Of steep ones the error is relative.
                     assert off["balanced"] <= USUAL[1] * max(1.0, abs(slope)), (name, varied)
