@@ -1,5 +1,5 @@
 # `make gait` runs the main job, `make walk` simulates the walker, `make test` runs all checks,
-# `make check` those that take minutes.
+# `make check` those that take minutes, `make docs` builds the documentation site.
 # Each sets up what it needs in .venv inside this checkout; repeated runs do not set up again.
 PYTHON ?= python3
 VENV := .venv
@@ -13,7 +13,7 @@ PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 EXPERIMENTS := $(filter-out _% quote,$(patsubst experiments/%.py,%,$(wildcard experiments/*.py)))
 ONLY ?= $(EXPERIMENTS)
 
-.PHONY: walk gait check test lint types notebooks figures clean
+.PHONY: walk gait check test lint types docs notebooks figures clean
 
 walk: $(VENV)/.installed
 	$(BIN)/jaxbiped walk --out $(OUT)
@@ -35,6 +35,11 @@ lint: $(VENV)/.installed-dev
 
 types: $(VENV)/.installed-dev
 	$(BIN)/mypy
+
+# The documentation site in out/site; EXECUTE=force runs the lessons first.
+docs: $(VENV)/.installed-dev
+	$(BIN)/sphinx-build -W --keep-going -q -j 2 -c docs . out/site
+	@echo "The site: out/site/index.html"
 
 # Runs all notebooks at full size and keeps them with their outputs; takes some minutes.
 notebooks: $(VENV)/.installed-dev

@@ -1,20 +1,29 @@
 """What the pages quote of the experiments' results.
 
 `--keep` turns the numbers of a run into the file of results: without the paths of its pictures, and
-with `--untimed`, for a machine that was not idle, without its timings. Without it, all that the
-results say is printed as the pages must have it, which tests/test_results.py asks for.
+with `--untimed`, for a machine that was not idle, without its timings; its pictures go, lighter, to
+the site's gallery. Without it, all that the results say is printed as the pages must have it, which
+tests/test_results.py asks for.
 """
 
 import dataclasses
+import datetime
 import json
+import os
+import platform
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import llvmlite.binding as llvm
 import tyro
+from PIL import Image
 
 RESULTS = Path(__file__).parent / "results"
+GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
+COLOURS, WIDEST = 128, 1600
+"""Of a picture in the gallery, and pixels: figures have few, and pages should load."""
 PICTURES = {"picture", "pictures"}
 TIMINGS = {
     "batch_ratio", "batch_us", "compile_s", "first_compile_s", "first_result_s", "gaits_s",
@@ -45,9 +54,38 @@ def without(numbers: Any, keys: set[str]) -> Any:
     return numbers
 
 
+def machine() -> str:
+    """What this machine is, as far as results depend on it."""
+    known = hasattr(os, "sched_getaffinity")
+    cores = len(os.sched_getaffinity(0)) if known else os.cpu_count()
+    features = llvm.get_host_cpu_features()
+    vectors = {"AVX-512": "avx512f", "AVX2": "avx2"}
+    width = next((word for word, flag in vectors.items() if features.get(flag)), "")
+    return f"{cores} cores, {width or platform.machine()}"
+
+
+def pictures_of(numbers: dict[str, Any]) -> list[Path]:
+    """Paths of the pictures that a run wrote."""
+    named = numbers.get("pictures", [numbers["picture"]] if "picture" in numbers else [])
+    found = named.values() if isinstance(named, dict) else named
+    return [Path(each) for each in found if str(each).endswith(".png")]
+
+
+def keep_picture(experiment: str, picture: Path) -> None:
+    """Puts a picture into the gallery, under the name of its experiment."""
+    own = picture.stem.removeprefix(experiment).strip("_-")
+    drawn = Image.open(picture).convert("RGB")
+    drawn.thumbnail((WIDEST, WIDEST * 4))
+    few = drawn.quantize(COLOURS, dither=Image.Dither.NONE)
+    GALLERY.mkdir(exist_ok=True)
+    few.save(GALLERY / f"{'-'.join(filter(None, (experiment, own)))}.png", optimize=True)
+
+
 def keep(path: Path, *, untimed: bool) -> Path:
     """Writes a run's numbers into the folder of results, a list of numbers on one line."""
-    numbers = without(json.loads(path.read_text()), PICTURES | (TIMINGS if untimed else set()))
+    run = json.loads(path.read_text())
+    numbers = without(run, PICTURES | (TIMINGS if untimed else set()))
+    numbers["made"] = {"date": datetime.date.today().isoformat(), "machine": machine()}
     text = json.dumps(numbers, indent=1, ensure_ascii=False)
     text = re.sub(r"\[[^][{}]*\]", lambda found: " ".join(found[0].split()), text)
     RESULTS.mkdir(exist_ok=True)
@@ -422,6 +460,8 @@ def quoted(name: str) -> list[str]:
 def main() -> None:
     options = tyro.cli(Options, description=__doc__)
     if options.keep is not None:
+        for picture in pictures_of(json.loads(options.keep.read_text())):
+            keep_picture(options.keep.stem, picture)
         known = options.keep.stem in QUOTES
         print(keep(options.keep, untimed=options.untimed) if known else "no page quotes this")
         return

@@ -69,6 +69,9 @@ def test_results_are_kept_without_paths_and_timings(untimed, tmp_path, monkeypat
     run = {"costs": {"a": {"wall_s": 1.5, "error": 1e-6}}, "rows": [[1, 2]], "pictures": ["/x.png"]}
     (tmp_path / "made.json").write_text(json.dumps(run))
     kept = json.loads(quote.keep(tmp_path / "made.json", untimed=untimed).read_text())
+    made = kept.pop("made")
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d", made["date"])
+    assert re.match(r"\d+ cores", made["machine"])
     cost = {"error": 1e-6} if untimed else {"wall_s": 1.5, "error": 1e-6}
     assert kept == {"costs": {"a": cost}, "rows": [[1, 2]]}
 

@@ -1,0 +1,78 @@
+"""The documentation site builds without a warning and has every public name and page."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from sphinx.util.inventory import InventoryFile
+
+ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site, its lessons with the outputs that they are kept with."""
+    folder = tmp_path_factory.mktemp("site")
+    command = ["-m", "sphinx", "-W", "--keep-going", "-q", "-j", "2", "-c", "docs", ".", folder]
+    built = subprocess.run(
+        [sys.executable, *map(str, command)], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert built.returncode == 0, built.stderr
+    assert built.stderr == ""
+    return folder
+
+
+def public_names():
+    """All names of the package that are no modules, by the path that a user writes."""
+    sys.path.append(str(ROOT / "docs" / "_ext"))
+    try:
+        from public_names import public_names
+    finally:
+        sys.path.pop()
+    pages = sorted((ROOT / "docs" / "reference").glob("*.rst"))
+    modules = ["jaxbiped" if page.stem == "jaxbiped" else f"jaxbiped.{page.stem}" for page in pages]
+    return {f"{module}.{name}" for module in modules for name in public_names(module)}
+
+
+def namespaces():
+    """Modules that the top level's map lists."""
+    import jaxbiped as jb
+
+    listed = (name for name in jb.__all__ if type(getattr(jb, name)) is type(sys))
+    return set(listed)
+
+
+def test_every_public_name_is_in_the_reference(site):
+    inventory = InventoryFile.loads((site / "objects.inv").read_bytes(), uri="")
+    documented = {
+        name for kind, names in inventory.data.items() if kind.startswith("py:") for name in names
+    }
+    names = public_names()
+    assert len(names) > 250
+    assert names - documented == set()
+
+
+def test_every_namespace_has_a_page():
+    pages = {page.stem for page in (ROOT / "docs" / "reference").glob("*.rst")}
+    assert namespaces() | {"jaxbiped"} == pages
+
+
+def test_lessons_are_on_the_site_with_their_pictures(site):
+    for notebook in (ROOT / "notebooks").glob("*.ipynb"):
+        page = (site / "notebooks" / f"{notebook.stem}.html").read_text()
+        assert "<img" in page, notebook.stem
+
+
+def test_every_picture_of_the_gallery_leads_to_its_script(site):
+    pictures = sorted((ROOT / "docs" / "gallery").glob("*.png"))
+    page = (site / "docs" / "gallery.html").read_text()
+    assert pictures
+    for picture in pictures:
+        assert picture.name in page
+        assert f"{picture.stem.partition('-')[0]}.py" in page
+
+
+def test_the_front_door_leads_to_the_index(site):
+    assert 'href="docs/index.html"' in (site / "index.html").read_text()
