@@ -114,7 +114,7 @@ def test_flags_of_the_command_line_exist(capsys):
     from jaxbiped.cli import main
 
     helps = ""
-    studies = ("models", "constraints", "trade", "extremes", "cache")
+    studies = ("models", "constraints", "trade", "extremes", "cache", "doctor")
     own = ("walk", "gait", "continue", "fit", "optimise", "basin", *studies)
     for command in own:
         with pytest.raises(SystemExit):

@@ -16,6 +16,7 @@ from jaxbiped.cli.commands._basin import Basin
 from jaxbiped.cli.commands._cache import Cache
 from jaxbiped.cli.commands._constraints import Constraints
 from jaxbiped.cli.commands._continue import ContinueGait
+from jaxbiped.cli.commands._doctor import Doctor
 from jaxbiped.cli.commands._extremes import Extremes
 from jaxbiped.cli.commands._fit import Fit
 from jaxbiped.cli.commands._gait import FindGait
@@ -36,6 +37,7 @@ _Command = (
     | Annotated[Trade, subcommand("trade")]
     | Annotated[Extremes, subcommand("extremes")]
     | Annotated[Cache, subcommand("cache")]
+    | Annotated[Doctor, subcommand("doctor")]
     | Annotated[None, subcommand("version")]
 )
 

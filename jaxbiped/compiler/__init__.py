@@ -8,6 +8,7 @@ from jaxbiped.compiler.passes._operation_counts import count_operations as count
 from jaxbiped.compiler.runtime._engine import AbstractEngine as AbstractEngine
 from jaxbiped.compiler.runtime._engine import Request as Request
 from jaxbiped.compiler.runtime._engine import Result as Result
+from jaxbiped.compiler.runtime._host_cpu import host as host
 from jaxbiped.compiler.runtime._lane_engine import LaneEngine as LaneEngine
 from jaxbiped.compiler.runtime._loop_engine import LoopEngine as LoopEngine
 from jaxbiped.compiler.runtime._primitive import Recording as Recording

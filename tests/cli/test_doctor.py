@@ -1,0 +1,51 @@
+"""The command doctor: it tells what is installed, and what is wrong with it."""
+
+import json
+
+import pytest
+
+from jaxbiped.cli import _doctor, main
+from jaxbiped.cli._doctor import complaints
+from jaxbiped.cli._self_test import Truth, self_test
+
+
+def _told(capsys, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main(["doctor", *arguments])
+    return ended.value.code, capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_sound_installation_passes(capsys):
+    code, printed = _told(capsys, "--json", "-")
+    told = json.loads(printed)
+    assert code == 0
+    assert told["wrong"] == []
+    assert [each["holds"] for each in told["self_test"]] == [True, True, True]
+    assert told["vector_width"] in (2, 4, 8)
+    assert told["versions"]["jax"].startswith("0.")
+    assert {abs(each.found - each.known) < each.allowed for each in self_test()} == {True}
+
+
+def test_what_is_wrong_is_said_and_costs_the_exit_code(capsys, monkeypatch):
+    off = Truth("height", 1.0, 1.5, 1e-9)
+    monkeypatch.setattr(_doctor, "self_test", lambda: (off, off._replace(found=1.0)))
+    code, printed = _told(capsys)
+    assert code == 1
+    assert "height is off by 5e-01" in printed
+    assert printed.count("wrong") == 1
+
+    def broken():
+        raise RuntimeError("no code for this CPU")
+
+    monkeypatch.setattr(_doctor, "self_test", broken)
+    code, printed = _told(capsys)
+    assert code == 1
+    assert "the self-test ended with RuntimeError: no code for this CPU" in printed
+
+
+def test_versions_known_to_be_bad_are_named():
+    assert complaints({"jax": "0.10.1"}) == []
+    (said,) = complaints({"jax": "0.10.2"})
+    assert "jax 0.10.2 must not be used" in said
+    assert "39103" in said
