@@ -13,7 +13,7 @@ PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 EXPERIMENTS := $(filter-out _% quote,$(patsubst experiments/%.py,%,$(wildcard experiments/*.py)))
 ONLY ?= $(EXPERIMENTS)
 
-.PHONY: walk gait check test lint types docs notebooks figures clean
+.PHONY: walk gait check test lint types docs dist notebooks figures clean
 
 walk: $(VENV)/.installed
 	$(BIN)/jaxbiped walk --out $(OUT)
@@ -40,6 +40,11 @@ types: $(VENV)/.installed-dev
 docs: $(VENV)/.installed-dev
 	$(BIN)/sphinx-build -W --keep-going -q -j 2 -c docs . out/site
 	@echo "The site: out/site/index.html"
+
+# The wheel and the source distribution, the same to the last byte for the same commit.
+dist: $(VENV)/.installed-dev
+	rm -rf dist
+	SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(BIN)/python -m build --outdir dist .
 
 # Runs all notebooks at full size and keeps them with their outputs; takes some minutes.
 notebooks: $(VENV)/.installed-dev
