@@ -22,7 +22,7 @@ from PIL import Image
 
 RESULTS = Path(__file__).parent / "results"
 GALLERY = Path(__file__).parents[1] / "docs" / "gallery"
-COLOURS, WIDEST = 128, 1600
+COLOURS, WIDEST = 256, 1600
 """Of a picture in the gallery, and pixels: figures have few, and pages should load."""
 PICTURES = {"picture", "pictures"}
 TIMINGS = {
@@ -76,7 +76,7 @@ def keep_picture(experiment: str, picture: Path) -> None:
     own = picture.stem.removeprefix(experiment).strip("_-")
     drawn = Image.open(picture).convert("RGB")
     drawn.thumbnail((WIDEST, WIDEST * 4))
-    few = drawn.quantize(COLOURS, dither=Image.Dither.NONE)
+    few = drawn.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
     GALLERY.mkdir(exist_ok=True)
     few.save(GALLERY / f"{'-'.join(filter(None, (experiment, own)))}.png", optimize=True)
 

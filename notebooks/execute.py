@@ -22,7 +22,7 @@ from PIL import Image
 HERE = Path(__file__).parent
 LARGEST = 1_000_000
 """Bytes of a notebook with its outputs."""
-COLOURS = 128
+COLOURS = 256
 """Of a picture that is kept: figures have few, and a palette makes them three times lighter."""
 FOLDERS = re.compile(r"/(?:home|root|tmp|work|mnt|Users|usr|var|opt)/[\w.]")
 """Absolute paths, which belong to a machine."""
@@ -81,7 +81,9 @@ def joined(outputs: list[nbformat.NotebookNode]) -> list[nbformat.NotebookNode]:
 def lighter(png: str) -> str:
     """The same picture, Base64, with a palette."""
     picture, written = Image.open(io.BytesIO(base64.b64decode(png))), io.BytesIO()
-    few = picture.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
+    # Else the colours of thin lines are lost to those of large areas.
+    way = Image.Quantize.MAXCOVERAGE
+    few = picture.convert("RGB").quantize(COLOURS, way, dither=Image.Dither.NONE)
     few.save(written, "png", optimize=True)
     return base64.b64encode(written.getvalue()).decode()
 
