@@ -4,8 +4,9 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._energy import kinetic_and_moment
 from jaxbiped.dynamics._rigid_state import RigidState, whole_state
 from jaxbiped.dynamics._rolling import rolling
@@ -98,7 +99,7 @@ def _knot_times(began: np.ndarray, end: float, apart: float) -> tuple[np.ndarray
 
 
 def _walked(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> RigidState:
-    found = []
+    found, arrays = [], jtu.tree_map(as_float, scene)
     # No time at all is not simulated.
     shortest = 1e-12 * time_unit(scene)
     for k in range(0, len(durations), _AT_ONCE):
@@ -106,9 +107,12 @@ def _walked(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> Rig
         missing = _AT_ONCE - len(durations[rows])
         padded = [np.pad(leaf[rows], (0, missing), mode="edge") for leaf in (*starts, durations)]
         part = RigidState(*map(jnp.asarray, padded[:-1]))
-        states = states_after(scene, part, np.maximum(padded[-1], shortest))
+        states = _states_after(arrays, part, np.maximum(padded[-1], shortest))
         found.append([np.asarray(leaf)[: _AT_ONCE - missing] for leaf in states])
     return RigidState(*map(np.concatenate, zip(*found, strict=True)))
+
+
+_states_after = cached_jit(states_after)
 
 
 def _channels(scene: RigidScene, states: RigidState) -> Channels:

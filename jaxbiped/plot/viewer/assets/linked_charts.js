@@ -7,7 +7,12 @@ import { html } from "./dom.js";
 const CHARTS = [
   { title: "Leg angles", y: "leg angle (rad)", curves: { theta_1: "leg-1", theta_2: "leg-2" } },
   { title: "Phase portrait", x: "leg angle (rad)", y: "leg rate (rad/s)", portrait: true },
-  { title: "Normal forces", y: "force (N)", most: mostForce, curves: { normal_1: "leg-1", normal_2: "leg-2" } },
+  {
+    title: "Normal forces",
+    y: "force (N)",
+    most: mostForce,
+    curves: { normal_1: "leg-1", normal_2: "leg-2" },
+  },
   {
     title: "Tangential forces",
     y: "downhill force (N)",
@@ -39,7 +44,8 @@ export class LinkedCharts {
 
   build(about, walks, pick) {
     const { walk } = this;
-    const names = about.portrait ? [1, 2] : Object.keys(about.curves).filter((n) => walk.channels[n]);
+    const known = Object.keys(about.curves ?? {}).filter((name) => walk.channels[name]);
+    const names = about.portrait ? [1, 2] : known;
     const curves = about.portrait
       ? names.map((leg) => portraitCurve(walk, leg))
       : names.map((name) => timeCurve(walk, name, about.curves[name]));
@@ -50,7 +56,8 @@ export class LinkedCharts {
     const y = about.portrait
       ? rangeOf(like(({ channels }) => [channels.omega_1, channels.omega_2]))
       : cut(rangeOf(like(({ channels }) => names.map((name) => channels[name]))), about, walks);
-    const x = about.portrait && rangeOf(like(({ channels }) => [channels.theta_1, channels.theta_2]));
+    const angles = like(({ channels }) => [channels.theta_1, channels.theta_2]);
+    const x = about.portrait && rangeOf(angles);
     const key = names.map((name, k) => keyEntry(curves[k].look, nameOf(walk, name)));
     const caption = html("figcaption", {}, about.title, html("span", { class: "key" }, ...key));
     const figure = html("figure", {}, caption, chart.element);

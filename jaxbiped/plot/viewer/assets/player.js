@@ -35,11 +35,12 @@ export class Player {
       this.changed();
     });
     this.live = html("p", { class: "hidden live", "aria-live": "polite", role: "status" });
+    const follow = html("label", {}, followed, "Follow");
     this.element = html(
       "div",
       { class: "player", role: "group", "aria-label": "Player" },
       html("div", { class: "row" }, this.play, this.slider),
-      html("div", { class: "row" }, this.speeds.label, html("label", {}, followed, "Follow"), this.spans.label),
+      html("div", { class: "row" }, this.speeds.label, follow, this.spans.label),
       this.live,
     );
     this.refresh();

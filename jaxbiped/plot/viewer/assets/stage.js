@@ -50,7 +50,8 @@ export class Stage {
   drawFootprints() {
     this.prints = this.walk.footprints.map((print) => {
       const half = 0.06 * this.walk.l;
-      const [left, right] = [-half, half].map((x) => onPage(this.walk, print.x + x, -0.035 * this.walk.l));
+      const depth = 0.035 * this.walk.l;
+      const [left, right] = [-half, half].map((x) => onPage(this.walk, print.x + x, -depth));
       const line = svg("line", {
         x1: left[0], y1: left[1], x2: right[0], y2: right[1],
         class: `footprint leg-${print.foot}`,

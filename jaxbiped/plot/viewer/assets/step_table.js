@@ -9,7 +9,8 @@ export function stepTable(walk) {
     const [period, length] = [print.t - strikes[k].t, print.x - strikes[k].x];
     const numbers = [print.t, period, length, length / period];
     const cells = numbers.map((value) => html("td", {}, fixed(value, 3)));
-    return html("tr", {}, html("th", { scope: "row" }, String(k + 1)), html("td", {}, `leg ${print.foot}`), ...cells);
+    const number = html("th", { scope: "row" }, String(k + 1));
+    return html("tr", {}, number, html("td", {}, `leg ${print.foot}`), ...cells);
   });
   if (!rows.length) return null;
   const heads = ["footstep", "strikes", "time (s)", "period (s)", "length (m)", "speed (m/s)"];

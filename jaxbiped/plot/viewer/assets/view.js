@@ -22,7 +22,9 @@ export function showWalks(sent, el, { autoplay = false } = {}) {
   });
   const panels = walks.map((walk) => panel(walk, walks, (time) => player.scrub(time)));
   const keys = html("p", { class: "keys" }, KEYS);
-  root.append(html("div", { class: `panels${walks.length === 1 ? " single" : ""}` }, ...panels.map((each) => each.element)), player.element, keys);
+  const all = { class: walks.length === 1 ? "panels single" : "panels" };
+  const shown = html("div", all, ...panels.map((each) => each.element));
+  root.append(shown, player.element, keys);
   root.addEventListener("keydown", (event) => player.key(event));
   const draw = () => {
     for (const each of panels) {
@@ -55,12 +57,13 @@ function panel(walk, walks, pick) {
   const slope = `slope ${fixed(walk.slope, 4)} rad`;
   const told = `Outcome after ${fixed(walk.end, 2)} s: ${walk.ending}; ${slope}`;
   const reading = html("p", { class: "reading" });
+  const note = html("p", { class: "note" }, arrowNote(walk));
   const element = html(
     "section",
     { class: "panel", "aria-label": walk.name },
     html("h2", {}, walk.name),
     html("p", { class: "told" }, told),
-    html("div", { class: "picture" }, stage.element, reading, html("p", { class: "note" }, arrowNote(walk))),
+    html("div", { class: "picture" }, stage.element, reading, note),
     charts.element,
   );
   const table = stepTable(walk);
@@ -80,7 +83,8 @@ function reading({ legs }) {
 function arrowNote(walk) {
   return (
     "Arrows: forces of the ground on the feet, 0.3 leg lengths for the walker's weight of " +
-    `${fixed(walk.weight, 1)} N, cut at 1.1 leg lengths. Marks under the slope: footprints; ticks: every 0.1 m.`
+    `${fixed(walk.weight, 1)} N, cut at 1.1 leg lengths. ` +
+    "Marks under the slope: footprints; ticks: every 0.1 m."
   );
 }
 
