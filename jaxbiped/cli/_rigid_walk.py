@@ -1,9 +1,11 @@
 """`jaxbiped walk --model rigid`: footsteps of the rigid walker."""
 
+import dataclasses
 import time
 import warnings
 from typing import Any
 
+import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped import _clock
@@ -106,7 +108,9 @@ def run_rigid_walk(
 
         path = output.out / "leg_angles.png"
         plot.rigid_leg_angles(scene, state, duration=min(float(walk.t[-1]), _SHOWN)).savefig(path)
-        report.say(f"wrote {path}")
+        page = plot.view(scene, _beginning(walk), start=state).save(output.out / "walk.html")
+        for written in (path, page):
+            report.say(f"wrote {written}")
     report.finish(numbers)
     return 1 if walk.outcome is Ending.SOLVER_FAILED else 0
 
@@ -117,6 +121,16 @@ def _walk(scene: RigidScene, state: RigidState, options: JsonObject) -> Trajecto
         walk = rigid_walk(scene, state, **options)
     walk.t.block_until_ready()
     return walk
+
+
+def _beginning(walk: Trajectory[RigidState]) -> Trajectory[RigidState]:
+    """The part of a long walk that can be watched: as far as its last heel strike there."""
+    assert walk.arrivals is not None
+    if float(walk.t[-1]) <= _SHOWN:
+        return walk
+    count = int(np.searchsorted(np.asarray(walk.arrivals.t), _SHOWN))
+    t, state = jtu.tree_map(lambda leaf: leaf[:count], walk.arrivals[1:])
+    return dataclasses.replace(walk, arrivals=Arrivals(walk.arrivals.total, t, state))
 
 
 def _tolerance(solve: SolveOptions, walk: Trajectory[RigidState]) -> float:

@@ -39,7 +39,7 @@ _MOST_ROWS = 24
 _ROOM = 1 << 17
 """Steps that XLA finds room for at first; a walk that takes more is run again with more room."""
 _SHOWN = 60.0
-"""The part of a long walk that is animated [s]."""
+"""The part of a long walk that is animated and can be watched [s]."""
 
 
 def run(options: Walk) -> int:
@@ -163,7 +163,7 @@ def _run(request: Simulation) -> tuple[Trajectory, float]:
 
 
 def write_outputs(scene: Any, trajectory: Trajectory, out: Path) -> list[Path]:
-    """Writes the figures, the animation and the trajectory; returns their paths."""
+    """Writes the figures, the animations and the trajectory; returns their paths."""
     from jaxbiped import plot
     from jaxbiped.measure._dataset import trajectory_dataset
 
@@ -178,8 +178,10 @@ def write_outputs(scene: Any, trajectory: Trajectory, out: Path) -> list[Path]:
     trajectory_dataset(scene, trajectory).to_netcdf(out / "trajectory.nc")
     for name, draw in figures.items():
         draw(scene, trajectory).savefig(out / name)
-    plot.save_animation(plot.animate(scene, _beginning(trajectory)), out / "walk.gif")
-    return [out / "trajectory.nc", *(out / name for name in figures), out / "walk.gif"]
+    shown = _beginning(trajectory)
+    page = plot.view(scene, shown).save(out / "walk.html")
+    plot.save_animation(plot.animate(scene, shown), out / "walk.gif")
+    return [out / "trajectory.nc", *(out / name for name in figures), out / "walk.gif", page]
 
 
 def _beginning(trajectory: Trajectory) -> Trajectory:

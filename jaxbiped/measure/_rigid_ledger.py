@@ -1,9 +1,7 @@
 """The energy ledger of the rigid walker: where the work of gravity and actuators went."""
 
-from collections.abc import Callable
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -14,9 +12,9 @@ from jaxbiped.dynamics._energy import kinetic_and_moment
 from jaxbiped.dynamics._push_off import push_off_work
 from jaxbiped.dynamics._rigid_state import RigidState, whole_state
 from jaxbiped.dynamics._rolling import rolling_hip_motion, rolling_rates
+from jaxbiped.measure._rigid_samples import states_after
 from jaxbiped.measure._samples import NODES, Samples
 from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.solve._trajectory import Trajectory
 
 _PANELS = 24
@@ -114,20 +112,10 @@ def _energies(scene: RigidScene, states: RigidState) -> tuple[np.ndarray, np.nda
     return np.asarray(kinetic), np.asarray(scene.ground.g * moment)
 
 
-def _walked(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> RigidState:
-    """States so long after their starts, within their footsteps."""
-
-    def walked(start: RigidState, duration: Scalar) -> RigidState:
-        return rigid_walk(scene, start, duration=cast(float, duration), accuracy="tight").final
-
-    each: Callable[[RigidState, Scalar], RigidState] = jax.vmap(walked)
-    return each(starts, jnp.asarray(durations))
-
-
 def _before_impact(scene: RigidScene, starts: RigidState, periods: np.ndarray) -> RigidState:
     """States just before the impacts that end footsteps."""
     rest = _BEFORE * periods
-    near = _walked(scene, starts, periods - rest)
+    near = states_after(scene, starts, periods - rest)
     rates = rolling_rates(scene, near)
     angles = [
         angle + rest * (rate + 0.5 * rest * alpha)
@@ -146,7 +134,7 @@ def _hip_works(
         return np.zeros(len(periods)), np.zeros(len(periods))
     shares = (edges[:-1, None] + np.diff(edges)[:, None] * 0.5 * (1.0 + NODES)).ravel()
     many = RigidState(*[jnp.repeat(leaf, len(shares)) for leaf in starts])
-    states = _walked(scene, many, np.outer(periods, shares).ravel())
+    states = states_after(scene, many, np.outer(periods, shares).ravel())
     powers = _powers(scene, states)
 
     def split(power: Scalar) -> np.ndarray:

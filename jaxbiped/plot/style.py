@@ -8,11 +8,34 @@ from matplotlib.figure import Figure
 
 LEG_COLOURS = ("#0072B2", "#D55E00")
 """Leg 1 blue, leg 2 vermilion: two of Okabe and Ito's colours, distinct to colour-blind readers."""
+LEG_COLOURS_ON_DARK = ("#56B4E9", "#E69F00")
+"""Sky blue and orange, of the same colours, which stand out from a dark page."""
 LEG_STYLES: tuple[Any, ...] = ("-", (0, (5, 1.5)))
 """Leg 1 solid, leg 2 dashed, for print without colour."""
 LEG_NAMES = ("leg 1", "leg 2")
 GROUND_COLOUR = "#595959"
 SHADE_COLOUR = "#DDDDDD"
+_ENERGY_COLOURS = {
+    "kinetic": ("#0072B2", "#56B4E9"),
+    "elastic": ("#A8578A", "#CC79A7"),
+    "supplied": ("#00795A", "#2CC79B"),
+    "lost": ("#B84C00", "#E69F00"),
+}
+"""Of each energy's curve in the viewer, on a light page and on a dark one."""
+
+
+def view_colours() -> dict[str, str]:
+    """The viewer's colours, `light-…` and `dark-…`, by what they stand for."""
+    pairs = {
+        f"leg-{leg}": pair
+        for leg, pair in enumerate(zip(LEG_COLOURS, LEG_COLOURS_ON_DARK, strict=True), 1)
+    }
+    pairs |= _ENERGY_COLOURS | {"ground": (GROUND_COLOUR, "#B9B9B9")}
+    return {
+        f"{page}-{name}": pair[k]
+        for k, page in enumerate(("light", "dark"))
+        for name, pair in pairs.items()
+    }
 
 
 def new_figure(width: float = 6.4, height: float = 4.0) -> Figure:

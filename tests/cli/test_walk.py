@@ -1,6 +1,7 @@
 """`jaxbiped walk` as a user meets it."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -19,6 +20,11 @@ def _run(*arguments):
         text=True,
         check=False,
     )
+
+
+def _sent(page):
+    """What a page that plays walks was given."""
+    return json.loads(re.search(r'id="walks">(.*?)</script>', page)[1])
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +69,25 @@ def test_writes_pictures_an_animation_and_the_trajectory(walk):
         assert sorted(leg_pixels(out / "out" / name))[-1] > 100, name
     assert min(leg_pixels(out / "out" / "strobe.png")) > 100
     assert min(leg_pixels(out / "out" / "walk.gif")) > 100
+
+
+def test_writes_a_page_that_plays_the_walk_and_says_so(walk):
+    out, result = walk
+    page = (out / "out" / "walk.html").read_text()
+    assert f"wrote {out / 'out' / 'walk.html'}" in result.stdout
+    sent = _sent(page)
+    assert [each["ending"] for each in sent["walks"]] == ["walking"]
+    assert len(page) < 1.5e6
+
+
+def test_a_long_rigid_walk_is_played_as_far_as_it_is_drawn(tmp_path, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(["walk", "--model", "rigid", "--duration", "70", "--out", str(tmp_path)])
+    assert stopped.value.code == 0
+    assert f"wrote {tmp_path / 'walk.html'}" in capsys.readouterr().out
+    sent = _sent((tmp_path / "walk.html").read_text())
+    strikes = [each["t"] for each in sent["walks"][0]["footprints"]]
+    assert 59.0 < strikes[-1] < 60.0
 
 
 @pytest.mark.parametrize(

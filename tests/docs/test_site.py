@@ -5,7 +5,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from selenium.webdriver.support.ui import WebDriverWait
 from sphinx.util.inventory import InventoryFile
+
+from tests.browser import chromium
 
 ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.slow
@@ -76,3 +79,41 @@ def test_every_picture_of_the_gallery_leads_to_its_script(site):
 
 def test_the_front_door_leads_to_the_index(site):
     assert 'href="docs/index.html"' in (site / "index.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("sought", "page"),
+    [
+        ("multiplier", "docs/gaits"),
+        ("basin", "docs/basins"),
+        ("stiffness", "docs/laws"),
+        ("find_gait", "docs/reference/jaxbiped"),
+    ],
+)
+def test_a_search_leads_to_the_right_page(site, browser, sought, page):
+    browser.open(f"{site / 'search.html'}?q={sought}")
+    places = "return [...document.querySelectorAll('#search-results li a')].map(a => a.href)"
+    over = (
+        "return !document.querySelector('#search-results .search-summary')?.innerText.includes('…')"
+    )
+    WebDriverWait(browser.driver, 20).until(
+        lambda _: len(browser.run(places)) > 0 and browser.run(over)
+    )
+    found = [each.partition(f"{site}/")[2].partition(".html")[0] for each in browser.run(places)]
+    assert page in found[:5], found[:10]
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as page:
+        yield page
+
+
+def test_pages_open_without_a_message_on_the_console(site, browser):
+    for name in ("docs/index", "docs/gallery", "docs/reference/gait", "notebooks/first_walk"):
+        browser.open(f"{site / name}.html", width=400)
+        severe = [each for each in browser.errors() if each["level"] == "SEVERE"]
+        # Mathematics comes from a network, which a test does without.
+        assert [each for each in severe if "http" not in each["message"]] == [], name
+        wider = "return document.documentElement.scrollWidth - window.innerWidth"
+        assert browser.run(wider) <= 0, name

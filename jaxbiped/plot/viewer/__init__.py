@@ -1,0 +1,1 @@
+"""Viewer of walks: pages and widgets that play them. `jaxbiped.plot` has its public names."""

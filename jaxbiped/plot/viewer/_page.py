@@ -1,0 +1,82 @@
+"""Page and scripts of the viewer: one file of HTML that needs no network."""
+
+import html
+import json
+import re
+from importlib.resources import files
+
+from jaxbiped._types import JsonObject
+
+_MODULES = (
+    "dom",
+    "channels",
+    "pose",
+    "stage",
+    "chart",
+    "linked_charts",
+    "player",
+    "step_table",
+    "view",
+)
+"""In the order of their imports."""
+_IMPORT = re.compile(r'^import \{[^}]*\} from "\./\w+\.js";\n', re.MULTILINE)
+_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+_PAGE = """\
+<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<link rel="icon" href="data:,">
+<title>{title}</title>
+<style>
+body {{ margin: 0; }}
+@media (prefers-color-scheme: dark) {{ body {{ background: #16181d; color: #f0f0f0; }} }}
+{style}</style>
+</head>
+<body>
+<main><noscript>This page plays a walk, which takes JavaScript.</noscript></main>
+<script type="application/json" id="walks">{walks}</script>
+<script type="module">
+{script}showPage();
+</script>
+</body>
+</html>
+"""
+
+
+def page_of(sent: JsonObject, title: str) -> str:
+    """A page of HTML that holds everything: what it shows, its script and its look.
+
+    Args:
+        sent: what `showWalks` takes, ready for JSON.
+        title: of the page.
+
+    Returns:
+        The page's text.
+    """
+    return _PAGE.format(
+        policy=_POLICY,
+        title=html.escape(title),
+        style=style(),
+        # No text within ends the script.
+        walks=json.dumps(sent, allow_nan=False).replace("<", "\\u003c"),
+        script=script(*_MODULES, "page"),
+    )
+
+
+def style() -> str:
+    """The viewer's style sheet."""
+    return _asset("view.css")
+
+
+def script(*modules: str) -> str:
+    """Modules of the viewer as one, behind each other: their names are known to all."""
+    parts = [_IMPORT.sub("", _asset(f"{name}.js")) for name in modules]
+    return re.sub(r"^export ", "", "".join(parts), flags=re.MULTILINE)
+
+
+def _asset(name: str) -> str:
+    return files("jaxbiped.plot.viewer").joinpath("assets", name).read_text(encoding="utf-8")

@@ -1,0 +1,115 @@
+"""Views of walks: what plays them, as a page or in a notebook."""
+
+import dataclasses
+import html
+from pathlib import Path
+from typing import Any
+
+from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._types import JsonObject
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.plot.style import view_colours
+from jaxbiped.plot.viewer._compliant_recording import record_walk
+from jaxbiped.plot.viewer._page import page_of
+from jaxbiped.plot.viewer._recording import Recording
+from jaxbiped.plot.viewer._rigid_recording import record_rigid_walk
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._trajectory import Trajectory
+
+
+@dataclasses.dataclass(frozen=True)
+class View:
+    """Walks that can be watched, side by side under one clock. A notebook shows it.
+
+    Attributes:
+        recordings: the walks as they are played.
+    """
+
+    recordings: tuple[Recording, ...]
+
+    def sent(self) -> JsonObject:
+        """What page and widget are given, ready for JSON."""
+        return {
+            "walks": [each.numbers() for each in self.recordings],
+            "colours": view_colours(),
+        }
+
+    def html(self) -> str:
+        """One page of HTML that holds everything and needs no network."""
+        return page_of(self.sent(), ", ".join(each.name for each in self.recordings))
+
+    def save(self, path: str | Path) -> Path:
+        """Writes that page, and returns its path."""
+        Path(path).write_text(self.html(), encoding="utf-8")
+        return Path(path)
+
+    def _repr_html_(self) -> str:
+        rows = -(-len(self.recordings) // 2)
+        return (
+            f'<iframe srcdoc="{html.escape(self.html())}" sandbox="allow-scripts" '
+            f'title="walks" style="width: 100%; height: {620 * rows}px; border: 0"></iframe>'
+        )
+
+
+def view(
+    scene: Scene | RedundantScene | RigidScene,
+    trajectory: Trajectory[Any],
+    *,
+    start: RigidState | None = None,
+    name: str = "walk",
+) -> View:
+    """A walk to watch: played, scrubbed, with forces, footprints and linked charts.
+
+    Positions between the times that are kept are those of `trajectory.at` to 1e-5 of a leg's
+    length. Forces and energies are as exact as they are drawn.
+
+    Args:
+        scene: what was simulated.
+        trajectory: the motion, saved step by step; of a rigid walker with its heel strikes, by
+            `max_arrivals`.
+        start: of a rigid walk, which otherwise is seen from its first heel strike on.
+        name: what it is called.
+
+    Returns:
+        The view: a notebook shows it, `save(path)` writes it as one page of HTML.
+
+    Raises:
+        ArgumentError: arguments of the wrong type, or a rigid walk without heel strikes or start.
+        ValueError: the trajectory was not saved step by step, or this is a batch.
+
+    Examples:
+        >>> import jaxbiped as jb
+        >>> scene = jb.seed_scene()
+        >>> how = dict(footsteps=2, accuracy="draft", engine="lanes")
+        >>> walk = jb.simulate(scene, jb.seed_state(), **how)
+        >>> jb.plot.view(scene, walk).html().startswith("<!doctype html>")
+        True
+    """
+    check_type("scene", scene, Scene, RedundantScene, RigidScene)
+    check_type("trajectory", trajectory, Trajectory)
+    if isinstance(scene, RigidScene):
+        return View((record_rigid_walk(scene, trajectory, start, name),))
+    if start is not None:
+        raise ArgumentError("start is only allowed with a rigid walk: this one knows its own.")
+    return View((record_walk(scene, trajectory, name),))
+
+
+def side_by_side(*views: View) -> View:
+    """Several walks side by side under one clock, their charts on the same axes.
+
+    Args:
+        views: from `view`, in order, each with a name of its own.
+
+    Returns:
+        One view of all.
+
+    Raises:
+        ArgumentError: no view, or something else.
+    """
+    if not views:
+        raise ArgumentError("views is empty, which is not allowed: give at least one.")
+    for each in views:
+        check_type("views", each, View)
+    return View(tuple(walk for each in views for walk in each.recordings))

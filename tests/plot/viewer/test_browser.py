@@ -1,0 +1,194 @@
+"""The viewer in a real browser: what it shows is what was simulated."""
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.plot._upright import poses
+from tests.browser import chromium, require_chromium
+from tests.drawn import leg_pixels
+
+pytestmark = pytest.mark.slow
+
+TIME = ".jaxbiped-view input[type=range]"
+WHERE = """
+const at = (part, names) => [...document.querySelectorAll(`[data-part=${part}]`)].map(
+  (each) => names.map((name) => Number(each.getAttribute(name))));
+return {
+  time: Number(document.querySelector(".stage").dataset.time),
+  hip: at("hip", ["cx", "cy"]), foot_1: at("foot-1", ["cx", "cy"]),
+  foot_2: at("foot-2", ["cx", "cy"]), leg_1: at("leg-1", ["x2", "y2"]),
+};
+"""
+SCRUB = """
+const slider = document.querySelector("input[type=range]");
+slider.value = arguments[0];
+slider.dispatchEvent(new Event("input", {bubbles: true}));
+"""
+FIRST_PAINT = """
+new PerformanceObserver((list) => {
+  const found = list.getEntriesByName("first-contentful-paint");
+  if (found.length) arguments[0](found[0].startTime);
+}).observe({type: "paint", buffered: true});
+"""
+
+
+@pytest.fixture(scope="module")
+def page():
+    with chromium() as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def walk():
+    require_chromium()
+    scene = jb.seed_scene(slope=0.02)
+    return scene, jb.simulate(scene, jb.seed_state(), footsteps=20, engine="lanes")
+
+
+@pytest.fixture(scope="module")
+def file(walk, tmp_path_factory):
+    return jb.plot.view(*walk, name="seed").save(tmp_path_factory.mktemp("view") / "walk.html")
+
+
+def assert_is_there(page, walk):
+    """The page's walker is where the simulation has it, to 0.1 mm."""
+    shown = page.run(WHERE)
+    scene, trajectory = walk
+    time = min(shown["time"], float(trajectory.t[-1]))
+    there = poses(scene, trajectory.at(np.array([time])))
+    for name, (x, z) in zip(
+        ("hip", "foot_1", "foot_2"), (there.hip[0], *(f[0] for f in there.feet)), strict=True
+    ):
+        assert np.allclose(shown[name], [[x, -z]], rtol=0.0, atol=1e-4), (name, time)
+    assert shown["leg_1"] == shown["foot_1"]
+    return shown["time"]
+
+
+def test_it_weighs_little_and_shows_its_first_frame_within_a_second(page, file):
+    assert file.stat().st_size < 1.5e6
+    painted = []
+    for _ in range(3):
+        page.open(file)
+        painted.append(page.driver.execute_async_script(FIRST_PAINT))
+    assert min(painted) < 1000.0
+    assert page.run("return performance.getEntriesByType('resource').length") == 0
+    assert page.errors() == []
+
+
+def test_scrubbed_positions_are_those_of_the_walk(page, file, walk):
+    page.open(file)
+    end = float(walk[1].t[-1])
+    strike = jb.footsteps(*walk).time_s[3]
+    for time in (0.0, 0.123, strike - 1e-3, strike + 5e-4, 4.321, end):
+        page.run(SCRUB, time)
+        assert assert_is_there(page, walk) == pytest.approx(time, abs=1e-9)
+    assert page.errors() == []
+
+
+def test_it_plays_and_pauses(page, file, walk):
+    page.open(file)
+    assert page.find(".play").text == "Play"
+    page.find(".play").click()
+    page.driver.set_script_timeout(20)
+    moved = """
+    const done = arguments[0];
+    const look = () => Number(document.querySelector(".stage").dataset.time) > 0.5
+      ? done(true) : requestAnimationFrame(look);
+    look();
+    """
+    assert page.driver.execute_async_script(moved)
+    assert page.find(".play").text == "Pause"
+    page.find(".play").click()
+    stopped = assert_is_there(page, walk)
+    assert stopped > 0.5
+    frames = "const done = arguments[0]; setTimeout(done, 100)"
+    page.driver.execute_async_script(frames)
+    assert page.run(WHERE)["time"] == stopped
+    assert page.errors() == []
+
+
+def test_it_plays_by_itself_unless_motion_is_to_be_reduced(page, file):
+    assert page.open(file, reduced=False).find(".play").text == "Pause"
+    assert page.open(file, reduced=True).find(".play").text == "Play"
+
+
+def test_keys_do_what_the_page_says(page, file, walk):
+    page.open(file)
+    strikes = [p["t"] for p in jb.plot.view(*walk).sent()["walks"][0]["footprints"] if p["strike"]]
+    time = lambda: page.run(WHERE)["time"]
+    left, right, home, end = "\ue012", "\ue014", "\ue011", "\ue010"
+    page.keys(right)
+    assert time() == pytest.approx(0.02)
+    page.keys(left, left)
+    assert time() == 0.0
+    page.keys(right, right, shift=True)
+    assert time() == pytest.approx(strikes[1])
+    page.keys(left, shift=True)
+    assert time() == pytest.approx(strikes[0])
+    page.keys(end)
+    assert time() == pytest.approx(float(walk[1].t[-1]))
+    assert page.find(".badge").text == "walking"
+    page.keys(home)
+    assert time() == 0.0
+    page.keys("-", " ")
+    assert page.find("select").get_attribute("value") == "0.5"
+    assert page.find(".play").text == "Pause"
+    page.keys(" ")
+    assert page.find(".play").text == "Play"
+    assert page.errors() == []
+
+
+def test_a_press_on_a_chart_moves_every_cursor(page, file, walk):
+    page.open(file)
+    chart = page.find(".chart.picks")
+    page.press(chart, 0, 0)
+    time = assert_is_there(page, walk)
+    assert 0.3 < time / float(walk[1].t[-1]) < 0.7
+    cursors = page.run(
+        "return [...document.querySelectorAll('.picks .cursor')].map((c) => c.getAttribute('x1'))"
+    )
+    assert len(cursors) == 4
+    assert len(set(cursors)) == 1
+    page.run("document.querySelectorAll('select')[1].value = 0.01")
+    page.run("document.querySelectorAll('select')[1].dispatchEvent(new Event('change'))")
+    ticks = page.run("return [...document.querySelectorAll('.picks .axes text')][0].textContent")
+    assert float(ticks) == pytest.approx(time, abs=0.01)
+    assert page.errors() == []
+
+
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("width", [400, 1200])
+def test_it_fits_any_width_by_day_and_by_night(page, file, tmp_path, dark, width):
+    page.open(file, width=width, dark=dark)
+    page.run(SCRUB, 4.0)
+    assert page.run("return document.documentElement.scrollWidth") <= width
+    out = page.run(
+        "return [...document.querySelectorAll('.chart text, .clock')].filter((each) => {"
+        "const [own, box] = [each, each.ownerSVGElement].map((e) => e.getBoundingClientRect());"
+        "return own.left < box.left - 1 || own.right > box.right + 1 || own.height < 8;"
+        "}).map((each) => each.textContent)"
+    )
+    assert out == []
+    picture = page.screenshot(tmp_path / "view.png")
+    if not dark:
+        assert min(leg_pixels(picture)) > 100
+
+
+def test_screen_readers_are_told(page, file):
+    page.open(file)
+    page.run(SCRUB, 1.0)
+    page.driver.execute_async_script("setTimeout(arguments[0], 600)")
+    told = page.find("[aria-live]").get_attribute("textContent")
+    assert "1.00 s" in told
+    assert "heel strikes: 2" in told
+    slider = page.find(TIME)
+    assert slider.accessible_name == "Time"
+    assert slider.get_attribute("aria-valuetext") == "1.00 of 8.77 seconds"
+    nameless = page.run(
+        "return [...document.querySelectorAll('button, input, select, svg[role=img]')]"
+    )
+    assert len(nameless) > 8
+    assert [each.tag_name for each in nameless if not each.accessible_name] == []
+    rows = page.run("return document.querySelectorAll('tbody tr').length")
+    assert rows == 19

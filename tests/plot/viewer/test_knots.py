@@ -1,0 +1,42 @@
+"""Knots: few, and interpolation between them is as exact as asked."""
+
+import numpy as np
+import pytest
+
+from jaxbiped.plot.viewer._knots import Tolerances, adaptive_knots
+
+
+def _motion(t):
+    """A swing, and a force that lasts a hundredth of a second."""
+    return {
+        "angle": np.sin(7.0 * t),
+        "rate": 7.0 * np.cos(7.0 * t),
+        "force": 300.0 * np.exp(-(((t - 0.503) / 2e-3) ** 2)),
+    }
+
+
+@pytest.mark.parametrize("exact", [1e-3, 1e-5])
+def test_interpolation_is_as_exact_as_asked_with_few_knots(exact):
+    scipy = pytest.importorskip("scipy.interpolate")
+    tolerances = Tolerances({"angle": ("rate", exact)}, {"force": 1.0}, shortest=1e-6)
+    t, found = adaptive_knots(_motion, np.linspace(0.0, 1.0, 400), tolerances)
+    assert (np.diff(t) > 0.0).all()
+    assert t[[0, -1]].tolist() == [0.0, 1.0]
+    assert len(t) < 150
+    between = np.linspace(0.0, 1.0, 30_011)
+    curve = scipy.CubicHermiteSpline(t, found["angle"], found["rate"])
+    assert np.abs(curve(between) - np.sin(7.0 * between)).max() < exact
+    force = np.interp(between, t, found["force"])
+    assert np.abs(force - _motion(between)["force"]).max() < 1.5
+
+
+def test_a_jump_is_split_no_further_than_the_shortest_interval():
+    def step(t):
+        return {"angle": 0.0 * t, "rate": 0.0 * t, "force": np.where(t > 1 / np.pi, 5.0, 0.0)}
+
+    tolerances = Tolerances({"angle": ("rate", 1.0)}, {"force": 0.1}, shortest=1e-4)
+    t, found = adaptive_knots(step, np.linspace(0.0, 1.0, 11), tolerances)
+    before, after = t[found["force"] == 0.0].max(), t[found["force"] == 5.0].min()
+    assert before < 1 / np.pi < after
+    assert 1e-4 / 4 < after - before <= 1e-4
+    assert len(t) < 20

@@ -1,0 +1,131 @@
+"""Recordings: between their knots walks of every kind are where they were simulated."""
+
+import base64
+
+import jax
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+import jaxbiped as jb
+from jaxbiped.plot._upright import poses
+
+pytestmark = pytest.mark.slow
+
+START = jb.seed_state()
+LADDER = jb.ladder()
+
+
+def recorded(*arguments, **options):
+    return jb.plot.view(*arguments, **options).recordings[0]
+
+
+def played(recording, t):
+    """Hip and angles as the page has them at times, from what it is sent."""
+    sent = recording.numbers()
+    knots = np.frombuffer(base64.b64decode(sent["t"]), "<f8")
+    channel = lambda name: np.frombuffer(base64.b64decode(sent["channels"][name]), "<f4")
+    pairs = ("hip_x", "hip_vx"), ("hip_z", "hip_vz"), ("theta_1", "omega_1"), ("theta_2", "omega_2")
+    return [CubicHermiteSpline(knots, *map(channel, pair))(t) for pair in pairs]
+
+
+def feet_of(recording, t):
+    x, z, *angles = played(recording, t)
+    reach = recording.l - recording.r
+    return [(x + reach * np.sin(a), z - reach * np.cos(a)) for a in angles]
+
+
+@pytest.mark.parametrize("name", ["seed", "steep", "bristles", "redundant"])
+def test_feet_are_where_they_were(name):
+    scene = {
+        "seed": jb.seed_scene(),
+        "steep": jb.seed_scene(slope=0.04),
+        "bristles": LADDER["bristles"],
+        "redundant": jb.RedundantScene(jb.seed_scene()),
+    }[name]
+    start = jb.dynamics.redundant_state(scene, START) if name == "redundant" else START
+    walk = jb.simulate(scene, start, duration=2.0, accuracy="draft")
+    found = recorded(scene, walk)
+    assert found.ending == ("fell forward" if name == "steep" else "walking")
+    end = float(walk.t[-1])
+    assert found.t[[0, -1]].tolist() == [0.0, end]
+    t = np.linspace(0.0, end, 4001)
+    there = jb.dynamics.feet(scene, walk.at(t))
+    for (x, z), foot in zip(feet_of(found, t), there, strict=True):
+        np.testing.assert_allclose(x, foot.x, rtol=0.0, atol=2e-5)
+        np.testing.assert_allclose(z, foot.z, rtol=0.0, atol=2e-5)
+
+
+def test_forces_and_energies_are_those_of_the_walk(seed_walk):
+    scene, walk = seed_walk
+    found = recorded(scene, walk)
+    t = np.asarray(walk.t)
+    forces = jb.dynamics.foot_forces(scene, walk.state)
+    weight = float(scene.walker.total_mass * scene.ground.g)
+    assert found.weight == pytest.approx(weight)
+    for leg, force in enumerate(forces, 1):
+        normal, peak = found.channels[f"normal_{leg}"], float(force.normal.max())
+        shown = np.interp(t, found.t, normal)
+        assert np.abs(shown - force.normal).max() < 0.15 * weight
+        assert normal.max() == pytest.approx(peak, rel=0.02)
+    books = jb.energy_ledger(scene, walk)
+    assert found.channels["supplied"][-1] == pytest.approx(float(books.gravity_work[0]))
+    lost = float(books.damper_loss[0] + books.friction_loss[0])
+    assert found.channels["lost"][-1] == pytest.approx(lost, rel=1e-5)
+
+
+def test_footprints_are_the_heel_strikes(seed_walk):
+    scene, walk = seed_walk
+    prints = recorded(scene, walk).footprints
+    assert [each.strike for each in prints] == [False] + [True] * (len(prints) - 1)
+    assert [each.foot for each in prints] == [2, 1, 2, 1, 2][: len(prints)]
+    steps = jb.footsteps(scene, walk)
+    np.testing.assert_allclose([each.t for each in prints[2:]], steps.time_s)
+    np.testing.assert_allclose(np.diff([each.x for each in prints[1:]]), steps.length_m)
+
+
+def test_a_rigid_walk_keeps_its_legs():
+    scene, start = LADDER["rigid"], jb.dynamics.rigid_state(START)
+    walk = jb.rigid_walk(scene, start, footsteps=3, max_arrivals=3)
+    found = recorded(scene, walk, start=start)
+    strikes = np.asarray(walk.arrivals.t)
+    assert [each.foot for each in found.footprints] == [2, 1, 2]
+    t = np.array([0.1, strikes[0] + 0.1, strikes[1] + 0.2])
+    states = jax.vmap(lambda time: jb.rigid_walk(scene, start, duration=time).final)(t)
+    x, _, one, two = played(found, t)
+    np.testing.assert_allclose(x, states.hip_x, rtol=0.0, atol=1e-5)
+    swapped = np.array([False, True, False])
+    np.testing.assert_allclose(one, np.where(swapped, states.theta_2, states.theta_1), atol=1e-5)
+    np.testing.assert_allclose(two, np.where(swapped, states.theta_1, states.theta_2), atol=1e-5)
+    # Legs go on where they were at an impact.
+    assert np.abs(np.diff(found.channels["theta_1"])).max() < 0.05
+    later = recorded(scene, walk)
+    assert later.t[0] == strikes[0]
+    assert later.t[-1] == found.t[-1]
+    with pytest.raises(jb.ArgumentError, match="no heel strikes"):
+        recorded(scene, jb.rigid_walk(scene, start, footsteps=3))
+
+
+def test_the_page_stands_upright(seed_walk):
+    """Gravity down the page: what `onPage` does is what `upright` does."""
+    scene, walk = seed_walk
+    found = recorded(scene, walk)
+    x, z, *_ = played(found, np.array([1.0]))
+    sine, cosine = np.sin(found.slope), np.cos(found.slope)
+    hip = poses(scene, walk.at(np.array([1.0]))).hip[0]
+    assert hip == pytest.approx(
+        [cosine * x[0] + sine * z[0], cosine * z[0] - sine * x[0]], abs=1e-5
+    )
+
+
+def test_what_cannot_be_viewed_is_told(seed_walk):
+    scene, walk = seed_walk
+    with pytest.raises(jb.ArgumentError, match="start is only allowed with a rigid walk"):
+        jb.plot.view(scene, walk, start=jb.dynamics.rigid_state(START))
+    end = jb.simulate(scene, START, duration=0.1, save="end")
+    with pytest.raises(ValueError, match="Nothing is known between"):
+        jb.plot.view(scene, end)
+    with pytest.raises(jb.ArgumentError, match="views"):
+        jb.plot.side_by_side()
+    with pytest.raises(jb.ArgumentError, match="views"):
+        jb.plot.side_by_side(walk)
