@@ -49,11 +49,15 @@ class Page:
             "prefers-reduced-motion": "reduce" if reduced else "no-preference",
         }
         media = [{"name": name, "value": value} for name, value in features.items()]
-        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": media})
-        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        self.resize(width=width, height=height)
         self.driver.get(f"file://{path}")
         return self
+
+    def resize(self, *, width=1200, height=900):
+        """Gives the window this size [px]."""
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
 
     def run(self, script, *arguments):
         """What a function's body in JavaScript returns."""
