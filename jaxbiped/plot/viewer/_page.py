@@ -67,6 +67,11 @@ def page_of(sent: JsonObject, title: str) -> str:
     )
 
 
+def widget_script() -> str:
+    """The viewer as a module for `anywidget`."""
+    return script(*_MODULES, "widget") + "\nexport default { render };\n"
+
+
 def style() -> str:
     """The viewer's style sheet."""
     return _asset("view.css")

@@ -2,6 +2,7 @@
 
 import dataclasses
 import html
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -45,12 +46,33 @@ class View:
         Path(path).write_text(self.html(), encoding="utf-8")
         return Path(path)
 
-    def _repr_html_(self) -> str:
+    def widget(self) -> Any:
+        """The view as a widget of `anywidget` (`pip install jaxbiped[view]`).
+
+        Its `time` [s] follows the page and moves it; its `sent` may be set to another view's
+        `sent()`.
+
+        Raises:
+            ModuleNotFoundError: anywidget is not installed.
+        """
+        from jaxbiped.plot.viewer._widget import ViewWidget
+
+        return ViewWidget(sent=self.sent())
+
+    def _repr_mimebundle_(self, **options: Any) -> Any:
+        """What a notebook shows: the widget, or the page in a frame where there is no anywidget."""
+        if find_spec("anywidget") is not None:
+            return self.widget()._repr_mimebundle_(**options)
         rows = -(-len(self.recordings) // 2)
-        return (
+        frame = (
             f'<iframe srcdoc="{html.escape(self.html())}" sandbox="allow-scripts" '
             f'title="walks" style="width: 100%; height: {620 * rows}px; border: 0"></iframe>'
         )
+        return {"text/html": frame, "text/plain": repr(self)}
+
+    def __repr__(self) -> str:
+        told = ", ".join(f"{each.name}: {each.ending}" for each in self.recordings)
+        return f"View({told})"
 
 
 def view(

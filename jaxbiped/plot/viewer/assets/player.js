@@ -29,13 +29,14 @@ export class Player {
       this.span = value;
       this.changed();
     });
-    const followed = html("input", { type: "checkbox", checked: true });
-    followed.addEventListener("change", () => {
-      this.follow = followed.checked;
-      this.changed();
+    this.followed = html("input", {
+      type: "checkbox", checked: true, onchange: () => {
+        this.follow = this.followed.checked;
+        this.changed();
+      },
     });
     this.live = html("p", { class: "hidden live", "aria-live": "polite", role: "status" });
-    const follow = html("label", {}, followed, "Follow");
+    const follow = html("label", {}, this.followed, "Follow");
     this.element = html(
       "div",
       { class: "player", role: "group", "aria-label": "Player" },
@@ -59,7 +60,23 @@ export class Player {
     this.playing = false;
     this.refresh();
     this.changed();
+    this.rest();
+  }
+
+  /** Time rests: that is told. */
+  rest() {
     this.say();
+    this.onrest?.(this.time);
+  }
+
+  /** Goes on where another player is, for other walks. */
+  resume({ time, playing, speed, follow, span }) {
+    Object.assign(this, { speed, follow, span });
+    this.speeds.select.value = String(speed);
+    this.spans.select.value = String(span);
+    this.followed.checked = follow;
+    this.scrub(time);
+    if (playing) this.toggle();
   }
 
   tick(now) {
@@ -81,7 +98,7 @@ export class Player {
     this.refresh();
     this.changed();
     clearTimeout(this.waiting);
-    this.waiting = setTimeout(() => this.say(), 400);
+    this.waiting = setTimeout(() => this.playing || this.rest(), 400);
   }
 
   refresh() {

@@ -40,7 +40,11 @@ export function showWalks(sent, el, { autoplay = false } = {}) {
   draw();
   player.say();
   if (autoplay && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.toggle();
-  return { player, walks, stop: () => resized.disconnect() };
+  const stop = () => {
+    player.playing = false;
+    resized.disconnect();
+  };
+  return { player, walks, stop };
 }
 
 /** Moves the cursor of a panel's charts; draws them anew only where what they show has changed. */
