@@ -1,10 +1,12 @@
 """Recordings of walks with laws of contact, in minimal or redundant coordinates."""
 
+from typing import Any
+
 import numpy as np
 
 from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._energy import energies
-from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.dynamics._redundant_state import CompliantState, minimal_state
 from jaxbiped.dynamics._state import State
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._samples import at_steps, evaluate_along
@@ -20,19 +22,25 @@ from jaxbiped.plot.viewer._recording import (
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
+_EXACT, _LOOKS_RIGHT = 1e-5, 1e-4
+"""Errors allowed of angles [rad], and of lengths in parts of the legs'."""
 _EVEN, _MOST = 0.05, 20_000
 """Even times to begin with [√(l/g)], and their largest number."""
 _STEPS = 5e-3
 """The solver's steps are begun with, too, as far as they are this far apart [√(l/g)]."""
 
 
-def record_walk(scene: Scene, trajectory: Trajectory, name: str) -> Recording:
+def record_walk(
+    scene: Any, trajectory: Trajectory, name: str, *, motion_only: bool = False
+) -> Recording:
     """A recording of a compliant walk.
 
     Args:
-        scene: what was simulated.
+        scene: what was simulated, a `Scene` or a `RedundantScene`.
         trajectory: the motion, saved step by step.
         name: what it is called.
+        motion_only: whether to leave out forces and energies, and to be content with a motion that
+            looks right.
 
     Returns:
         The recording, as long as the trajectory.
@@ -45,10 +53,12 @@ def record_walk(scene: Scene, trajectory: Trajectory, name: str) -> Recording:
 
     def evaluate(t: np.ndarray) -> Channels:
         states = state_at(trajectory, t)
+        motion = _motion(scene, states)
+        if motion_only:
+            return motion
         now = evaluate_along(scene, states, energies)
-        hip = minimal_state(scene, states)
         return {
-            **{field: np.asarray(getattr(hip, field)) for field in State._fields},
+            **motion,
             **_forces(evaluate_along(scene, states, contacts)),
             "kinetic": now.kinetic,
             "elastic": now.elastic,
@@ -56,7 +66,8 @@ def record_walk(scene: Scene, trajectory: Trajectory, name: str) -> Recording:
             "lost": started.total - now.total,
         }
 
-    t, channels = adaptive_knots(evaluate, first, tolerances_for(scene))
+    exact = _LOOKS_RIGHT if motion_only else _EXACT
+    t, channels = adaptive_knots(evaluate, first, tolerances_for(scene, exact))
     prints = _footprints(scene, trajectory)
     return recording(scene, name, trajectory.outcome, t, channels, prints)
 
@@ -73,12 +84,17 @@ def _first_times(scene: Scene, trajectory: Trajectory) -> np.ndarray:
     return times[np.concatenate([[True], apart[:-1] | (times[1:-1] == last), [True]])]
 
 
+def _motion(scene: Scene, states: CompliantState) -> Channels:
+    hip = minimal_state(scene, states)
+    return {field: np.asarray(getattr(hip, field)) for field in State._fields}
+
+
 def _forces(found: Contacts) -> Channels:
-    forces = {}
+    forces: Channels = {}
     for leg, force in enumerate(found.forces, 1):
-        forces[f"normal_{leg}"] = force.normal
+        forces[f"normal_{leg}"] = np.asarray(force.normal)
         if force.tangential is not None:
-            forces[f"tangential_{leg}"] = force.tangential
+            forces[f"tangential_{leg}"] = np.asarray(force.tangential)
     return forces
 
 

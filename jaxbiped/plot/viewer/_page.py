@@ -17,6 +17,7 @@ _MODULES = (
     "player",
     "step_table",
     "view",
+    "basin",
 )
 """In the order of their imports."""
 _IMPORT = re.compile(r'^import \{[^}]*\} from "\./\w+\.js";\n', re.MULTILINE)
@@ -64,6 +65,14 @@ def page_of(sent: JsonObject, title: str) -> str:
         # No text within ends the script.
         walks=json.dumps(sent, allow_nan=False).replace("<", "\\u003c"),
         script=script(*_MODULES, "page"),
+    )
+
+
+def frame_of(page: str, title: str, height: int) -> str:
+    """A page in a frame of this height [px], for a notebook."""
+    return (
+        f'<iframe srcdoc="{html.escape(page)}" sandbox="allow-scripts" '
+        f'title="{html.escape(title)}" style="width: 100%; height: {height}px; border: 0"></iframe>'
     )
 
 

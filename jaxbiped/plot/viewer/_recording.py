@@ -9,8 +9,6 @@ import numpy as np
 from jaxbiped._types import JsonObject
 from jaxbiped.plot.viewer._knots import Channels, Tolerances
 
-_EXACT = 1e-5
-"""Error allowed of angles [rad], and of lengths in parts of the legs'."""
 _COORDINATES = {
     "hip_x": "hip_vx",
     "hip_z": "hip_vz",
@@ -113,11 +111,11 @@ def time_unit(scene: Any) -> float:
     return float(np.sqrt(scene.walker.l / scene.ground.g))
 
 
-def tolerances_for(scene: Any) -> Tolerances:
-    """The errors allowed for a scene's channels."""
+def tolerances_for(scene: Any, exact: float) -> Tolerances:
+    """The errors allowed: `exact` of angles [rad], and of lengths in parts of the legs'."""
     weight = _weight(scene)
-    length = _EXACT * float(scene.walker.l)
-    allowed = {name: length if name.startswith("hip") else _EXACT for name in _COORDINATES}
+    length = exact * float(scene.walker.l)
+    allowed = {name: length if name.startswith("hip") else exact for name in _COORDINATES}
     return Tolerances(
         cubic={name: (rate, allowed[name]) for name, rate in _COORDINATES.items()},
         linear={name: _FORCE * weight for name in FORCES}

@@ -1,5 +1,7 @@
 """Recordings of rigid walks: footstep by footstep, the names of the legs exchanged back."""
 
+from typing import Any
+
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
@@ -48,7 +50,7 @@ def record_rigid_walk(
     check_type("trajectory.state", walk.state, RigidState)
     began, starts, end = _footsteps(walk, start)
     rows, t = _knot_times(began, end, _EVEN * time_unit(scene))
-    each = RigidState(*[np.asarray(leaf)[rows] for leaf in starts])
+    each = RigidState(*[leaf[rows] for leaf in starts])
     channels = _channels(scene, _walked(scene, each, t - began[rows]))
     odd = rows % 2 == 1
     swapped = {**channels}
@@ -75,7 +77,7 @@ def _footsteps(
     if start is not None:
         first = check_state(start, RigidState, "start")
         times = np.concatenate([[0.0], times])
-        states = RigidState(*[np.append(a, b) for a, b in zip(first, states, strict=True)])
+        states = jtu.tree_map(np.append, first, states)
         states = jtu.tree_map(lambda leaf: leaf[: len(times)], states)
     if not times.size or (len(times) == 1 and end <= times[0]):
         raise ArgumentError(
@@ -108,8 +110,8 @@ def _walked(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> Rig
         padded = [np.pad(leaf[rows], (0, missing), mode="edge") for leaf in (*starts, durations)]
         part = RigidState(*map(jnp.asarray, padded[:-1]))
         states = _states_after(arrays, part, np.maximum(padded[-1], shortest))
-        found.append([np.asarray(leaf)[: _AT_ONCE - missing] for leaf in states])
-    return RigidState(*map(np.concatenate, zip(*found, strict=True)))
+        found.append([leaf[: _AT_ONCE - missing] for leaf in states])
+    return RigidState(*[jnp.concatenate(leaves) for leaves in zip(*found, strict=True)])
 
 
 _states_after = cached_jit(states_after)
@@ -117,7 +119,8 @@ _states_after = cached_jit(states_after)
 
 def _channels(scene: RigidScene, states: RigidState) -> Channels:
     """What is shown of states, leg 2 standing; gravity's work from the first of them on."""
-    channels: Channels = evaluate_along(scene, states, _quantities)
+    along: Any = evaluate_along
+    channels: Channels = along(scene, states, _quantities)
     height = channels.pop("gravitational")
     return channels | {"supplied": height[0] - height}
 

@@ -1,7 +1,6 @@
 """Views of walks: what plays them, as a page or in a notebook."""
 
 import dataclasses
-import html
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.plot.style import view_colours
 from jaxbiped.plot.viewer._compliant_recording import record_walk
-from jaxbiped.plot.viewer._page import page_of
+from jaxbiped.plot.viewer._page import frame_of, page_of
 from jaxbiped.plot.viewer._recording import Recording
 from jaxbiped.plot.viewer._rigid_recording import record_rigid_walk
 from jaxbiped.scene._redundant_scene import RedundantScene
@@ -63,11 +62,7 @@ class View:
         """What a notebook shows: the widget, or the page in a frame where there is no anywidget."""
         if find_spec("anywidget") is not None:
             return self.widget()._repr_mimebundle_(**options)
-        rows = -(-len(self.recordings) // 2)
-        frame = (
-            f'<iframe srcdoc="{html.escape(self.html())}" sandbox="allow-scripts" '
-            f'title="walks" style="width: 100%; height: {620 * rows}px; border: 0"></iframe>'
-        )
+        frame = frame_of(self.html(), "walks", 620 * -(-len(self.recordings) // 2))
         return {"text/html": frame, "text/plain": repr(self)}
 
     def __repr__(self) -> str:

@@ -100,7 +100,7 @@ export class Chart {
       parts.push(svg("line", { x1: x, x2: x, y1: top, y2: bottom }));
       parts.push(svg("text", { x, y: bottom + 14, "text-anchor": "middle" }, text));
     }
-    for (const { at, text } of niceTicks(...this.ranges.y, 4)) {
+    for (const { at, text } of niceTicks(...this.ranges.y, (bottom - top) / 32)) {
       const y = this.py(at);
       parts.push(svg("line", { x1: left, x2: right, y1: y, y2: y }));
       parts.push(svg("text", { x: left - 5, y: y + 4, "text-anchor": "end" }, text));

@@ -12,7 +12,7 @@ import { stepTable } from "./step_table.js";
 export function showWalks(sent, el, { autoplay = false } = {}) {
   const walks = sent.walks.map(decodeWalk);
   const root = html("div", { class: "jaxbiped-view", role: "region", "aria-label": "Walks" });
-  colour(root, sent.colours);
+  setColours(root, sent.colours);
   const player = new Player({
     start: Math.min(...walks.map((walk) => walk.start)),
     end: Math.max(...walks.map((walk) => walk.end)),
@@ -29,7 +29,7 @@ export function showWalks(sent, el, { autoplay = false } = {}) {
   const draw = () => {
     for (const each of panels) {
       const pose = each.stage.draw(player.time, player.follow);
-      each.reading.textContent = reading(pose);
+      each.reading.textContent = reading(each.walk, pose);
       showCharts(each, player);
     }
     root.dataset.time = player.time;
@@ -61,7 +61,7 @@ function panel(walk, walks, pick) {
   const slope = `slope ${fixed(walk.slope, 4)} rad`;
   const told = `Outcome after ${fixed(walk.end, 2)} s: ${walk.ending}; ${slope}`;
   const reading = html("p", { class: "reading" });
-  const note = html("p", { class: "note" }, arrowNote(walk));
+  const note = html("p", { class: "note" }, marksNote(walk));
   const element = html(
     "section",
     { class: "panel", "aria-label": walk.name },
@@ -76,19 +76,25 @@ function panel(walk, walks, pick) {
 }
 
 /** What a pose reads, leg by leg. */
-function reading({ legs }) {
+function reading(walk, { legs }) {
+  const forces = ({ normal, tangential }) => `, ${fixed(normal, 1)} N, ${fixed(tangential, 1)} N`;
   const told = legs.map(
-    ({ angle, normal, tangential }, k) =>
-      `leg ${k + 1}: ${fixed(angle, 3)} rad, ${fixed(normal, 1)} N, ${fixed(tangential, 1)} N`,
+    (leg, k) => `leg ${k + 1}: ${fixed(leg.angle, 3)} rad${tellsForces(walk) ? forces(leg) : ""}`,
   );
-  return `${told.join("; ")} (angle, normal and tangential force)`;
+  const what = tellsForces(walk) ? "angle, normal and tangential force" : "angle";
+  return `${told.join("; ")} (${what})`;
 }
 
-function arrowNote(walk) {
+function tellsForces(walk) {
+  return walk.channels.normal_1 !== undefined;
+}
+
+function marksNote(walk) {
+  const marks = "Marks under the slope: footprints; ticks: every 0.1 m.";
+  if (!tellsForces(walk)) return marks;
   return (
     "Arrows: forces of the ground on the feet, 0.3 leg lengths for the walker's weight of " +
-    `${fixed(walk.weight, 1)} N, cut at 1.1 leg lengths. ` +
-    "Marks under the slope: footprints; ticks: every 0.1 m."
+    `${fixed(walk.weight, 1)} N, cut at 1.1 leg lengths. ${marks}`
   );
 }
 
@@ -109,6 +115,6 @@ function sentence(walk, time) {
   return `${walk.name}: ${told}.`;
 }
 
-function colour(root, colours) {
+export function setColours(root, colours) {
   for (const [name, value] of Object.entries(colours)) root.style.setProperty(`--${name}`, value);
 }

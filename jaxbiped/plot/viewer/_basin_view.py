@@ -1,0 +1,165 @@
+"""Views of basins: a picture of labels, in which a start that is picked shows its walk."""
+
+import base64
+import dataclasses
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import jax.tree_util as jtu
+import numpy as np
+
+from jaxbiped._checks import ArgumentError, check_count, check_type
+from jaxbiped._types import JsonObject
+from jaxbiped.basins._label import label_names
+from jaxbiped.plot._label_colours import in_order, label_colour
+from jaxbiped.plot.style import view_colours
+from jaxbiped.plot.viewer._compliant_recording import record_walk
+from jaxbiped.plot.viewer._page import frame_of, page_of
+from jaxbiped.plot.viewer._recording import Recording
+from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.simulate._simulate import simulate
+from jaxbiped.sweep._labelling import Labelling
+from jaxbiped.sweep.starts._coordinates import coordinate_quantities
+from jaxbiped.sweep.starts._starts import Grid
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclasses.dataclass(frozen=True)
+class BasinView:
+    """A basin's picture whose starts show their walks.
+
+    Attributes:
+        basin: the picture, ready for JSON.
+        recordings: walks of the starts that are kept, row by row; None where one cannot be
+            simulated.
+    """
+
+    basin: JsonObject
+    recordings: tuple[Recording | None, ...]
+
+    def html(self) -> str:
+        """One page of HTML that holds everything and needs no network."""
+        walks = [each and each.numbers() for each in self.recordings]
+        sent = {"basin": self.basin, "walks": walks, "colours": view_colours()}
+        return page_of(sent, self.basin["title"])
+
+    def save(self, path: str | Path) -> Path:
+        """Writes that page, and returns its path."""
+        Path(path).write_text(self.html(), encoding="utf-8")
+        return Path(path)
+
+    def _repr_html_(self) -> str:
+        return frame_of(self.html(), self.basin["title"], 900)
+
+
+def view_basin(
+    labelling: Labelling,
+    starts: Grid,
+    found: "xarray.Dataset",
+    *,
+    most: int = 250,
+    footsteps: int = 3,
+    title: str = "Basin of attraction",
+) -> BasinView:
+    """A basin's picture in which a start that is picked shows its walk.
+
+    Walks of an even choice of the starts are simulated, by the draft accuracy, and kept in the
+    page: their motion to 1e-4 of a leg's length, without forces.
+
+    Args:
+        labelling: by which the starts were labelled, of a compliant walker.
+        starts: a grid with two axes, the second along the page.
+        found: their labels, by `jaxbiped.sweep`.
+        most: how many walks to keep; one weighs some 4 kB.
+        footsteps: of each.
+        title: of the picture.
+
+    Returns:
+        The view: `save(path)` writes it as one page of HTML, a notebook shows it in a frame.
+
+    Raises:
+        ArgumentError: arguments of the wrong type, not two axes of two starts or more, a rigid
+            walker, or labels of another shape.
+    """
+    check_type("labelling", labelling, Labelling)
+    check_type("starts", starts, Grid)
+    check_count("most", most)
+    check_count("footsteps", footsteps)
+    if isinstance(labelling.scene, RigidScene):
+        raise ArgumentError("labelling.scene is rigid, which is not allowed: give a compliant one.")
+    if len(starts.shape) != 2 or min(starts.shape) < 2 or found.label.shape != starts.shape:
+        raise ArgumentError(
+            f"starts has shape {starts.shape} and found {found.label.shape}, which is not allowed: "
+            "both must be of the same two axes, two starts or more along each."
+        )
+    rows, columns = _even_choice(starts.shape, most)
+    numbers = np.ravel(rows[:, None] * starts.shape[1] + columns)
+    words = label_names(found.label.values, found.cycle_footsteps.values)
+    names = in_order(set(words.ravel().tolist()))
+    y, x = starts.values
+    quantities = coordinate_quantities(labelling.scene)
+    picture = {
+        "title": title,
+        "x": starts.values[x].tolist(),
+        "y": starts.values[y].tolist(),
+        "xLabel": _told(quantities[x]),
+        "yLabel": _told(quantities[y]),
+        "names": names,
+        "colours": [label_colour(name) for name in names],
+        "cells": _encoded(np.vectorize(names.index)(words)),
+        "columns": columns.tolist(),
+        "rows": rows.tolist(),
+        "first": _first(words[np.ix_(rows, columns)]),
+    }
+    return BasinView(picture, tuple(_walks(labelling, starts, numbers, footsteps)))
+
+
+def _even_choice(shape: tuple[int, ...], most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of an even choice of at most so many starts, as many along each axis."""
+    side = max(int(np.sqrt(most)), 1)
+    counts = [min(side, size) for size in shape]
+    for k in (0, 1):
+        counts[k] = max(min(most // counts[1 - k], shape[k]), 1)
+    rows, columns = (
+        np.unique(np.round((np.arange(count) + 0.5) / count * size - 0.5).astype(int))
+        for count, size in zip(counts, shape, strict=True)
+    )
+    return rows, columns
+
+
+def _walks(
+    labelling: Labelling, starts: Grid, numbers: np.ndarray, footsteps: int
+) -> list[Recording | None]:
+    batch = starts.at(labelling, numbers)
+    found: list[Recording | None] = []
+    for k in range(len(numbers)):
+        here = {name: float(column[k]) for name, column in batch.parameters.items()}
+        scene: Any = with_parameters(labelling.scene, here)
+        state = jtu.tree_map(lambda leaf, k=k: leaf[k], batch.states)
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)
+                walk = simulate(scene, state, footsteps=footsteps, accuracy="draft")
+            found.append(record_walk(scene, walk, "walk", motion_only=True))
+        except ArgumentError:  # a start that no walk can have
+            found.append(None)
+    return found
+
+
+def _first(words: np.ndarray) -> list[int]:
+    """Column and row of the start that is shown at first: one that walks, if there is one."""
+    walking = np.argwhere(np.char.startswith(words.astype(str), "walking"))
+    row, column = walking[len(walking) // 2] if len(walking) else (0, 0)
+    return [int(column), int(row)]
+
+
+def _told(quantity: Any) -> str:
+    return f"{quantity.words} ({quantity.unit})" if quantity.unit else quantity.words
+
+
+def _encoded(cells: np.ndarray) -> str:
+    return base64.b64encode(cells.astype(np.uint8).tobytes()).decode("ascii")

@@ -1,0 +1,93 @@
+"""The basin in a browser: a start that is picked shows its own walk."""
+
+import base64
+import dataclasses
+import json
+import re
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.plot.viewer._basin_view import _even_choice
+from tests.browser import chromium
+
+pytestmark = pytest.mark.slow
+
+REWIND = """
+const slider = document.querySelector("input[type=range]");
+slider.value = 0;
+slider.dispatchEvent(new Event("input"));
+"""
+AXES = {"omega_swing": np.linspace(-1.0, 4.0, 6), "theta_swing": np.linspace(-0.4, 0.5, 7)}
+
+
+@pytest.fixture(scope="module")
+def basin(seed):
+    starts = jb.starts.grid(seed.scene, AXES)
+    found = jb.sweep(seed, starts)
+    return found, jb.plot.view_basin(seed, starts, found, most=12, footsteps=2)
+
+
+def test_the_choice_is_even_and_no_more_than_asked():
+    for shape in ((6, 7), (200, 200), (2, 500), (3, 2)):
+        rows, columns = _even_choice(shape, 12)
+        assert len(rows) * len(columns) <= 12
+        assert rows.max() < shape[0]
+        assert columns.max() < shape[1]
+        for chosen in (rows, columns):
+            assert np.ptp(np.diff(chosen)) <= 1 if chosen.size > 2 else True
+    assert [each.tolist() for each in _even_choice((3, 2), 100)] == [[0, 1, 2], [0, 1]]
+
+
+def test_cells_are_the_labels(basin):
+    found, view = basin
+    names = jb.basins.label_names(found.label.values, found.cycle_footsteps.values)
+    page = view.html()
+    sent = json.loads(re.search(r'id="walks">(.*?)</script>', page)[1])
+    cells = np.frombuffer(base64.b64decode(sent["basin"]["cells"]), np.uint8)
+    assert [sent["basin"]["names"][k] for k in cells] == names.ravel().tolist()
+
+
+def test_a_start_that_is_picked_shows_its_walk(basin, tmp_path):
+    _, view = basin
+    with chromium() as page:
+        page.open(view.save(tmp_path / "basin.html"))
+        picture = page.find(".basin .chart")
+        ring = "return Number(document.querySelector('.ring').getAttribute('cx'))"
+
+        def assert_shows_its_start():
+            told = page.find(".picture .told").text
+            angle, rate = map(float, re.findall(r"\) (-?[\d.]+)", told))
+            page.run(REWIND)
+            reading = page.find(".reading").text.replace("−", "-")
+            shown = float(re.search(r"leg 1: (-?[\d.]+)", reading)[1])
+            assert shown == pytest.approx(angle, abs=6e-4)
+            assert rate in AXES["omega_swing"].round(4)
+            return angle, rate
+
+        first = assert_shows_its_start()
+        page.press(picture, -150, 40)
+        second = assert_shows_its_start()
+        assert second != first
+        at = page.run(ring)
+        page.keys("\ue014")
+        third = assert_shows_its_start()
+        assert third[0] > second[0]
+        assert third[1] == second[1]
+        assert page.run(ring) > at
+        page.keys("\ue013")
+        assert assert_shows_its_start()[1] > third[1]
+        page.open(tmp_path / "basin.html", width=400, dark=True)
+        assert page.run("return document.documentElement.scrollWidth") <= 400
+        assert page.errors() == []
+
+
+def test_what_cannot_be_viewed_is_told(seed, basin):
+    found, _ = basin
+    one = jb.starts.grid(seed.scene, {"theta_swing": AXES["theta_swing"]})
+    with pytest.raises(jb.ArgumentError, match="same two axes"):
+        jb.plot.view_basin(seed, one, found)
+    rigid = dataclasses.replace(seed, scene=jb.ladder()["rigid"])
+    with pytest.raises(jb.ArgumentError, match="rigid"):
+        jb.plot.view_basin(rigid, jb.starts.grid(seed.scene, AXES), found)
