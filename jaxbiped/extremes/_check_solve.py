@@ -1,4 +1,7 @@
-"""Solve of the check's equations: final states by SciPy, and how well they are known."""
+"""Solve of the check's equations: final states by SciPy, and how well they are known.
+
+Where SciPy's solves leave too much doubt, the motion is solved in multiple precision.
+"""
 
 import contextlib
 import io
@@ -11,6 +14,7 @@ import numpy as np
 from scipy.integrate import odeint
 
 from jaxbiped.extremes._check_equations import derivative, jacobian
+from jaxbiped.extremes._check_precise import can_be_precise, precise_motion
 
 _TOLERANCES = ((1e-13, 3e-12), (1e-11, 2e-10))
 """Relative tolerances of a solve and of the second one that it is held against; the looser two
@@ -32,21 +36,41 @@ class Checked(NamedTuple):
         doubt: relative change of it by the second solve; infinite where either fails.
         lowest: least height of the hip over the one at which it has fallen, in units of l, before
             the last hundredth of the time.
+        precise: whether it is from a solve in multiple precision.
     """
 
     state: np.ndarray
     doubt: float
     lowest: float
+    precise: bool = False
 
 
-def checked(start: np.ndarray, p: np.ndarray, duration: float) -> Checked:
+def checked(start: np.ndarray, p: np.ndarray, duration: float, *, doubt: float = np.inf) -> Checked:
     """The motion from a start by the check's equations, with a second solve's doubt.
 
     Args:
         start: shape (8,), or (10,) with bristles, SI units.
         p: the numbers of the scene, see `_check_equations`.
         duration: simulated time [s].
+        doubt: from which on a solve in multiple precision follows, where mpmath is installed.
     """
+    found = _by_scipy(start, p, duration)
+    if found.doubt <= doubt or not can_be_precise():
+        return found
+    units = scales(p, start.size)
+    precise = precise_motion(start, p, duration, units)
+    if not precise.doubt < found.doubt:
+        return found
+    lowest = (precise.lowest - _fallen_height(p)) / p[2]
+    return Checked(precise.state, precise.doubt, lowest, True)
+
+
+def _fallen_height(p: np.ndarray) -> float:
+    """Height of the hip at which it counts as fallen [m]."""
+    return float(p[4] + (p[2] - p[4]) * np.cos(1.0))
+
+
+def _by_scipy(start: np.ndarray, p: np.ndarray, duration: float) -> Checked:
     units = scales(p, start.size)
     nudge = _NUDGE * units * np.where(np.arange(start.size) % 2, 1.0, -1.0)
 
@@ -67,9 +91,8 @@ def checked(start: np.ndarray, p: np.ndarray, duration: float) -> Checked:
     if found is None:
         return Checked(np.full(start.size, np.nan), np.inf, np.nan)
     first, second = found
-    low = p[4] + (p[2] - p[4]) * np.cos(1.0)
     before = first[: max(1, _POINTS * 99 // 100)]
-    lowest = float(np.min(before[:, 1] - low)) / p[2]
+    lowest = float(np.min(before[:, 1]) - _fallen_height(p)) / p[2]
     return Checked(first[-1], distance(first[-1], second[-1], units), lowest)
 
 

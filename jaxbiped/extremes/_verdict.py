@@ -37,6 +37,7 @@ class Verdict:
         told: relative error that the result itself tells [–]; None where it tells none.
         doubt: of the check itself [–]; None where it was not asked.
         seconds: of the simulation.
+        precise: whether the check solved in multiple precision.
     """
 
     verdict: str
@@ -47,6 +48,7 @@ class Verdict:
     told: float | None = None
     doubt: float | None = None
     seconds: float = 0.0
+    precise: bool = False
 
 
 def judge(case: Case) -> Verdict:
@@ -80,9 +82,9 @@ def judge(case: Case) -> Verdict:
     if reached <= _AT_ONCE * case.time or not finite:
         return Verdict("flagged", flag or f"it ended at its start: {walk.outcome}", **known)
     p, begin = check_numbers(scene), check_start(scene, start)
-    check = checked(begin, p, reached)
+    check = checked(begin, p, reached, doubt=np.inf if flag else SURE * wanted)
     apart = distance(end, check.state, scales(p, begin.size))
-    known |= dict(error=_number(apart), doubt=_number(check.doubt))
+    known |= dict(error=_number(apart), doubt=_number(check.doubt), precise=check.precise)
     if flag:
         return Verdict("flagged", flag, **known)
     if not check.doubt <= SURE * wanted:

@@ -66,8 +66,9 @@ def simulate(
             unless it is about 1e-6, and their derivatives unless it is half of that: friction's
             rate, up to 5e6 1/s, makes a longer Euler step unstable, which the state survives
             because friction saturates, and derivatives do not. Outside of `jit`, `vmap` and
-            derivatives the walk is solved a second time, by steps twice as long (where there are
-            few, half as long), and a `RuntimeWarning` tells where that leads elsewhere.
+            derivatives the walk is solved twice more, by steps 2 and √2 times as long (where there
+            are few, a half and a third as long), and a `RuntimeWarning` tells where one of these
+            leads elsewhere.
         save: "steps" for every step and the continuous solution, "end" for the final state, an
             array of increasing times [s], shape (n,), at which to save, or a section (by lanes
             only), whose `arrivals` to save beside the final state: `HeelStrike()` saves the

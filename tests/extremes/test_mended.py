@@ -15,6 +15,16 @@ def test_steps_of_one_size_that_are_too_long_are_told(dt):
         jb.simulate(jb.seed_scene(), jb.seed_state(), duration=0.03, dt=dt, save="end")
 
 
+def test_steps_whose_other_solve_is_as_wrong_by_chance_are_told():
+    case = Case(
+        "dt [s], rodas5p", {"dt [s], rodas5p": 3e-4}, {"xi": 1e6}, duration=0.03,
+        asked={"dt": 3e-4, "solver": "rodas5p"},
+    )  # fmt: skip
+    found = judge(case)
+    assert found.error > 1e-2
+    assert found.verdict == "flagged"
+
+
 def test_short_steps_of_one_size_are_not(recwarn):
     walk = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=3e-3, dt=1e-6, save="end")
     assert walk.outcome is jb.Ending.WALKING
