@@ -1,0 +1,54 @@
+"""Host CPU: vectors narrower than it has, and the same bits by all of them."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from jaxbiped.compiler.runtime import _host_cpu
+from jaxbiped.compiler.runtime._host_cpu import VECTOR_VARIABLE, host
+
+_ASKED = """
+import jax, jax.numpy as jnp, jaxbiped as jb, numpy as np
+from jaxbiped.compiler.runtime._host_cpu import host
+rates = jnp.linspace(-1.4, -1.1, 9)
+def walk(rate):
+    start = jb.seed_state()._replace(omega_2=rate)
+    return jb.simulate(jb.seed_scene(), start, duration=0.1, save="end", engine="lanes").final
+found = jax.vmap(walk)(rates)
+print(host().width, np.stack(jax.tree.leaves(found)).tobytes().hex())
+"""
+
+
+def _asked(bits):
+    environment = os.environ | {VECTOR_VARIABLE: bits}
+    command = [sys.executable, "-c", _ASKED]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return done.stdout.split()
+
+
+def _host():
+    return host.__wrapped__()
+
+
+@pytest.mark.parametrize("bits", ["", "64", "1e3", "many", "4096"])
+def test_what_is_no_width_of_vectors_changes_nothing(monkeypatch, bits):
+    monkeypatch.delenv(VECTOR_VARIABLE, raising=False)
+    plain = _host()
+    monkeypatch.setenv(VECTOR_VARIABLE, bits)
+    assert _host() == plain
+
+
+def test_narrower_vectors_do_without_the_wider_ones_instructions(monkeypatch):
+    monkeypatch.setenv(VECTOR_VARIABLE, "128")
+    assert _host().width == 2
+    assert _host().scales is False
+    assert _host().features.endswith(f"-{_host_cpu._WITHOUT['128']}")
+
+
+@pytest.mark.slow
+def test_all_widths_give_the_same_bits():
+    (widest, wanted), (narrow, found) = _asked(""), _asked("128")
+    assert (int(narrow), found) == (2, wanted)
+    assert int(widest) >= 2
