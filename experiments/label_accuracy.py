@@ -204,10 +204,10 @@ def draw(
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.0, 4.6), layout="constrained")
     theta, omega = places
     for code in np.unique(codes):
-        own = codes == code
-        left.plot(
-            theta[own], omega[own], ".", markersize=1.5, label=str(jb.basins.Label(int(code)))
-        )
+        own, label = codes == code, jb.basins.Label(int(code))
+        unknown = label is jb.basins.Label.PENDING
+        said = "the reference ran out of steps" if unknown else str(label)
+        left.plot(theta[own], omega[own], ".", markersize=6 if unknown else 1.5, label=said)
     left.plot(theta[differ], omega[differ], "kx", markersize=6, label="draft and tight differ")
     left.set_xlabel(f"{AXES[0]} [{UNITS[0]}]")
     left.set_ylabel(f"{AXES[1]} [{UNITS[1]}]")

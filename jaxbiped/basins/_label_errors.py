@@ -30,7 +30,7 @@ class LabelErrors(NamedTuple):
         wrong: estimated share of wrong labels among those that are not flagged.
         wrong_high: upper end of its interval, 95 %.
         rtol: relative tolerance at which every start was labelled at last.
-        met: whether `wrong` is at most `wanted`.
+        met: whether `wrong_high` is at most `wanted`.
     """
 
     starts: int
@@ -42,6 +42,11 @@ class LabelErrors(NamedTuple):
     wrong_high: float
     rtol: float
     met: bool
+
+    @property
+    def fewest(self) -> int:
+        """How many starts it takes to tell that accuracy, where not one label is doubted."""
+        return math.ceil(_upper_end(0.0, 0.0) / self.wanted)
 
     def numbers(self) -> JsonObject:
         """Ready for JSON."""
@@ -57,6 +62,8 @@ class LabelErrors(NamedTuple):
         )
         if self.met:
             return f"{told}, of {self.wanted:g} allowed"
+        if self.starts < self.fewest:
+            told += f"; fewer than {self.fewest} starts cannot tell it"
         return f"accuracy = {self.wanted:g} is not met: {told}."
 
     def warn(self) -> None:
@@ -122,11 +129,8 @@ def estimate_label_errors(seen: Seen, *, wanted: float, rtol: float) -> LabelErr
     # Chapman's (a + 1)(b + 1)/(ab + 1) − 1 in all, less those that were seen.
     overlooked = (a - ab) * (b - ab) / (ab + 1.0)
     variance = (a + 1.0) * (b + 1.0) * (a - ab) * (b - ab) / ((ab + 1.0) ** 2 * (ab + 2.0))
-    # One more than estimated: where none was seen, none is not certain. Counts are skewed as the
-    # log-normal distribution is (Chao, Biometrics 43 (1987) 783).
-    more = overlooked + 1.0
-    high = more * math.exp(_QUANTILE * math.sqrt(math.log1p((variance + more) / more**2)))
     wrong = overlooked / seen.starts
+    wrong_high = min(1.0, _upper_end(overlooked, variance) / seen.starts)
     return LabelErrors(
         starts=seen.starts,
         wanted=wanted,
@@ -134,7 +138,17 @@ def estimate_label_errors(seen: Seen, *, wanted: float, rtol: float) -> LabelErr
         changed=seen.changed,
         in_doubt=seen.in_doubt,
         wrong=wrong,
-        wrong_high=min(1.0, high / seen.starts),
+        wrong_high=wrong_high,
         rtol=rtol,
-        met=wrong <= wanted,
+        met=wrong_high <= wanted,
     )
+
+
+def _upper_end(overlooked: float, variance: float) -> float:
+    """Upper end of the interval of a count and of its estimate's variance.
+
+    One more than estimated: where none was seen, none is not certain. Counts are skewed as the
+    log-normal distribution is (Chao, Biometrics 43 (1987) 783).
+    """
+    more = overlooked + 1.0
+    return more * math.exp(_QUANTILE * math.sqrt(math.log1p((variance + more) / more**2)))

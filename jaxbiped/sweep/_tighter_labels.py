@@ -27,7 +27,9 @@ def tightened(
     executor: Executor | None,
     workers: int,
 ) -> LabelErrors:
-    """Labels all starts at finer tolerances until their estimated errors are what is wanted.
+    """Labels all starts at finer tolerances until their errors are certainly what is wanted.
+
+    Where the starts are too few to tell, it is enough that they are estimated to be.
 
     Each round is noted before it begins: a run that is killed goes on with it. Estimates count all
     starts, so that no label depends on the chunks.
@@ -44,7 +46,8 @@ def tightened(
                 results.write(chunk, fields, mark=ALL_GAITS + more)
         errors = estimate_label_errors(seen(layout, results), wanted=wanted, rtol=tolerances[-1])
         finest = tolerances[-1] <= 1.001 * FINEST_FIRST[compliant]
-        if errors.met or finest or len(tolerances) >= _ROUNDS:
+        too_few = errors.wrong <= wanted and errors.starts < errors.fewest
+        if errors.met or too_few or finest or len(tolerances) >= _ROUNDS:
             return errors
         tolerances.append(max(tolerances[-1] / _FINER, FINEST_FIRST[compliant]))
         results.note({_TOLERANCES: json.dumps(tolerances)})

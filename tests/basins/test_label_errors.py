@@ -37,9 +37,16 @@ def test_independent_witnesses_tell_how_many_they_overlooked(recalls):
 
 
 def test_nothing_seen_is_not_certain_and_an_excess_is_warned_of():
-    none = estimate_label_errors(Seen(1000), wanted=1e-4, rtol=1e-6)
+    none = estimate_label_errors(Seen(1000), wanted=1e-2, rtol=1e-6)
     assert (none.wrong, none.met) == (0.0, True)
     assert none.wrong_high == pytest.approx(np.exp(1.96 * np.sqrt(np.log(2.0))) * 1e-3)
+    few = estimate_label_errors(Seen(1000), wanted=1e-4, rtol=1e-6)
+    assert (few.wrong, few.met) == (0.0, False)
+    with pytest.warns(RuntimeWarning, match=f"fewer than {few.fewest} starts cannot tell it"):
+        few.warn()
+    enough = estimate_label_errors(Seen(few.fewest), wanted=1e-4, rtol=1e-6)
+    assert enough.met
+    assert not estimate_label_errors(Seen(few.fewest - 1), wanted=1e-4, rtol=1e-6).met
     many = estimate_label_errors(Seen(1000, 9, 8, 1, 4, 4, 0), wanted=1e-3, rtol=1e-6)
     assert not many.met
     assert many.wrong == pytest.approx(16e-3)

@@ -39,7 +39,10 @@ def test_labels_are_those_of_a_tight_solve_whatever_the_chunks():
     np.testing.assert_array_equal(whole.label.values.ravel()[certain], exact.label[certain])
     assert whole.doubt.attrs["flag_meanings"] == "none settled remains"
     errors = jb.basins.label_errors(whole)
-    assert errors.met
+    # So few cannot tell it, and finer tolerances would not help.
+    assert not errors.met
+    assert errors.wrong <= 1e-2 < errors.wrong_high
+    assert errors.starts < errors.fewest == 512
     assert (errors.starts, errors.wanted, errors.rtol) == (64, 1e-2, 3e-5)
     assert errors.relabelled == int((whole.disagreed > 0).sum())
     same_results(jb.sweep(LABELLING, STARTS, chunk=5), whole)
