@@ -188,6 +188,30 @@ def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
     yield f"diffrax {small(tsit5['gradient_error'])}, Warp {small(warp['gradient_error'])}"
 
 
+def of_footstep_truth(numbers: dict[str, Any]) -> Iterator[str]:
+    """Errors of a footstep and its gradient by each way and setting, and what it says of them."""
+    for each in numbers["rows"]:
+        said = "nothing" if each["said"] is None else small(each["said"])
+        setting = f"{each['setting']} = {small(each['value'], 0)}"
+        yield row(
+            each["way"], setting, small(each["state_error"]), small(each["gradient_error"]), said
+        )
+    yield f"changes by {small(numbers['problem']['coarser_collocation'])}"
+    yield f"differs from our finest solve by {small(numbers['problem']['our_finest'])}"
+
+
+def of_reproducibility(numbers: dict[str, Any]) -> Iterator[str]:
+    """How walks, labels and the gait differ by widths, batches, threads and engines."""
+    yield f"of {numbers['walks']} walks"
+    for each in numbers["rows"]:
+        labels, gait = each["labels"], each["gait"]
+        yield row(
+            each["name"], str(each["same_bits"]), small(each["median"]), small(each["largest"]),
+            str(each["endings"]), "–" if labels is None else str(labels),
+            "–" if gait is None else small(gait),
+        )  # fmt: skip
+
+
 def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
     """In how many fits the intervals hold the truth."""
     inside = {name: each["inside_95"] for name, each in numbers["parameters"].items()}
@@ -354,7 +378,8 @@ def of_label_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
                 model, f"{each['wanted']:g}", str(each["relabelled"]), str(each["changed"]),
                 str(each["in_doubt"]), f"{each['wrong_before']} → {each['truly_wrong']}",
                 small(each["wrong_share"]), small(each["estimated_share"]),
-                f"{each['within_interval']} of {each['draws']}", f"{each['steps_ratio']:.1f}",
+                f"{each['within_interval']} of {each['draws']}",
+                f"{each['met']} of {each['draws']}", f"{each['steps_ratio']:.1f}",
             )  # fmt: skip
 
 
@@ -434,6 +459,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "basin_simplest": of_basin_simplest,
     "bifurcation_elasticities": of_bifurcation_elasticities,
     "extremes": of_extremes,
+    "footstep_truth": of_footstep_truth,
     "force_models": of_force_models,
     "gradient_accuracy": of_gradient_accuracy,
     "gradient_cost": of_gradient_cost,
@@ -445,6 +471,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "long_walks": of_long_walks,
     "optimise_speed": of_optimise_speed,
     "period_doubling": of_period_doubling,
+    "reproducibility": of_reproducibility,
     "search_robustness": of_search_robustness,
     "slope_branch": of_slope_branch,
     "trade": of_trade,
