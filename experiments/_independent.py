@@ -20,6 +20,7 @@ STIFFNESS, DAMPING = 1e6, 1e7
 STATIC, KINETIC, PEAK_SPEED, DECAY = 0.50, 0.40, 1e-4, 1000.0
 LAWS = (STIFFNESS, DAMPING, DECAY)
 """K, c and ξ, which derivatives are taken by."""
+COEFFICIENTS = (STATIC, KINETIC)
 PULL_X, PULL_Z = 9.8 * math.sin(0.02), -9.8 * math.cos(0.02)
 
 try:
@@ -33,9 +34,10 @@ compiled: Callable[..., Any] = (
 
 
 @compiled
-def contact(hip_z, vx, vz, sine, cosine, rate, laws=LAWS):
+def contact(hip_z, vx, vz, sine, cosine, rate, laws=LAWS, coefficients=COEFFICIENTS):
     """Force on one foot along the slope and along its normal [N]."""
     stiffness, damping, decay = laws
+    static, kinetic = coefficients
     arm = LENGTH - RADIUS
     depth = RADIUS - (hip_z - arm * cosine)
     if depth <= 0.0 or rate >= 0.0:
@@ -45,20 +47,20 @@ def contact(hip_z, vx, vz, sine, cosine, rate, laws=LAWS):
     slip = vx + arm * cosine * rate + RADIUS * rate
     speed = abs(slip)
     if speed < PEAK_SPEED:
-        size = STATIC * normal * (1.0 - ((speed - PEAK_SPEED) / PEAK_SPEED) ** 2)
+        size = static * normal * (1.0 - ((speed - PEAK_SPEED) / PEAK_SPEED) ** 2)
     else:
         left = math.exp(-decay * (speed - PEAK_SPEED))
-        size = normal * (KINETIC + (STATIC - KINETIC) * left)
+        size = normal * (kinetic + (static - kinetic) * left)
     return -math.copysign(size, slip), normal
 
 
 @compiled
-def rates(y, laws=LAWS):
+def rates(y, laws=LAWS, coefficients=COEFFICIENTS):
     """Time derivative of the eight numbers of the state."""
     _, hip_z, angle_1, angle_2, vx, vz, rate_1, rate_2 = y
     s_1, c_1, s_2, c_2 = math.sin(angle_1), math.cos(angle_1), math.sin(angle_2), math.cos(angle_2)
-    along_1, normal_1 = contact(hip_z, vx, vz, s_1, c_1, rate_1, laws)
-    along_2, normal_2 = contact(hip_z, vx, vz, s_2, c_2, rate_2, laws)
+    along_1, normal_1 = contact(hip_z, vx, vz, s_1, c_1, rate_1, laws, coefficients)
+    along_2, normal_2 = contact(hip_z, vx, vz, s_2, c_2, rate_2, laws, coefficients)
     arm, moment, total = LENGTH - RADIUS, MASS * CENTRE, 2.0 * MASS
     spin_1, spin_2 = moment * rate_1 * rate_1, moment * rate_2 * rate_2
     push_x = total * PULL_X + along_1 + along_2 + s_1 * spin_1 + s_2 * spin_2
@@ -82,9 +84,10 @@ def rates(y, laws=LAWS):
 
 
 @compiled
-def right_hand_side(t, y, laws=LAWS):
+def right_hand_side(t, y, laws=LAWS, coefficients=COEFFICIENTS):
     """What `scipy.integrate.solve_ivp` calls."""
-    return np.array(rates((y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7]), laws))
+    state = (y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7])
+    return np.array(rates(state, laws, coefficients))
 
 
 def solved(

@@ -2,7 +2,8 @@
 
 Writes footstep_truth.png. Ours differentiates the time and the end of one footstep with respect to
 its start, stiffness, damping and friction. The truth is by collocation on one smooth piece of the
-laws at a time (`_footstep_collocation.py`), which shares nothing with ours.
+laws at a time (`_footstep_collocation.py`), which shares nothing with ours. Beside it are
+differences of SciPy's solves.
 """
 
 import time
@@ -13,15 +14,23 @@ import numpy as np
 from _ball_ways import Answer, relative_error
 from _footstep_collocation import footstep
 from _footstep_equations import LAWS, PARAMETERS, START
-from _footstep_ways import INPUTS, OUTPUTS, WAYS, references
+from _footstep_peers import PEERS
+from _footstep_ways import INPUTS, OUTPUTS, ours, references
 from _options import Options, parse
 from tqdm import tqdm
+
+OURS = ("jaxbiped", "rtol", (1e-4, 3e-7, 1e-9), ours)
+"""Name, what is varied, its values from rough to fine, and the way."""
 
 
 def main() -> None:
     options = parse(__doc__ or "")
     truth, change, apart = references()
-    work = [(way, value) for way in WAYS for value in way[2]]
+    work = [(OURS, value) for value in OURS[2]]
+    if options.quick:
+        work.append((PEERS[-1], PEERS[-1][2][0]))
+    else:
+        work += [(way, value) for way in PEERS for value in way[2]]
     rows = [_row(way, value, truth) for way, value in tqdm(work, desc="ways")]
     problem = {
         "start": START.tolist(),
