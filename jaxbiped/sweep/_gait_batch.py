@@ -63,6 +63,7 @@ def _find_each(
     def one(values: dict[str, np.ndarray], start: PyTree) -> Gait:
         own = jtu.tree_map(jnp.asarray, with_parameters(scene, values))
         # Times and states of all steps would take more memory than all else.
-        return dataclasses.replace(find_gait(own, start, **options), orbit=None)
+        gait = find_gait(own, start, **options)
+        return dataclasses.replace(gait, orbit=None)  # type: ignore[arg-type]
 
     return jax.vmap(one)(values, starts)

@@ -86,7 +86,7 @@ def gait_sweep(
     values = _check_values(scene, over)
     if store is not None:
         check_store(Path(store))
-    options = dict(
+    options: dict[str, Any] = dict(
         parameters=parameters,
         footsteps=footsteps,
         accuracy=accuracy,

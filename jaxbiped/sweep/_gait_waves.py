@@ -91,8 +91,8 @@ class GaitWaves:
         parts = find_each(self._scene, values, guesses, self._type, self._options)
         for part, gaits in parts:
             stable, here = np.asarray(gaits.stable), places[part]
-            self._keep([here[k] for k in np.flatnonzero(stable)], _rows(gaits, stable))
-            for k in np.flatnonzero(~stable):
+            self._keep([here[k] for k in map(int, np.flatnonzero(stable))], _rows(gaits, stable))
+            for k in map(int, np.flatnonzero(~stable)):
                 self._doubt(here[k], _rows(gaits, k))
 
     def _keep(self, places: Sequence[Place], gaits: Gait) -> None:
