@@ -1,9 +1,10 @@
 """Gaits on a grid of parameters as a dataset, in memory or in a Zarr store."""
 
+import contextlib
 import json
 import shutil
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,6 +93,15 @@ class GaitGrid:
             return self._dataset.drop_vars(_DONE)
         self.flush()
         return open_store(self._path).drop_vars(_DONE)
+
+    @contextlib.contextmanager
+    def open(self) -> Iterator[None]:
+        """Within, what was found before an interrupt is not lost."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            self.flush()
+            raise
 
     def flush(self) -> None:
         """Writes to the store, where there is one, what is not there yet."""

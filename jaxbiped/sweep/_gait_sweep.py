@@ -124,14 +124,11 @@ def gait_sweep(
     grid = open_gait_grid(
         first, values, units, settings, provenance(scene), path, any_version=any_version
     )
-    with tqdm(total=math.prod(shape), unit="gaits", disable=not progress) as bar:
+    with tqdm(total=math.prod(shape), unit="gaits", disable=not progress) as bar, grid.open():
         if math.prod(shape) >= LARGE and first.engine == "lanes":
             if not grid.is_done(centre, found=False):
                 grid.write(centre, first)
-            waves = GaitWaves(
-                scene, values, (centre, first), grid, options, search_alone, bar.update
-            )
-            waves.run()
+            GaitWaves(scene, values, (centre, first), grid, options, search_alone, bar.update).run()
             return grid.dataset()
         for again in (False, True):
             for place in order:
@@ -142,7 +139,7 @@ def gait_sweep(
                         grid.write(place, gait)
                 states[place] = grid.state(place)
                 bar.update(not again)
-    return grid.dataset()
+        return grid.dataset()
 
 
 def _find(scene: AnyScene, near: list[PyTree], options: dict[str, Any], *, alone: bool) -> Gait:

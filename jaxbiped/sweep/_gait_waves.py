@@ -52,16 +52,13 @@ class GaitWaves:
     def run(self) -> None:
         """Searches whatever the grid does not hold yet."""
         plan = waves(self._shape, self._first)
-        try:
-            for wave in plan:
-                self._search(wave)
-            self._spread()
-            coarse = {place for wave in plan if not wave.fills for place in wave.places}
-            for place in [place for wave in plan for place in wave.places]:
-                if place in self._doubtful:
-                    self._settle(place, alone=place in coarse)
-        finally:
-            self._grid.flush()
+        for wave in plan:
+            self._search(wave)
+        self._spread()
+        coarse = {place for wave in plan if not wave.fills for place in wave.places}
+        for place in [place for wave in plan for place in wave.places]:
+            if place in self._doubtful:
+                self._settle(place, alone=place in coarse)
 
     def _search(self, wave: Wave) -> None:
         """One wave; what it finds is known after it."""
