@@ -1,13 +1,15 @@
 """Gaits on a grid of parameters as a dataset, in memory or in a Zarr store."""
 
+import contextlib
 import json
 import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
 from jaxtyping import PyTree
@@ -38,7 +40,9 @@ _MEASURES = {
     "spectral_radius": "",
 }
 _PAUSE = 2.0
-"""Seconds between two writes of a store."""
+"""Seconds between two writes of a store, at least."""
+_SHARE = 20.0
+"""How much longer than a write takes."""
 
 
 class GaitGrid:
@@ -46,12 +50,17 @@ class GaitGrid:
 
     def __init__(self, dataset: "xarray.Dataset", state: type, path: Path | None) -> None:
         self._dataset, self._state, self._path = dataset, state, path
-        self._written = time.monotonic()
+        self._written, self._pause = time.monotonic(), _PAUSE
 
     def is_done(self, place: tuple[int, ...], *, found: bool) -> bool:
         """Whether a point is known; where `found`, whether a gait was found there."""
         done = bool(self._dataset[_DONE].data[place])
         return done and (not found or self._dataset["ending"].data[place] == int(Search.FOUND))
+
+    def is_stable(self, place: tuple[int, ...]) -> bool:
+        """Whether a stable gait was found at a point."""
+        found = self.is_done(place, found=True)
+        return found and bool(self._dataset["spectral_radius"].data[place] < 1.0)
 
     def state(self, place: tuple[int, ...]) -> PyTree:
         """The gait's state on the section, None where there is none."""
@@ -60,25 +69,47 @@ class GaitGrid:
         names = self._state._fields[1:]  # type: ignore[attr-defined]
         return self._state(0.0, *(float(self._dataset[f"state_{n}"].data[place]) for n in names))
 
+    def states(self) -> np.ndarray:
+        """States without hip_x at all points, shape (*grid, m); NaN where there is no gait."""
+        names = self._state._fields[1:]  # type: ignore[attr-defined]
+        return np.stack([self._dataset[f"state_{name}"].data for name in names], axis=-1)
+
     def write(self, place: tuple[int, ...], gait: Gait) -> None:
         """Keeps a gait, and what is new in the store every few seconds."""
-        for name, (_, value, _) in _variables(gait).items():
-            self._dataset[name].data[place] = value
-        self._dataset[_DONE].data[place] = True
-        if self._path is not None and time.monotonic() - self._written > _PAUSE:
-            self._flush()
+        self.write_each([place], jtu.tree_map(lambda leaf: np.asarray(leaf)[None], gait))
+
+    def write_each(self, places: Sequence[tuple[int, ...]], gaits: Gait) -> None:
+        """`write` of several, whose arrays have a first axis."""
+        at = tuple(np.transpose(places))
+        for name, (_, values, _) in _variables(gaits).items():
+            self._dataset[name].data[at] = values
+        self._dataset[_DONE].data[at] = True
+        if self._path is not None and time.monotonic() - self._written > self._pause:
+            self.flush()
 
     def dataset(self) -> "xarray.Dataset":
         """The results; of a store, opened lazily."""
         if self._path is None:
             return self._dataset.drop_vars(_DONE)
-        self._flush()
+        self.flush()
         return open_store(self._path).drop_vars(_DONE)
 
-    def _flush(self) -> None:
+    @contextlib.contextmanager
+    def open(self) -> Iterator[None]:
+        """Within, what was found before an interrupt is not lost."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            self.flush()
+            raise
+
+    def flush(self) -> None:
+        """Writes to the store, where there is one, what is not there yet."""
         import zarr
 
-        assert self._path is not None
+        if self._path is None:
+            return
+        began = time.monotonic()
         try:
             group: Any = zarr.open_group(str(self._path), mode="r+", use_consolidated=False)
             # What says that points are known is written after what is known of them.
@@ -88,6 +119,8 @@ class GaitGrid:
         except OSError as error:
             raise unwritable(self._path, error) from None
         self._written = time.monotonic()
+        # All is written each time: that must not take longer than what is searched between.
+        self._pause = max(_PAUSE, _SHARE * (self._written - began))
 
 
 def open_gait_grid(
@@ -163,13 +196,17 @@ def _empty(
 
 
 def _variables(gait: Gait) -> dict[str, tuple[tuple[str, ...], np.ndarray, JsonObject]]:
-    """Of each variable its own dimensions, its value at a point, and its attributes."""
-    found = gait.outcome is Search.FOUND
+    """Of each variable its own dimensions, its value, and its attributes.
+
+    Arrays of a gait, or of several, keep their first axis.
+    """
+    found = np.asarray(gait.ending) == int(Search.FOUND)
     rows: dict[str, tuple[tuple[str, ...], np.ndarray, JsonObject]] = {}
 
     def add(name: str, value: npt.ArrayLike, unit: str, *own: str) -> None:
         number = np.asarray(value, dtype=np.float64)
-        rows[name] = (own, number if found else np.full_like(number, np.nan), {"units": unit})
+        known = found.reshape(found.shape + (1,) * (number.ndim - found.ndim))
+        rows[name] = (own, np.where(known, number, np.nan), {"units": unit})
 
     codes = {
         "ending": gait.ending,

@@ -1,7 +1,7 @@
 """Sweeps of gaits over parameters: each point is searched from its neighbours on the grid."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -25,6 +25,8 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._gait_grid import open_gait_grid
+from jaxbiped.sweep._gait_waves import GaitWaves
+from jaxbiped.sweep._grid_waves import LARGE, Place, neighbours, rings
 from jaxbiped.sweep._identity import identity
 from jaxbiped.sweep._provenance import provenance
 from jaxbiped.sweep._zarr_store import check_store
@@ -55,6 +57,12 @@ def gait_sweep(
     to none, or to an unstable one, the point is searched without a guess as well; what failed is
     tried once more from neighbours that were found later.
 
+    By lanes a grid of 64 points or more is searched in waves, all points of a wave at once: a
+    coarse lattice from its middle outwards, then each finer one from interpolated states. Where
+    that leads to no stable gait, Newton's method begins from neighbours; then, where there is no
+    gait or the point is of the coarse lattice, the point is searched without a guess, and stable
+    gaits that this finds lead on to their neighbours'.
+
     Args:
         scene: the walker; parameters that are not swept keep its values.
         over: values of each swept parameter by name (see `parameter_names`), shape (k,) each.
@@ -78,7 +86,7 @@ def gait_sweep(
     values = _check_values(scene, over)
     if store is not None:
         check_store(Path(store))
-    options = dict(
+    options: dict[str, Any] = dict(
         parameters=parameters,
         footsteps=footsteps,
         accuracy=accuracy,
@@ -91,36 +99,47 @@ def gait_sweep(
         "options": {**options, "parameters": None if parameters is None else list(parameters)},
     }
     shape = tuple(map(len, values.values()))
-    states: dict[tuple[int, ...], PyTree] = {}
-    order = list(_outwards(shape, _nearest(scene, values)))
+    states: dict[Place, PyTree] = {}
+    centre = _nearest(scene, values)
+    order = [place for ring in rings(shape, centre) for place in ring]
 
-    def search(place: tuple[int, ...], *, again: bool) -> Gait | None:
-        """The gait there; none again where no neighbour has one."""
+    def scene_at(place: Place) -> AnyScene:
         point = {name: values[name][i] for name, i in zip(values, place, strict=True)}
-        near = [states[at] for at in _neighbours(place, shape) if states.get(at) is not None]
+        own: AnyScene = jtu.tree_map(as_float, with_parameters(scene, point))
+        return own
+
+    def search_alone(place: Place) -> Gait:
+        return find_gait(scene_at(place), engine=engine, **options)
+
+    def search(place: Place, *, again: bool) -> Gait | None:
+        """The gait there; none again where no neighbour has one."""
+        near = [states[at] for at in neighbours(place, shape) if states.get(at) is not None]
         if again and not near:
             return None
-        own = jtu.tree_map(as_float, with_parameters(scene, point))
-        return _find(own, near, options | {"engine": engine}, alone=not again)
+        return _find(scene_at(place), near, options | {"engine": engine}, alone=not again)
 
-    first = search(order[0], again=False)
-    assert first is not None
+    first = search_alone(centre)
     path = None if store is None else Path(store)
     units = {name: parameter_quantities(scene)[name].unit for name in values}
     grid = open_gait_grid(
         first, values, units, settings, provenance(scene), path, any_version=any_version
     )
-    with tqdm(total=math.prod(shape), unit="gaits", disable=not progress) as bar:
+    with tqdm(total=math.prod(shape), unit="gaits", disable=not progress) as bar, grid.open():
+        if math.prod(shape) >= LARGE and first.engine == "lanes":
+            if not grid.is_done(centre, found=False):
+                grid.write(centre, first)
+            GaitWaves(scene, values, (centre, first), grid, options, search_alone, bar.update).run()
+            return grid.dataset()
         for again in (False, True):
             for place in order:
                 if not grid.is_done(place, found=again):
-                    gait = search(place, again=again) if place != order[0] or again else first
+                    gait = search(place, again=again) if place != centre or again else first
                     # What the first pass found out about a failure is kept.
                     if gait is not None and (not again or gait.outcome is Search.FOUND):
                         grid.write(place, gait)
                 states[place] = grid.state(place)
                 bar.update(not again)
-    return grid.dataset()
+        return grid.dataset()
 
 
 def _find(scene: AnyScene, near: list[PyTree], options: dict[str, Any], *, alone: bool) -> Gait:
@@ -157,27 +176,7 @@ def _check_values(
     return values
 
 
-def _nearest(scene: AnyScene, values: dict[str, np.ndarray]) -> tuple[int, ...]:
+def _nearest(scene: AnyScene, values: dict[str, np.ndarray]) -> Place:
     """The point of the grid nearest to the scene's own parameters."""
     own = parameter_values(scene)
     return tuple(int(np.argmin(np.abs(v - float(own[name])))) for name, v in values.items())
-
-
-def _neighbours(place: tuple[int, ...], shape: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    for axis, size in enumerate(shape):
-        for step in (-1, 1):
-            moved = place[axis] + step
-            if 0 <= moved < size:
-                yield (*place[:axis], moved, *place[axis + 1 :])
-
-
-def _outwards(shape: tuple[int, ...], first: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    """All points of the grid, each but the first a neighbour of one before it."""
-    seen, waiting = {first}, [first]
-    while waiting:
-        place = waiting.pop(0)
-        yield place
-        for near in _neighbours(place, shape):
-            if near not in seen:
-                seen.add(near)
-                waiting.append(near)

@@ -1,0 +1,100 @@
+"""Sweeps in waves: gaits are those of single searches, whatever was killed or failed on the way."""
+
+import numpy as np
+import pytest
+import xarray
+
+import jaxbiped as jb
+from jaxbiped.sweep import _gait_waves
+from jaxbiped.sweep._gait_batch import find_each
+
+pytestmark = pytest.mark.slow
+
+PLAIN = dict(parameters=("K",), radius_sensitivities=False)
+OVER = {"slope": np.linspace(0.018, 0.03, 8), "K": np.geomspace(8e5, 1.3e6, 8)}
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return jb.gait_sweep(jb.seed_scene(), OVER, **PLAIN)
+
+
+@pytest.mark.parametrize("place", [(0, 0), (7, 7), (3, 5)])
+def test_gaits_are_those_of_single_searches(swept, place):
+    point = {name: values[i] for (name, values), i in zip(OVER.items(), place, strict=True)}
+    alone = jb.find_gait(jb.with_parameters(jb.seed_scene(), point), **PLAIN)
+    here = swept.isel(dict(zip(OVER, place, strict=True)))
+    # To the solve's error, for they begin elsewhere.
+    for name, within in dict(period=2e-7, peak_normal=2e-6, spectral_radius=3e-5).items():
+        assert float(here[name]) == pytest.approx(float(getattr(alone.measures, name)), rel=within)
+    assert float(here.elasticity_period[0]) == pytest.approx(
+        float(alone.elasticities.period[0]), rel=1e-3
+    )
+    assert np.all(swept.ending == int(jb.gait.Search.FOUND))
+    # A start that the seed's own gait is near; all others come from neighbours.
+    assert np.sum(swept.found_by == int(jb.gait.FoundBy.START)) == 1
+
+
+def test_a_batch_rounds_as_a_single_search_whatever_is_beside():
+    scene = jb.seed_scene()
+    start = jb.find_gait(scene, **PLAIN).measures.state
+    values = {"K": np.linspace(9e5, 1.1e6, 20)}
+    rows = np.tile([float(x) for x in start[1:]], (20, 1))
+
+    def periods(order):
+        parts = find_each(scene, {"K": values["K"][order]}, rows[order], type(start), PLAIN)
+        return np.concatenate([gaits.measures.period for _, gaits in parts])
+
+    whole = periods(np.arange(20))
+    np.testing.assert_array_equal(periods(np.arange(20)[::-1])[::-1], whole)
+    alone = jb.find_gait(jb.with_parameters(scene, {"K": values["K"][3]}), start, **PLAIN)
+    assert whole[3] == pytest.approx(float(alone.measures.period), rel=1e-12)
+
+
+def test_a_killed_sweep_continues_to_the_same_bits(swept, tmp_path, monkeypatch):
+    path, find, calls = tmp_path / "gaits", _gait_waves.find_each, []
+
+    def interrupted(*args):
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+        calls.append(args)
+        return find(*args)
+
+    monkeypatch.setattr(_gait_waves, "find_each", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        jb.gait_sweep(jb.seed_scene(), OVER, store=path, **PLAIN)
+    known = int(np.isfinite(xarray.open_zarr(path).period).sum())
+    assert known == 1 + sum(len(starts) for _, _, starts, *_ in calls)
+    searched = []
+
+    def counted(*args):
+        searched.append(len(args[2]))
+        return find(*args)
+
+    monkeypatch.setattr(_gait_waves, "find_each", counted)
+    again = jb.gait_sweep(jb.seed_scene(), OVER, store=path, **PLAIN).load()
+    assert sum(searched) == 64 - known
+    xarray.testing.assert_equal(again.drop_attrs(), swept.drop_attrs())
+
+
+def test_what_a_wave_misses_its_neighbours_find(swept, monkeypatch):
+    """Guesses that lead nowhere cost a point its wave, not its gait."""
+    honest = _gait_waves.extrapolated
+
+    def misled(states, wave):
+        guesses = honest(states, wave)
+        guesses[::3] = 0.0
+        return guesses
+
+    monkeypatch.setattr(_gait_waves, "extrapolated", misled)
+    again = jb.gait_sweep(jb.seed_scene(), OVER, **PLAIN)
+    assert np.all(again.found_by.data.ravel()[1:] >= 0)
+    np.testing.assert_allclose(again.period, swept.period, rtol=1e-6)
+
+
+def test_where_there_is_no_gait_the_branch_end_is_told():
+    over = {"slope": np.array([0.006, *np.linspace(0.015, 0.03, 64)])}
+    found = jb.gait_sweep(jb.seed_scene(), over, **PLAIN)
+    assert int(found.branch_end[0]) == int(jb.gait.BranchEnd.FOLD)
+    assert np.isnan(float(found.period[0]))
+    assert np.all(found.spectral_radius[1:] < 1.0)
