@@ -171,10 +171,10 @@ def _assumptions(scene: RigidScene, gait: Gait) -> dict[str, float]:
     """What the gait asks of real feet: where it would slip, fly or scuff."""
     checks = rigid_checks(scene, gait.orbit[1])
     return {
-        "needed_friction": float(np.max(checks.needed_friction)),
+        "needed_friction": float(np.max(np.asarray(checks.needed_friction))),
         "impact_friction": float(checks.impact_friction),
-        "least_normal_N": float(np.min(checks.normal)),
-        "lowest_clearance_m": float(np.min(checks.clearance)),
+        "least_normal_N": float(np.min(np.asarray(checks.normal))),
+        "lowest_clearance_m": float(np.min(np.asarray(checks.clearance))),
         "lifting_m_s": float(checks.lifting),
     }
 
