@@ -18,6 +18,7 @@ from jaxbiped._caches import Once, register_programs
 from jaxbiped._compiled_store import CompiledCall, Skeleton, read_call, trace_call
 from jaxbiped._disk_cache import cache_folder
 from jaxbiped._fingerprint import fingerprint, settings
+from jaxbiped._paused_collection import paused_collection
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -88,7 +89,8 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         key = None if arguments is None else self._key(arguments)
         kept = None if key is None else read_call(key)
         if arguments is None or kept is None:
-            return eqx.filter_eval_shape(self._jitted, *args, **kwargs)
+            with paused_collection():
+                return eqx.filter_eval_shape(self._jitted, *args, **kwargs)
         self._once(arguments)(lambda: kept)
         return kept.shapes()
 

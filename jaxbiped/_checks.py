@@ -1,7 +1,7 @@
 """Checks of arguments: one clear sentence each, raised before anything is compiled.
 
 Values that are being traced (inside `jit`, `vmap`, `grad`) have no number to check and pass. JAX is
-not imported for a check: the command line refuses without it.
+not imported for a check, nor NumPy before one: the command line refuses without them.
 """
 
 import errno
@@ -12,12 +12,11 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-import numpy as np
-
 if TYPE_CHECKING:
+    import numpy as np
     from jaxtyping import ArrayLike
 
-_Test: TypeAlias = Callable[[np.ndarray], np.ndarray]
+_Test: TypeAlias = "Callable[[np.ndarray], np.ndarray]"
 
 
 class ArgumentError(ValueError):
@@ -45,6 +44,7 @@ def is_number(value: object) -> bool:
     """Whether a value may stand for a number or many; texts and truth values may not."""
     if hasattr(value, "dtype"):
         import jax
+        import numpy as np
 
         return bool(jax.dtypes.issubdtype(value.dtype, np.number))  # type: ignore[attr-defined]
     if isinstance(value, list | tuple):
@@ -57,7 +57,9 @@ def _is_traced(value: object) -> bool:
     return jax is not None and isinstance(value, jax.core.Tracer)
 
 
-def _numbers(name: str, value: object) -> np.ndarray:
+def _numbers(name: str, value: object) -> "np.ndarray":
+    import numpy as np
+
     try:
         if not is_number(value):
             raise ValueError
@@ -66,7 +68,7 @@ def _numbers(name: str, value: object) -> np.ndarray:
         raise ArgumentError(f"{name} = {value!r} is not a number.") from None
 
 
-def _shown(array: np.ndarray, bad: np.ndarray) -> str:
+def _shown(array: "np.ndarray", bad: "np.ndarray") -> str:
     """The first offending value; where there are many, how many offend."""
     first = f"{array[bad].flat[0]:g}"
     return first if array.size == 1 else f"{first} (one of {int(bad.sum())} such entries)"
@@ -75,6 +77,8 @@ def _shown(array: np.ndarray, bad: np.ndarray) -> str:
 def _require(name: str, value: object, allowed: str, test: _Test) -> None:
     if _is_traced(value):
         return
+    import numpy as np
+
     array = _numbers(name, value)
     bad = ~(np.isfinite(array) & test(array))
     if bad.any():
@@ -83,17 +87,21 @@ def _require(name: str, value: object, allowed: str, test: _Test) -> None:
 
 def holds_somewhere(condition: "ArrayLike") -> bool:
     """Whether a condition is known to hold in any entry; what is being traced is not known."""
+    import numpy as np
+
     return not _is_traced(condition) and bool(np.any(condition))
 
 
 def is_zero_somewhere(value: "ArrayLike") -> bool:
     """Whether any entry is known to be zero."""
+    import numpy as np
+
     return not _is_traced(value) and bool(np.any(np.asarray(value) == 0.0))
 
 
 def check_finite(name: str, value: object) -> None:
     """Raises `ArgumentError` unless every entry of `value` is a finite number."""
-    _require(name, value, "a finite number", lambda x: np.ones(x.shape, bool))
+    _require(name, value, "a finite number", lambda x: x == x)
 
 
 def check_positive(name: str, value: object, unit: str = "") -> None:
@@ -108,6 +116,8 @@ def check_not_negative(name: str, value: object, unit: str = "") -> None:
 
 def check_count(name: str, value: "ArrayLike") -> None:
     """Raises `ArgumentError` unless `value` is one whole number above zero, known beforehand."""
+    import numpy as np
+
     allowed = "a whole number above 0"
     if _is_traced(value) or np.ndim(value):
         shown = "a traced value" if _is_traced(value) else f"an array of shape {np.shape(value)}"
@@ -118,6 +128,7 @@ def check_count(name: str, value: "ArrayLike") -> None:
 def check_unbatched(name: str, value: object, one: str = "one number") -> None:
     """Raises `ArgumentError` where any leaf of `value` is an array instead of one number."""
     import jax
+    import numpy as np
 
     def is_array(x: object) -> bool:
         return type(x) is list or (x is value and type(x) is tuple)

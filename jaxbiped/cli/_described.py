@@ -3,6 +3,9 @@
 import dataclasses
 from typing import Any
 
+import jax.tree_util as jtu
+import numpy as np
+
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._parameter import parameter_infos
 from jaxbiped._types import as_float
@@ -41,7 +44,8 @@ def _compliant(options: SceneOptions) -> Scene:
         K=options.K,
         c=options.c,
         n=options.n,
-        mass=own.walker.total_mass,
+        # By NumPy: JAX would compile a program for each operation.
+        mass=jtu.tree_map(np.asarray, own.walker).total_mass,
         g=options.g,
     )
     friction = friction_law_like(

@@ -119,7 +119,7 @@ def gait_numbers(gait: Gait) -> JsonObject:
         "multiplier_errors": np.asarray(gait.multiplier_errors).tolist(),
         "unit_multiplier_error": float(gait.unit_multiplier_error),
         "spectral_radius": float(measures.spectral_radius),
-        "stable": bool(gait.stable),
+        "stable": gait.outcome is Search.FOUND and float(measures.spectral_radius) < 1.0,
         "bifurcation": str(gait.critical if gait.outcome is Search.FOUND else Bifurcation.NONE),
         "sensitivities": _by_parameter(gait.parameters, gait.sensitivities),
         "sensitivity_errors": _by_parameter(gait.parameters, gait.sensitivity_errors),
@@ -171,10 +171,10 @@ def _assumptions(scene: RigidScene, gait: Gait) -> dict[str, float]:
     """What the gait asks of real feet: where it would slip, fly or scuff."""
     checks = rigid_checks(scene, gait.orbit[1])
     return {
-        "needed_friction": float(checks.needed_friction.max()),
+        "needed_friction": float(np.max(np.asarray(checks.needed_friction))),
         "impact_friction": float(checks.impact_friction),
-        "least_normal_N": float(checks.normal.min()),
-        "lowest_clearance_m": float(checks.clearance.min()),
+        "least_normal_N": float(np.min(np.asarray(checks.normal))),
+        "lowest_clearance_m": float(np.min(np.asarray(checks.clearance))),
         "lifting_m_s": float(checks.lifting),
     }
 

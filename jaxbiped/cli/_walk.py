@@ -89,7 +89,7 @@ def _report(
     numbers: JsonObject = {
         "ending": ending_name(scene, trajectory),
         "slope_rad": float(scene.ground.slope),
-        "duration_s": float(trajectory.t[-1]),
+        "duration_s": float(np.asarray(trajectory.t)[-1]),
         "steps": _step_list(steps),
         "energy_residual_J": float(ledger.residual[0]),
         "energy_residual_relative": relative_residual(ledger),

@@ -4,7 +4,9 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import check_not_negative, check_type
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._impact import impact
@@ -68,13 +70,30 @@ def rigid_checks(scene: RigidScene, states: RigidState) -> RigidChecks:
     """
     check_type("scene", scene, RigidScene)
     check_type("states", states, RigidState)
-    known = jnp.isfinite(jnp.ravel(states.theta_2))
-    states = jtu.tree_map(lambda leaf: jnp.ravel(leaf)[known], states)
+    states = jtu.tree_map(lambda leaf: np.ravel(np.asarray(leaf)), states)
+    known = np.isfinite(states.theta_2)
+    last = np.max(np.flatnonzero(known), initial=0)
+    # Of all states: one program then serves for any number of those that are known.
+    found = _checks(scene, jtu.tree_map(jnp.asarray, states), jnp.asarray(last))
+
+    def of_known(leaf: Scalar) -> Scalar:
+        return jnp.asarray(np.asarray(leaf)[known])
+
+    return found._replace(
+        normal=of_known(found.normal),
+        needed_friction=of_known(found.needed_friction),
+        clearance=of_known(found.clearance),
+    )
+
+
+@cached_jit
+def _checks(scene: RigidScene, states: RigidState, last: Scalar) -> RigidChecks:
+    """The checks of n states, shape (n,), the impact's at the last of them."""
     force = rolling(scene, states).force
     normal, tangential = force.normal, jnp.abs(jnp.asarray(force.tangential))
     needed = jnp.where(normal > 0.0, tangential / jnp.where(normal > 0.0, normal, 1.0), jnp.inf)
     heights = jnp.cos(states.theta_2) - jnp.cos(states.theta_1)
-    struck = impact(scene, jtu.tree_map(lambda leaf: leaf[-1], states))
+    struck = impact(scene, jtu.tree_map(lambda leaf: leaf[last], states))
     return RigidChecks(
         normal=normal,
         needed_friction=needed,

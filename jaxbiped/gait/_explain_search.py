@@ -32,7 +32,7 @@ def explain_search(scene: AbstractScene, gait: Gait) -> str:
             for each in gait.others
         )
         text += f"; other gaits seen: {seen}"
-    if not bool(gait.stable) and int(gait.origin.branch_end) != int(BranchEnd.NOT_FOLLOWED):
+    if int(gait.origin.branch_end) != int(BranchEnd.NOT_FOLLOWED) and not bool(gait.stable):
         text += f"; no stable one was seen{_branch(scene, gait)}"
     if int(gait.grazes):
         text += f"; {grazing_sentence(gait)}"

@@ -4,7 +4,9 @@ from typing import cast
 
 import diffrax
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
@@ -80,7 +82,7 @@ def walking_spec(
         system=system_of(scene),
         section=section,
         solver=solver,
-        max_time=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
+        max_time=_patience(scene.walker.l, scene.ground.g),
         steps=steps,
         max_solver_steps=most,
         engine=engine,
@@ -97,3 +99,10 @@ class _Arrival(eqx.Module):
     def __call__(self, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
         after_reset = minimal_state(args, self.system.reset_map(args, y))
         return self.section.value(args, after_reset), self.section.counts(args, after_reset)
+
+
+def _patience(length: Scalar, g: Scalar) -> Scalar:
+    if isinstance(length, jax.core.Tracer) or isinstance(g, jax.core.Tracer):
+        return _PATIENCE * jnp.sqrt(length / g)
+    # By NumPy, to the same bits: JAX would compile a program for each operation.
+    return jnp.asarray(_PATIENCE * np.sqrt(np.asarray(length) / np.asarray(g)))

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 
 from jaxbiped.dynamics._contacts import Contacts, contacts
-from jaxbiped.dynamics._feet import Feet, landings, standing_foot
+from jaxbiped.dynamics._feet import Feet, landings, touches
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._samples import Samples, at_steps, evaluate_at, moments_of_change, sample
 from jaxbiped.scene._scene import Scene
@@ -68,7 +68,9 @@ def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
     both = at_steps(scene, trajectory, contacts).feet
     before, after = (_part(both, part) for part in (slice(-1), slice(1, None)))
     lands = np.stack(landings(before, after))
-    last = int(standing_foot(_part(both, 0)))
+    # By NumPy: JAX would compile a program for this one number.
+    touch_1, touch_2 = (bool(touches(foot)) for foot in _part(both, 0))
+    last = int(touch_1 and not touch_2) + 2 * int(touch_2 and not touch_1)
     found: list[tuple[int, int]] = []
     for k in np.flatnonzero(lands.any(axis=0)):
         for leg in (1, 2):
@@ -119,7 +121,8 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     loads = sample(scene, trajectory, contacts, time)
     step = np.searchsorted(time, 0.5 * (loads.edges[1:] + loads.edges[:-1])) - 1
     ledger = energy_ledger(scene, trajectory, time)
-    weight = float(scene.walker.total_mass * scene.ground.g)
+    own = jax.tree_util.tree_map(np.asarray, (scene.walker, scene.ground))
+    weight = float(own[0].total_mass * own[1].g)
     return Footsteps(
         time_s=time[1:],
         period_s=period,

@@ -81,6 +81,16 @@ _REFUSED = (
 )  # fmt: skip
 
 
+def test_help_and_unknown_options_do_without_numpy():
+    asked = "--help\ngait --help\ngait --slopee 3\nwlak"
+    script = _ASK.replace('"jax" in', '"numpy" in')
+    ran = subprocess.run(
+        [sys.executable, "-c", script], input=asked, capture_output=True, text=True, check=True
+    )
+    imported = [line.split(" ", 2)[1] for line in ran.stdout.splitlines()]
+    assert imported == ["False"] * 4
+
+
 def test_help_and_refusals_do_without_jax():
     asked = "\n".join((*_ANSWERED, *_REFUSED))
     ran = subprocess.run(

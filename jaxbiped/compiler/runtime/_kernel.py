@@ -9,6 +9,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._fingerprint import as_leaves, fingerprint
+from jaxbiped._paused_collection import paused_collection
 from jaxbiped.compiler.codegen._lane_kernel import ENTRY, kernel_text
 from jaxbiped.compiler.runtime._host_cpu import host
 from jaxbiped.compiler.runtime._machine_code import (
@@ -96,21 +97,26 @@ class Kernel:
     def outline(self) -> Outline:
         """What leaves the program: known before its operations are."""
         kept = self._kept_signature
-        return outline_of(self._own_program(), self.inputs) if kept is None else kept.outline
+        if kept is not None:
+            return kept.outline
+        with paused_collection():
+            return outline_of(self._own_program(), self.inputs)
 
     @property
     def graph(self) -> Graph:
         """The program's operations."""
         # One after the other: what is traced first can be compiled while the next one is traced.
         if self._graph is None:
-            with _TRACING:
+            with _TRACING, paused_collection():
                 if self._graph is None:
                     self._graph = graph_of(self._own_program(), self.inputs)
         return self._graph
 
     def text(self, width: int) -> str:
         """The program as LLVM's text."""
-        return kernel_text(self.graph, width, host())
+        graph = self.graph
+        with paused_collection():
+            return kernel_text(graph, width, host())
 
     def instructions(self) -> int:
         """How many machine instructions it has, for vectors of the host's width."""

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, Protocol, cast
 
-import jax.numpy as jnp
-
 from jaxbiped._checks import check_choice, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene import laws
@@ -92,10 +90,7 @@ def normal_law_like(
 def _standing(law: RistowSchafer, mass: Scalar, g: Scalar) -> Standing:
     check_positive("mass", mass, "kg")
     check_positive("g", g, "m/s^2")
-    penetration = (mass * g / law.K) ** (1.0 / law.n)
-    stiffness = law.n * mass * g / penetration
-    damping_ratio = 0.5 * law.c * penetration / jnp.sqrt(stiffness * mass)
-    return Standing(mass, penetration, damping_ratio, g)
+    return Standing(law, mass, g)
 
 
 def friction_law_like(

@@ -93,4 +93,4 @@ class HuntCrossley(AbstractDampedLaw):
     @classmethod
     def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
         """The seed's exponent, penetration under the weight and damping ratio about it."""
-        return cls.from_weight(**standing._asdict(), n=seed.n)
+        return cls.from_weight(**standing.arguments(), n=seed.n)

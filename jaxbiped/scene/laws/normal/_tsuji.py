@@ -61,7 +61,7 @@ class Tsuji(AbstractDampedLaw):
     @classmethod
     def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
         """The same penetration under the weight, with the same damping ratio about it."""
-        return cls.from_weight(**standing._asdict())
+        return cls.from_weight(**standing.arguments())
 
 
 def _fourth_root(x: Scalar) -> Scalar:

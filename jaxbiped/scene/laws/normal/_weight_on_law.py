@@ -1,13 +1,16 @@
 """Weight on a normal law: its parameters from how a mass stands on it."""
 
 import abc
-from typing import ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 
 import jax.numpy as jnp
 
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
+
+if TYPE_CHECKING:
+    from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
 
 
 class AbstractDampedLaw(AbstractNormalLaw):
@@ -58,19 +61,34 @@ class AbstractDampedLaw(AbstractNormalLaw):
 
 
 class Standing(NamedTuple):
-    """How a mass stands on a law: the arguments of `from_weight`.
+    """How a mass stands on the seed's law, computed where it is asked for.
 
     Attributes:
+        law: the seed's.
         mass: what stands there [kg].
-        penetration: how deep [m].
-        damping_ratio: of small oscillations about that [–].
         g: gravitational acceleration [m/s²].
     """
 
+    law: "RistowSchafer"
     mass: Scalar
-    penetration: Scalar
-    damping_ratio: Scalar
     g: Scalar
+
+    @property
+    def penetration(self) -> Scalar:
+        """How deep it stands [m]."""
+        return (self.mass * self.g / self.law.K) ** (1.0 / self.law.n)
+
+    @property
+    def damping_ratio(self) -> Scalar:
+        """Of small oscillations about that [–]."""
+        penetration = self.penetration
+        stiffness = self.law.n * self.mass * self.g / penetration
+        return 0.5 * self.law.c * penetration / jnp.sqrt(stiffness * self.mass)
+
+    def arguments(self) -> dict[str, Scalar]:
+        """Of `from_weight`."""
+        names = ("mass", "penetration", "damping_ratio", "g")
+        return {name: getattr(self, name) for name in names}
 
 
 def matched_to_weight(
