@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from jaxbiped.compiler.codegen._instruction_selection import select_fused, select_instruction
-from jaxbiped.compiler.codegen._llvm_function import FunctionBuilder, literal, vector
+from jaxbiped.compiler.codegen._llvm_function import RARELY, FunctionBuilder, literal, vector
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.passes._liveness import Liveness
 
@@ -116,7 +116,10 @@ class GraphWriter:
         mask = self.use(here, width)
         before = [self.use(defaults[i], width) for i in wanted]
         start, rare, after = self.text.label, self.text.fresh("some"), self.text.fresh("none")
-        self.text.line(f"br i1 {self.text.any_lane(mask, width)}, label %{rare}, label %{after}")
+        hint = RARELY if inside.rare else ""
+        self.text.line(
+            f"br i1 {self.text.any_lane(mask, width)}, label %{rare}, label %{after}{hint}"
+        )
         self.text.begin(rare)
         chosen = []
         with self.text.scope():

@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxbiped.compiler.codegen._graph_codegen import GraphWriter, Place
 from jaxbiped.compiler.codegen._lane_scheduler import LaneScheduler, Sizes
-from jaxbiped.compiler.codegen._llvm_function import BYTES, vector
+from jaxbiped.compiler.codegen._llvm_function import BYTES, WEIGHTS, vector
 from jaxbiped.compiler.ir._elementwise_primitives import Array
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.passes._liveness import Liveness
@@ -50,7 +50,7 @@ class _Kernel:
         t.begin("leave")
         t.line("ret void")
         head = [*sorted(t.declarations), f"define void @{ENTRY}(ptr noalias %fields) {{", "entry:"]
-        return "\n".join([*head, *t.allocations, *t.lines, "}"]) + "\n"
+        return "\n".join([*head, *t.allocations, *t.lines, "}", WEIGHTS]) + "\n"
 
     def _rooms(self) -> None:
         """Memory for what outlives an attempt."""

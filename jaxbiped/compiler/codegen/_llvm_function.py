@@ -8,6 +8,10 @@ from jaxbiped.compiler.ir._graph import Kind
 
 _SHORT = {Kind.F64: "f64", Kind.F32: "f32", Kind.I64: "i64", Kind.I32: "i32", Kind.BOOL: "i1"}
 BYTES = {Kind.F64: 8, Kind.F32: 4, Kind.I64: 8, Kind.I32: 4, Kind.BOOL: 1}
+RARELY = ", !prof !0"
+"""Behind a branch that is hardly ever taken; see `WEIGHTS`."""
+WEIGHTS = '!0 = !{!"branch_weights", i32 1, i32 1048575}'
+"""What `RARELY` refers to, in the module."""
 
 
 def literal(number: float, kind: Kind) -> str:

@@ -91,7 +91,7 @@ class Arithmetic:
         self, rare: Value, value: Value, other: "Callable[[Arithmetic], Value]"
     ) -> Value:
         """`value`, but in the lanes that are `rare` another, computed only where there are any."""
-        inside = Block(self.block)
+        inside = Block(self.block, rare=True)
         found = other(Arithmetic(inside))
         results = self.block.region("if", (rare, inside, (found,), (value,)), [found.kind])
         return results[0]
@@ -116,6 +116,8 @@ _EXP_SERIES = (
     0.5000000000000001,
 )
 """(exp r − 1 − r)/r² through its values at Chebyshev's points of |r| ≤ 0.3466; off by 1.7e-17."""
+_EXP_IS_ZERO = -746.0
+"""Below it exp x is less than half the smallest number."""
 _LOG_SERIES = (
     1.479819860511658591e-01,
     1.531383769920937332e-01,
@@ -134,13 +136,15 @@ TINIEST_NORMAL = 2.2250738585072014e-308
 def exponential(m: Arithmetic, x: Value, low: Value | float = 0.0) -> Value:
     """exp(x + low), `low` a small correction."""
     clamped = m.choose(m.compare("ogt", x, 800.0), 800.0, x)
-    clamped = m.choose(m.compare("olt", clamped, -800.0), -800.0, clamped)
+    # A product that falls below all numbers takes a CPU many times as long as any other.
+    nothing = m.compare("olt", x, _EXP_IS_ZERO)
+    clamped = m.choose(nothing, 0.0, clamped)
     n = m.rint(m.mul(clamped, 1.0 / math.log(2.0)))
     minus = m.neg(n)
     r = m.fma(minus, LN2_LOW, m.fma(minus, LN2_HIGH, clamped))
     r = m.add(r, low)
     value = m.add(m.fma(m.mul(r, r), m.series(r, _EXP_SERIES), r), 1.0)
-    return m.scaled(value, n)
+    return m.choose(nothing, 0.0, m.scaled(value, n))
 
 
 def split_exponent(m: Arithmetic, x: Value) -> tuple[Value, Value]:

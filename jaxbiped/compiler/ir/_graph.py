@@ -65,12 +65,18 @@ class Block:
         invariant: whether what it computes depends on a simulation's inputs alone; then what
             blocks inside compute of such values alone is moved here.
         loop: whether it is run several times; what does not depend on the run is moved out.
+        rare: whether it is hardly ever run: registers are not saved on the way around it.
     """
 
     def __init__(
-        self, parent: "Block | None" = None, *, invariant: bool = False, loop: bool = False
+        self,
+        parent: "Block | None" = None,
+        *,
+        invariant: bool = False,
+        loop: bool = False,
+        rare: bool = False,
     ) -> None:
-        self.parent, self.invariant, self.loop = parent, invariant, loop
+        self.parent, self.invariant, self.loop, self.rare = parent, invariant, loop, rare
         self.values: list[Value] = []
         self._known: dict[tuple[Argument, ...], Value] = {}
 
