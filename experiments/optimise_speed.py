@@ -100,7 +100,7 @@ def descents(options: Options, scene: jb.Scene) -> dict[str, Any]:
     return found
 
 
-def picture(options: Options, own: jb.Gait, best: jb.optimise.Optimum) -> None:
+def picture(options: Options, own: jb.Gait, best: jb.optimise.Optimum) -> str:
     """The iterations, and the multipliers before and after."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 4.0), layout="constrained")
     names = ("spectral_radius", "sensitivity_norm")
@@ -118,8 +118,10 @@ def picture(options: Options, own: jb.Gait, best: jb.optimise.Optimum) -> None:
     right.set_xlabel("real part of a multiplier")
     right.set_ylabel("imaginary part")
     right.legend(frameon=False)
-    figure.savefig(options.path("optimise_speed.png"), dpi=150)
+    path = options.path("optimise_speed.png")
+    figure.savefig(path, dpi=150)
     plt.close(figure)
+    return str(path)
 
 
 def main() -> None:
@@ -160,8 +162,9 @@ def main() -> None:
             f"sensitivity norm {certificate['sensitivity_norm']:.3f}, "
             f"{certificate['footsteps']} footsteps, returned {certificate['returned']}"
         )
-    picture(options, own, designs["calmest"])
-    options.finish({"fastest": fast, "designs": told, "descents": descents(options, scene)})
+    drawn = picture(options, own, designs["calmest"])
+    descended = descents(options, scene)
+    options.finish({"fastest": fast, "designs": told, "descents": descended, "picture": drawn})
 
 
 if __name__ == "__main__":

@@ -27,8 +27,8 @@ COLOURS, WIDEST = 256, 1600
 PICTURES = {"picture", "pictures"}
 TIMINGS = {
     "batch_ratio", "batch_us", "compile_s", "first_compile_s", "first_result_s", "gaits_s",
-    "cheapest_by_cpu", "cold_cpu_s", "cold_wall_s", "cpu_s", "seconds", "single_us", "wall_ms",
-    "wall_s", "wall_s_run", "warm_cpu_s", "warm_wall_s",
+    "cheapest_by_cpu", "cold_cpu_s", "cold_wall_s", "cpu_s", "first_s", "seconds", "single_us",
+    "then_s", "wall_ms", "wall_s", "wall_s_run", "warm_cpu_s", "warm_wall_s",
 }  # fmt: skip
 """Keys of what an idle machine must measure."""
 UNKNOWN = "…"
@@ -303,6 +303,13 @@ def of_optimise_speed(numbers: dict[str, Any]) -> Iterator[str]:
         yield row(name, str(each["iterations"]), str(each["evaluations"]), *seconds)
 
 
+def of_radius_map(numbers: dict[str, Any]) -> Iterator[str]:
+    """What a map of gaits costs."""
+    for each in numbers["rows"]:
+        seconds = (f"{each[key]:.1f}" for key in ("first_s", "then_s", "cpu_s"))
+        yield row(each["kind"], str(each["found"]), *seconds)
+
+
 def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
     """How many scenes were searched, in how many walks settle, and how many were missed."""
     rows = [each for family in numbers.values() for each in family]
@@ -473,6 +480,7 @@ QUOTES: dict[str, Callable[[dict[str, Any]], Iterator[str]]] = {
     "optimise_speed": of_optimise_speed,
     "period_doubling": of_period_doubling,
     "reproducibility": of_reproducibility,
+    "radius_map": of_radius_map,
     "search_robustness": of_search_robustness,
     "slope_branch": of_slope_branch,
     "trade": of_trade,

@@ -49,7 +49,7 @@ def main() -> None:
         rows.append(row)
         options.say(f"{kind:<37} {count**2:6} {found:6}  {first:9.1f}  {seconds:8.1f}  {cpu:7.1f}")
     assert swept is not None
-    draw(options, swept)
+    picture = draw(options, swept)
     radius = swept.spectral_radius.data
     options.finish(
         {
@@ -58,6 +58,7 @@ def main() -> None:
             "c": over["c"].tolist(),
             "least_radius": float(np.nanmin(radius)),
             "largest_radius": float(np.nanmax(radius)),
+            "picture": picture,
         }
     )
 
@@ -74,13 +75,15 @@ def cpu_seconds() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def draw(options: Options, swept: Any) -> None:
+def draw(options: Options, swept: Any) -> str:
     figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.4), layout="constrained")
     panel(left, swept, "spectral_radius", "spectral radius ρ")
     panel(right, swept, "period", "period [s]")
     figure.suptitle("Gaits of the seed's walker on 0.02 rad; white cross: its own K and c")
-    figure.savefig(options.path("radius_map.png"), dpi=150)
+    path = options.path("radius_map.png")
+    figure.savefig(path, dpi=150)
     plt.close(figure)
+    return str(path)
 
 
 def panel(axes: Axes, swept: Any, name: str, title: str) -> None:
