@@ -11,6 +11,7 @@ from jaxbiped.measure._energy_ledger import EnergyLedger
 from jaxbiped.measure._samples import at_steps
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import unresolved_slip
 from jaxbiped.solve._trajectory import Trajectory
 
 AIRBORNE = "airborne"
@@ -54,12 +55,19 @@ def walk_warnings(
         )
     steps = numbers["solver"]["accepted"] + numbers["solver"]["rejected"]
     found += cut_short(numbers["ending"], steps)
+    if rtol is not None and (said := unresolved_slip(rtol, scene.minimal)):
+        found.append(said)
     share = numbers["energy_residual_relative"]
     bound = _WORST_RESIDUAL if rtol is None else min(_WORST_RESIDUAL, _FAR * rtol)
     if share is not None and share > bound:
         found.append(
             f"the energy left open is {share:.2g} of what was turned over: these numbers are not "
             f"accurate; take a smaller --{'dt' if rtol is None else 'rtol'}"
+        )
+    elif not np.isfinite(numbers["energy_residual_J"]):
+        found.append(
+            "the energy left open is no number, for the walk's own overflowed: take a smaller "
+            f"--{'dt' if rtol is None else 'rtol'}"
         )
     return [*found, *friction_warnings(scene)]
 

@@ -115,20 +115,25 @@ def resolve_slip_speed(rtol: float, scene: PyTree) -> RealScalarLike:
     return xp.where(_RESOLVED * slow < rtol * fast, finest, rtol)
 
 
-def warn_of_unresolved_slip(rtol: RealScalarLike, scene: PyTree) -> None:
-    """Warns of a tolerance far coarser than what resolves how friction builds up, where known."""
+def unresolved_slip(rtol: RealScalarLike, scene: PyTree) -> str:
+    """A sentence on a tolerance far coarser than what resolves how friction builds up, or none."""
     if isinstance(rtol, jax.core.Tracer):
-        return
+        return ""
     finest = resolve_slip_speed(float(rtol), scene)
-    if not isinstance(finest, jax.core.Tracer) and float(rtol) > _CHATTERS * float(finest):
-        name = scene.friction.builds_up_over
-        warnings.warn(
-            f"rtol = {float(rtol):g} is too coarse for {name} = "
-            f"{float(getattr(scene.friction, name)):g} m/s: steps may chatter about that slip "
-            f"speed; {float(finest):.1g} resolves it.",
-            RuntimeWarning,
-            stacklevel=3,
-        )
+    if isinstance(finest, jax.core.Tracer) or float(rtol) <= _CHATTERS * float(finest):
+        return ""
+    name = scene.friction.builds_up_over
+    return (
+        f"rtol = {float(rtol):g} is too coarse for {name} = "
+        f"{float(getattr(scene.friction, name)):g} m/s: steps may chatter about that slip "
+        f"speed; {float(finest):.1g} resolves it"
+    )
+
+
+def warn_of_unresolved_slip(rtol: RealScalarLike, scene: PyTree) -> None:
+    """Warns of such a tolerance, where it is known."""
+    if said := unresolved_slip(rtol, scene):
+        warnings.warn(f"{said}.", RuntimeWarning, stacklevel=3)
 
 
 def rms_norm(error: PyTree) -> Scalar:
