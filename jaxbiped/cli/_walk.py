@@ -70,7 +70,7 @@ def _request(options: Walk, scene: Scene | RedundantScene, state: State) -> Simu
         scene,
         state,
         duration=options.solve.duration,
-        solver=options.solve.method(),
+        solver=options.solve.solver,
         **options.solve.tolerances(),
         dt=options.solve.dt,
         engine=options.solve.engine,
@@ -95,7 +95,7 @@ def _report(
         "energy_residual_relative": relative_residual(ledger),
         "gravity_work_J": float(ledger.gravity_work[0]),
         "solver": {
-            "name": options.solve.method(),
+            "name": options.solve.solver,
             "rtol": rtol,
             "dt": options.solve.dt,
             "engine": trajectory.engine,

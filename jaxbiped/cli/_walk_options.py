@@ -223,8 +223,8 @@ class SolveOptions:
 
     duration: float = 10.0
     """Simulated time [s]."""
-    solver: str | None = None
-    """Ours (rodas3p, rodas4, rodas4p, rodas5p) or one of diffrax's: rodas4p, by a number rodas4."""
+    solver: str = "rodas4"
+    """Name of a solver: ours (rodas3p, rodas4, rodas4p, rodas5p) or one of diffrax's."""
     accuracy: str | None = None
     """In place of tolerances: draft, balanced or tight; or a relative error, such as 1e-4."""
     rtol: float = 1e-6
@@ -239,8 +239,7 @@ class SolveOptions:
 
     def check(self) -> None:
         """Raises `ArgumentError` for what is wrong in itself."""
-        if self.solver is not None:
-            check_choice("solver", self.solver, SOLVERS)
+        check_choice("solver", self.solver, SOLVERS)
         check_accuracy(self.accuracy)
         check_engine(self.engine)
         check_positive("rtol", self.rtol)
@@ -258,12 +257,6 @@ class SolveOptions:
         from jaxbiped.solve._accuracy import accuracy_told
 
         return check_accurate_walk(accuracy_told(self.accuracy), atol=self.atol, dt=self.dt)
-
-    def method(self) -> str:
-        """The name of the solver."""
-        from jaxbiped.simulate._accurate_walk import usual_solver
-
-        return self.solver or usual_solver(self.wanted())
 
     def tolerances(self) -> dict[str, Any]:
         """What decides on the steps' sizes, as `simulate` takes it; raises `ArgumentError`."""

@@ -23,8 +23,8 @@ from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, correct, locate
 
 _REAL = 1e-9
 """Imaginary part up to which a multiplier counts as real."""
-_BESIDE = 1e-3
-"""Arclength to both sides of a bifurcation between which another curve's is looked for."""
+_BESIDE = (1e-3, 1e-2)
+"""Arclengths to both sides of a bifurcation between which another curve's is looked for."""
 _AT = 1e-3
 """Distance from the unit circle that a located multiplier may have."""
 
@@ -139,13 +139,14 @@ def locate_near(
 
     None where the curve is lost, or the test function has one sign at both.
     """
-    here, there = (
-        correct(curve, place + way * _BESIDE * tangent, tangent, tangent).found
-        for way in (-1.0, 1.0)
-    )
-    if here is None or there is None or test(here) * test(there) >= 0.0:
-        return None
-    return locate(curve, here, there, test)
+    for beside in _BESIDE:
+        here, there = (
+            correct(curve, place + way * beside * tangent, tangent, tangent).found
+            for way in (-1.0, 1.0)
+        )
+        if here is not None and there is not None and test(here) * test(there) < 0.0:
+            return locate(curve, here, there, test)
+    return None
 
 
 def _witness_shift(

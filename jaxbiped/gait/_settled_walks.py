@@ -79,7 +79,6 @@ def _arrivals(scene: Scene, starts: PyTree) -> tuple[Scalar, PyTree]:
             scene,
             start,
             footsteps=_FOOTSTEPS + 1,
-            solver="rodas4",  # at draft the cheaper one
             accuracy="draft",
             save=MidStance(),
             max_arrivals=_FOOTSTEPS,

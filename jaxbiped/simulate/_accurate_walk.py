@@ -25,9 +25,6 @@ _FIRST = 1e-2
 """First tolerance as a share of the relative error wanted: errors of walks are about 6 to 80
 tolerances (the seed's walk of two seconds, 1e-5 to 1e-10), and bars a few times that."""
 
-_BY_NAME, _BY_NUMBER = "rodas4p", "rodas4"
-"""Usual solvers: the first is the cheaper one at equal error, the second the one whose error bars
-the weights below were chosen for, with the first as the reference."""
 _FINEST_FIRST = 1e-10
 """Finest tolerance to begin with."""
 
@@ -48,11 +45,6 @@ class Witness(NamedTuple):
 
     walk: Trajectory[Any]
     weight: float
-
-
-def usual_solver(wanted: float | None) -> str:
-    """Of a walk by tolerances, and of one to a wanted error."""
-    return _BY_NAME if wanted is None else _BY_NUMBER
 
 
 def check_accurate_walk(accuracy: str | float, **replaced: object) -> float | None:

@@ -9,11 +9,7 @@ from jaxtyping import Array, PyTree
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.simulate._accurate_walk import (
-    accurate_walk,
-    check_accurate_walk,
-    usual_solver,
-)
+from jaxbiped.simulate._accurate_walk import accurate_walk, check_accurate_walk
 from jaxbiped.simulate._fixed_steps import warn_of_long_steps
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._accuracy import warn_of_unresolved_slip
@@ -27,7 +23,7 @@ def simulate(
     *,
     duration: float | None = None,
     footsteps: int | None = None,
-    solver: str | diffrax.AbstractSolver[PyTree] | None = None,
+    solver: str | diffrax.AbstractSolver[PyTree] = "rodas4",
     accuracy: str | float = "balanced",
     rtol: float | None = None,
     atol: float | None = None,
@@ -55,8 +51,7 @@ def simulate(
         duration: simulated time [s].
         footsteps: how many (heel strikes) to end after; with a `duration`, too, the simulation
             ends at whichever comes first, and is "walking" either way.
-        solver: a name (see `SOLVERS`) or any diffrax solver; unless given "rodas4p", for an
-            accuracy by a number "rodas4".
+        solver: a name (see `SOLVERS`) or any diffrax solver.
         accuracy: "draft", "balanced" or "tight" (see `ACCURACIES`), or finer where that would not
             resolve the slip speed over which friction builds up. Or a number: the relative error
             wanted of every state and time that is returned, lengths in units of the legs' l,
@@ -110,7 +105,7 @@ def simulate(
         state,
         duration=duration,
         footsteps=footsteps,
-        solver=usual_solver(wanted) if solver is None else solver,
+        solver=solver,
         accuracy=accuracy if isinstance(accuracy, str) else "balanced",
         rtol=rtol,
         atol=atol,
