@@ -84,13 +84,13 @@ class ContinuationSetup(NamedTuple):
         last, scene = part.points[-1], self.scene
         if not isinstance(scene, Scene) or part.stop.end not in _TOLD_BY_CONTACT:
             return part
-        beyond = last.place[-1] + _BEYOND * np.sign(last.tangent[-1])
-        here, there = (
-            with_parameters(scene, {self.axis.name: value})
-            for value in (last.value, self.axis.value(float(beyond)))
+        away = _BEYOND * float(np.sign(last.tangent[-1]))
+        here, before, beyond = (
+            with_parameters(scene, {self.axis.name: self.axis.value(float(last.place[-1]) + moved)})
+            for moved in (0.0, -away, away)
         )
         state = self.state_of(last.recurring)
-        cause = limit_cause(here, there, state, last.period)
+        cause = limit_cause(here, before, beyond, state, last.period)
         return part if cause is None else part._replace(stop=part.stop._replace(cause=cause))
 
     def branch(self, before: Trace, after: Trace) -> Branch:

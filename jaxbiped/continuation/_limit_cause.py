@@ -1,6 +1,6 @@
 """Cause of a branch's end by a limit of the model, from the walks on either side of it."""
 
-from typing import NamedTuple, cast
+from typing import cast
 
 import numpy as np
 
@@ -24,36 +24,35 @@ _SLIDES = 1.5
 _LITTLE = 0.01
 
 
-class _Contact(NamedTuple):
-    """Contact of a walk over one cycle.
-
-    Attributes:
-        at_start: force on both feet where it begins, in units of the weight.
-        slipping: share of the load, summed over time, on feet that slip faster than the speed
-            over which friction builds up.
-    """
-
-    at_start: float
-    slipping: float
-
-
-def limit_cause(here: Scene, beyond: Scene, state: WalkerState, period: float) -> str | None:
+def limit_cause(
+    here: Scene, before: Scene, beyond: Scene, state: WalkerState, period: float
+) -> str | None:
     """What a limit between two scenes comes from; None where neither touch nor slip tells.
 
     Args:
-        here, beyond: the scene of the last gait, and one just behind the limit.
+        here: the scene of the last gait; at the limit itself rounding decides whether feet slide.
+        before, beyond: scenes as far before the limit as behind it.
         state: of the last gait, on the section.
         period: of its cycle [s].
     """
-    last, next_one = (_contact(scene, state, period) for scene in (here, beyond))
-    if last.at_start < _UNLOADED:
+    if _load(here, state) < _UNLOADED:
         return "no touch: the stance foot carries nothing on the section"
-    if next_one.slipping > max(_SLIDES * last.slipping, last.slipping + _LITTLE):
+    known, found = (_slipping(scene, state, period) for scene in (before, beyond))
+    if found > max(_SLIDES * known, known + _LITTLE):
         return "slip: beyond, a foot that lands slides on"
     return None
 
 
-def _contact(scene: Scene, state: WalkerState, period: float) -> _Contact:
+def _load(scene: Scene, state: WalkerState) -> float:
+    """Force on both feet, in units of the weight."""
+    both = contacts(scene, cast(State, state)).forces
+    weight = float(scene.walker.total_mass * scene.ground.g)
+    return sum(float(force.normal) for force in both) / weight
+
+
+def _slipping(scene: Scene, state: WalkerState, period: float) -> float:
+    """Share of the load, summed over a cycle's time, on feet that slip faster than the speed over
+    which friction builds up."""
     walk = simulate(scene, cast(State, state), duration=period)
     found = contacts(scene, walk.state)
     normal = np.stack([np.asarray(force.normal) for force in found.forces])
@@ -61,6 +60,4 @@ def _contact(scene: Scene, state: WalkerState, period: float) -> _Contact:
     name = getattr(scene.friction, "builds_up_over", None)
     slow = float(getattr(scene.friction, name)) if name is not None else 0.0
     load = normal[:, 1:] * np.diff(np.asarray(walk.t))
-    weight = float(scene.walker.total_mass * scene.ground.g)
-    slipping = float(np.sum(load * (slip[:, 1:] > slow)) / max(float(np.sum(load)), 1e-300))
-    return _Contact(float(np.sum(normal[:, 0])) / weight, slipping)
+    return float(np.sum(load * (slip[:, 1:] > slow)) / max(float(np.sum(load)), 1e-300))
