@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,16 +13,20 @@ EXPERIMENTS = ROOT / "experiments"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 TEXT = " ".join(" ".join(page.read_text().split()) for page in PAGES)
 
+sys.path.append(str(EXPERIMENTS))
 _place = importlib.util.spec_from_file_location("quote", EXPERIMENTS / "quote.py")
 quote = importlib.util.module_from_spec(_place)
 _place.loader.exec_module(quote)
+import _quote_words as words  # noqa: E402 (where the path leads to it)
+import _quotes_of_gaits as gaits  # noqa: E402
+
 RESULTS = sorted(quote.RESULTS.glob("*.json"))
 
 
 def _is_said(phrase, text=TEXT):
     """Whether a text has a phrase, with anything but a cell's end where the phrase is unknown."""
-    words = map(re.escape, " ".join(phrase.split()).split(quote.UNKNOWN))
-    return re.search("[^|]*".join(words), text) is not None
+    parts = map(re.escape, " ".join(phrase.split()).split(words.UNKNOWN))
+    return re.search("[^|]*".join(parts), text) is not None
 
 
 @pytest.mark.parametrize("path", RESULTS, ids=lambda path: path.stem)
@@ -60,7 +65,7 @@ def test_another_number_is_seen():
     [(1.66e-3, "1.7e-3"), (0.2149, "2.1e-1"), (1.55, "1.6"), (2.5e4, "2.5e4"), (None, "…")],
 )
 def test_numbers_are_written_as_the_pages_do(number, said):
-    assert quote.small(number) == said
+    assert words.small(number) == said
 
 
 @pytest.mark.parametrize("untimed", [False, True])
@@ -80,7 +85,7 @@ def test_a_rung_that_was_timed_is_quoted_with_its_costs():
     numbers = json.loads((quote.RESULTS / "ladder.json").read_text())
     for cost in numbers["costs"].values():
         cost.update(single_us=231.6, batch_us=0.137, error=6.9e-5)
-    rows = [each for each in quote.of_ladder(numbers) if each.startswith("| rigid")]
+    rows = [each for each in gaits.of_ladder(numbers) if each.startswith("| rigid")]
     assert rows == ["| rigid… | 0.44378 | 0.19041 | 0.5025 | 232 µs | 0.14 µs | 6.9e-5 |"]
 
 
@@ -88,6 +93,6 @@ def test_searches_are_counted():
     """Of two families: walks settle in three scenes, and one of these is missed."""
     verdicts = [("agrees", 1), ("missed", 2), ("agrees", 1), ("none, no walk settles", -1)]
     rows = [{"verdict": verdict, "cycle": cycle} for verdict, cycle in verdicts]
-    said = list(quote.of_search_robustness({"slope": rows[:2], "random": rows[2:]}))
+    said = list(gaits.of_search_robustness({"slope": rows[:2], "random": rows[2:]}))
     assert said[0] == "of 4 scenes"
     assert said[1].endswith("cycle in 3, and the search finds all but 1 of them")

@@ -1,0 +1,217 @@
+"""What the pages quote of errors, gradients, basins and costs."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from _quote_words import UNKNOWN, percents, row, small
+
+
+def of_basin_seed(numbers: dict[str, Any]) -> Iterator[str]:
+    """How much of the slice walks, how folded boundaries are, and what changes the basin."""
+    walks, boundary = numbers["fractions"]["walking period-1"], numbers["boundary"]
+    interval = f"[{percents(walks['low'])}, {percents(walks['high'])}]"
+    yield f"Of that slice {percents(walks['estimate'])} % {interval} walks"
+    yield (
+        f"the boundary of what walks has dimension {boundary['walking or not']['dimension']:.2f}, "
+        f"that of all labels {boundary['all labels']['dimension']:.2f}"
+    )
+    for name, said in (("c", "falls with damping"), ("K", "grows with stiffness")):
+        (first, *_), *_, (last, *_) = numbers["along"][name]["walking"]
+        yield f"{said} ({percents(first)} to {percents(last)} %"
+    yield f"{min(row['distance'] for row in numbers['pushes']):.4f} (units of"
+    yield f"rays alone find {numbers['pushes'][0]['distance']:.4f}"
+
+
+def of_basin_simplest(numbers: dict[str, Any]) -> Iterator[str]:
+    """How thin the simplest walker's basin is."""
+    shares = {slope: found["fractions"][-1] for slope, found in numbers["slopes"].items()}
+    (low, first), (high, second) = shares.items()
+    yield (
+        f"{100.0 * first['estimate']:.2f} % of a square at a slope of {low} and "
+        f"{100.0 * second['estimate']:.2f} % at {high}"
+    )
+
+
+def of_gradient_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
+    """The unit multiplier's error against tolerance, stepping for the state and ours."""
+    points = numbers["points"]["exact laws"]
+    for plain, both in zip(points["plain"], points["both"], strict=True):
+        yield row(
+            small(plain["rtol"], 0),
+            str(plain["steps"]),
+            small(plain["unit_multiplier"]),
+            str(both["steps"]),
+            small(both["unit_multiplier"]),
+        )
+
+
+def of_gradient_cost(numbers: dict[str, Any]) -> Iterator[str]:
+    """CPU time over the number of parameters."""
+    costs = ("return_ms", "return_with_columns_ms", "radius_by_adjoint_ms")
+    for each in numbers["rows"]:
+        times = (f"{each[name]:.1f}" for name in costs)
+        yield row(str(each["parameters"]), *times, f"{each['radius_by_differences_ms']:.0f}")
+
+
+def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
+    """Errors of state and gradient of each way and setting, and what it says of them."""
+    for each in numbers["rows"]:
+        if each["outcome"] == "answered":
+            said = "nothing" if each["said"] is None else small(each["said"])
+            setting = f"{each['setting']} = {small(each['value'], 0)}"
+            errors = small(each["state_error"]), small(each["gradient_error"])
+            yield row(each["problem"], each["way"], setting, *errors, said)
+    damped = {
+        (each["way"], each["value"]): each
+        for each in numbers["rows"]
+        if each["problem"] == "spring and damper" and each["outcome"] == "answered"
+    }
+    ours, tsit5 = damped["jaxbiped", 1e-6], damped["diffrax Tsit5", 1e-6]
+    warp = damped["Warp", 1e-5]
+    yield f"{small(ours['gradient_error'])}, says {small(ours['said'])}"
+    yield f"diffrax {small(tsit5['gradient_error'])}, Warp {small(warp['gradient_error'])}"
+
+
+def of_footstep_truth(numbers: dict[str, Any]) -> Iterator[str]:
+    """Errors of a footstep and its gradient by each way and setting, and what it says of them."""
+    for each in numbers["rows"]:
+        said = "nothing" if each["said"] is None else small(each["said"])
+        setting = f"{each['setting']} = {small(each['value'], 0)}"
+        yield row(
+            each["way"], setting, small(each["state_error"]), small(each["gradient_error"]), said
+        )
+    yield f"changes by {small(numbers['problem']['coarser_collocation'])}"
+    yield f"differs from our finest solve by {small(numbers['problem']['our_finest'])}"
+
+
+def of_reproducibility(numbers: dict[str, Any]) -> Iterator[str]:
+    """How walks, labels and the gait differ by widths, batches, threads and engines."""
+    yield f"of {numbers['walks']} walks"
+    for each in numbers["rows"]:
+        labels, gait = each["labels"], each["gait"]
+        yield row(
+            each["name"], str(each["same_bits"]), small(each["median"]), small(each["largest"]),
+            str(each["endings"]), "–" if labels is None else str(labels),
+            "–" if gait is None else small(gait),
+        )  # fmt: skip
+
+
+def of_long_walks(numbers: dict[str, Any]) -> Iterator[str]:
+    """How a long walk keeps to its gait."""
+    period, spread = numbers["period_s"], numbers["window_std_s"]
+    yield f"after {numbers['footsteps']:,} footsteps"
+    yield f"differs from the period by {small(abs(numbers['mean_s'] / period - 1.0))} of it"
+    yield f"the largest deviation is {small(numbers['largest_deviation_s'] / period)}"
+    yield f"from {small(spread[0] / period)} in the first tenth to {small(spread[-1] / period)}"
+    low, high = numbers["peak_MiB"]
+    yield f"{low:.0f} MiB after a tenth and {high:.0f} MiB at the end"
+
+
+def of_accuracy_coverage(numbers: dict[str, Any]) -> Iterator[str]:
+    """How many true errors lie within their bars."""
+    walks, gaits = numbers["walks"], numbers["gaits"]
+    rigid = numbers["rigid"]
+    yield (
+        f"{walks['met']} of {walks['run']} walks, {rigid['met']} of {rigid['run']} rigid ones and "
+        f"{gaits['met']} of {gaits['run']} gaits"
+    )
+    for name, found in numbers["coverage"].items():
+        # Zeros have no relative error.
+        ratio = "–" if name == "multipliers of zero" else f"{found['median_ratio']:.1f}"
+        counts = ("numbers", "resolved", "covered", "scenes", "scenes_all_covered")
+        yield row(name, *(str(found[each]) for each in counts), ratio)
+
+
+def of_label_accuracy(numbers: dict[str, Any]) -> Iterator[str]:
+    """How many labels change with the tolerance, and what is known of those that do."""
+    named, starts = numbers["named"], numbers["starts"]
+    changed = {each["way"]: each for each in named["rows"]}
+    yield f"Of {starts:,} starts"
+    for name in ("draft", "balanced", "tight"):
+        each = changed[name]
+        yield row(
+            f"`{name}`", str(each["changed"]), str(each["walking_changed"]),
+            f"{each['attempted']:.0f}",
+        )  # fmt: skip
+    yield f"{named['between']['draft and tight']} labels differ between draft and tight"
+    yield f"the two references differ in {named['references_differ']}"
+    for model, found in numbers["by_number"].items():
+        for each in found:
+            yield row(
+                model, f"{each['wanted']:g}", str(each["relabelled"]), str(each["changed"]),
+                str(each["in_doubt"]), f"{each['wrong_before']} → {each['truly_wrong']}",
+                small(each["wrong_share"]), small(each["estimated_share"]),
+                f"{each['within_interval']} of {each['draws']}",
+                f"{each['met']} of {each['draws']}", f"{each['steps_ratio']:.1f}",
+            )  # fmt: skip
+
+
+def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
+    """Floors, errors of the named accuracies, and what ways cost at equal errors."""
+    floors, counts = numbers["floors"], numbers["counts"]
+    yield f"{counts['rows']} rows, {counts['failed']} of them failures"
+    for group, axis in (
+        ("walk", "state"), ("walk", "step_time"), ("walk", "energy"), ("slopes", "slopes"),
+        ("gait", "period"), ("gait", "multiplier"), ("gait", "gradient"),
+    ):  # fmt: skip
+        yield row(f"{UNKNOWN}", small(floors[group][axis]), *_named(numbers, group, axis))
+    for group, axis in (
+        ("walk", "state"), ("batch", "state"), ("slopes", "slopes"), ("gait", "multiplier"),
+        ("gait", "gradient"),
+    ):  # fmt: skip
+        table = numbers["at_equal_error"][group][axis]
+        for way, steps in table["steps"].items():
+            times = table.get("cpu_s", {}).get(way, [UNKNOWN] * len(steps))
+            if any(each is not None for each in times):
+                yield row(way, *(_milliseconds(times[k]) for k in _COMPARED))
+    for found in numbers["rows"].get("stepping", ()):
+        if found["setting"] == "rtol=1e-06":
+            yield row(
+                found["way"], str(found["attempted"]),
+                *(small(found["errors"][axis]) for axis in ("period", "gradient")),
+            )  # fmt: skip
+    laws = {"the seed's laws": "walk"} | {k: k for k in ("smoothed laws", "v0 ten times wider")}
+    for name, group in laws.items():
+        ours = (each for each in numbers["rows"][group] if each["way"] == "rodas4 by lanes")
+        (found,) = (each for each in ours if each["setting"] == "rtol=1e-06")
+        yield row(name, str(found["attempted"]), small(found["errors"]["state"]))
+
+
+def of_extremes(numbers: dict[str, Any]) -> Iterator[str]:
+    """How cases, gaits and derivatives about a graze came out."""
+    verdicts = ("run", "accurate", "flagged", "refused", "silently_wrong", "unresolved")
+    gaits = numbers["gaits"]
+    for name, found in (("walks", numbers), ("gaits", gaits)):
+        yield row(name, *(str(found[each]) for each in verdicts))
+    yield f"{numbers['run']} of the {numbers['catalogue']} cases"
+    yield f"{numbers['precise']} cases by a solve at 40 digits"
+    errors = numbers["errors"]
+    yield f"{errors['within_told']} of {errors['told']} lie within"
+    yield f"at most {errors['most_beyond_told']:.1f} times"
+    for name, median in gaits["median_error"].items():
+        yield f"{name} {small(median)} (at most {small(gaits['largest_error'][name])})"
+    for swept in numbers["grazing"]:
+        counted = (str(swept[name]) for name in ("derivatives", *verdicts[1:3], "silently_wrong"))
+        yield row(swept["law"], swept["accuracy"], *counted, small(swept["largest_accurate"]))
+
+
+_COMPARED = (1, 2, 3, 4, 5)
+"""Which of the errors at which ways are compared are quoted: 1e-3 to 1e-7."""
+
+
+def _milliseconds(seconds: float | str | None) -> str:
+    if seconds is None:
+        return "–"
+    if isinstance(seconds, str):
+        return UNKNOWN
+    return f"{1e3 * seconds:.{0 if seconds >= 1e-2 else 1}f}"
+
+
+def _named(numbers: dict[str, Any], group: str, axis: str) -> list[str]:
+    """Errors by the named accuracies, or by three tolerances where there are none."""
+    rows = numbers["rows"].get(f"named {group}")
+    if rows is None:
+        settings = ("rtol=1e-05", "rtol=1e-06", "rtol=1e-08")
+        ours = [each for each in numbers["rows"][group] if each["way"] == "rodas4 by lanes"]
+        rows = [each for name in settings for each in ours if each["setting"] == name]
+    return [small(each["errors"][axis]) for each in rows]

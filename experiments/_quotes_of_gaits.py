@@ -1,0 +1,144 @@
+"""What the pages quote of gaits, their branches, designs and models."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from _quote_words import UNKNOWN, row, small
+
+
+def of_bifurcation_elasticities(numbers: dict[str, Any]) -> Iterator[str]:
+    """How the critical slopes move with the contact's stiffness and the feet's radius."""
+    for name, found in numbers["cases"].items():
+        cells = [f"{found['slope_rad']:.6f}"]
+        for parameter in ("K", "c", "J", "d", "r"):
+            known = found["parameters"].get(parameter)
+            cells.append("–" if known is None else f"{known['elasticity']:.4f}")
+        yield row(name, *cells)
+
+
+def of_identify(numbers: dict[str, Any]) -> Iterator[str]:
+    """In how many fits the intervals hold the truth."""
+    inside = {name: each["inside_95"] for name, each in numbers["parameters"].items()}
+    yield f"{numbers['sets']} times over"
+    yield (
+        f"in {100 * inside['K']:g} % (K), {100 * inside['c']:g} % (c) and "
+        f"{100 * inside['mu_kinetic']:g} % (friction) of the fits"
+    )
+
+
+def of_ladder(numbers: dict[str, Any]) -> Iterator[str]:
+    """Measures and costs of the rungs, and the rates of the way to the rigid limit."""
+    for name, found in numbers["measures"].items():
+        cost = numbers["costs"][name]
+        timed = "batch_us" in cost
+        single, batch = cost.get("single_us"), cost.get("batch_us")
+        yield row(
+            f"{name}{UNKNOWN}",
+            f"{found['period']:.5f}",
+            f"{found['step_length']:.5f}",
+            f"{found['spectral_radius']:.4f}",
+            f"{single:.{0 if single > 100 else 1}f} µs" if timed else UNKNOWN,
+            f"{batch:.{1 if batch > 10 else 2}f} µs" if timed else UNKNOWN,
+            small(cost["error"]) if timed else UNKNOWN,
+        )
+    both, alone = (numbers["paths"][path]["rates"] for path in ("c with K", "c alone"))
+    yield (
+        f"its period differs by s^−{both['period']:.2f} and its step length by "
+        f"s^−{both['step_length']:.2f}, with c alone by s^−{alone['period']:.1f}"
+    )
+
+
+def of_force_models(numbers: dict[str, Any]) -> Iterator[str]:
+    """How far the gait moves under other laws, and what tells that a law is not to be trusted."""
+    seed = numbers["normal"]["ristow-schafer"]["measures"]
+
+    def moved(law: dict[str, Any], key: str) -> float:
+        return float(law["measures"][key] / seed[key] - 1.0)
+
+    damped = {name: law for name, law in numbers["normal"].items() if law["measures"]}
+    keys = ("period_s", "step_length_m", "speed_m_s")
+    most = max(abs(moved(law, key)) for law in damped.values() for key in keys)
+    least = min(moved(law, "peak_normal_N") for law in damped.values())
+    largest = max(moved(law, "peak_normal_N") for law in damped.values()) + 1.0
+    yield f"period, step length and speed move by at most {100 * most:.1f} %"
+    yield f"the peak force by −{-100 * least:.0f} % (Hunt–Crossley) to {largest:.1f} times"
+    yield f"(off by {numbers['normal']['tsuji']['unit_multiplier_error']:.2f})"
+
+
+def of_level_ground(numbers: dict[str, Any]) -> Iterator[str]:
+    """What the simplest walker's push-off saves, and what drives of the seed's walker cost."""
+    pairs = numbers["simplest"]
+    yield f"{pairs[0]['ratio']:.2f} times at a half-angle of {pairs[0]['angle_rad']:.2f} rad"
+    yield f"{pairs[-1]['ratio']:.2f} times at {pairs[-1]['angle_rad']:.2f} rad"
+    for name, curve in numbers["seed"].items():
+        stable = [point for point in curve if point["stable"]]
+        ends = [pick(stable, key=lambda point: point["speed_m_s"]) for pick in (min, max)]
+        speeds = [f"{end['speed_m_s']:.3f}" for end in ends]
+        yield row(name, *speeds, *[small(end["cost_of_transport"], 2) for end in ends])
+    for each in numbers["designs"]:
+        costs = [f"{each[key]:.6f}" for key in ("seed_cost", "cost_of_transport")]
+        variables = [f"{each['variables'][name]:.4f}" for name in ("impulse", "d", "J")]
+        yield row(f"{each['speed_m_s']:.2f}", *costs, *variables)
+
+
+def of_optimise_speed(numbers: dict[str, Any]) -> Iterator[str]:
+    """Optimisers on one problem, designs at no loss of speed, and what descents took."""
+    for name, each in numbers["fastest"].items():
+        best, seconds = f"{each['objective']:.4f}", f"{each['wall_s']:.1f}"
+        yield row(name, best, each["outcome"], str(each["evaluations"]), seconds)
+    for name, each in numbers["designs"].items():
+        measures, told = each["measures"], each["certificate"]
+        sizes = (f"{measures['spectral_radius']:.4f}", f"{measures['speed']:.4f}")
+        basin, norm = f"{told['basin'][0]:.3f}", f"{told['sensitivity_norm']:.2f}"
+        yield row(name, *sizes, norm, basin)
+    for name, each in numbers["descents"].items():
+        seconds = (f"{each[key]:.1f}" for key in ("warm_wall_s", "warm_cpu_s"))
+        yield row(name, str(each["iterations"]), str(each["evaluations"]), *seconds)
+
+
+def of_radius_map(numbers: dict[str, Any]) -> Iterator[str]:
+    """What a map of gaits costs."""
+    for each in numbers["rows"]:
+        seconds = (f"{each[key]:.1f}" for key in ("first_s", "then_s", "cpu_s"))
+        yield row(each["kind"], str(each["found"]), *seconds)
+
+
+def of_search_robustness(numbers: dict[str, Any]) -> Iterator[str]:
+    """How many scenes were searched, in how many walks settle, and how many were missed."""
+    rows = [each for family in numbers.values() for each in family]
+    settles = [each for each in rows if each["cycle"] >= 1]
+    missed = [each for each in settles if each["verdict"] == "missed"]
+    found = "all of them" if not missed else f"all but {len(missed)} of them"
+    yield f"of {len(rows)} scenes"
+    yield f"settle on a gait or a longer cycle in {len(settles)}, and the search finds {found}"
+
+
+def of_slope_branch(numbers: dict[str, Any]) -> Iterator[str]:
+    """Where each model of the seed's walker loses its stability, by the branch and by bisection."""
+    for name, found in numbers["scenes"].items():
+        for loss in found["losses"]:
+            kind, multiplier = loss["kind"].replace("-", " "), loss["multiplier"][0]
+            yield row(
+                name, kind, f"{loss['slope']:.9f}", f"{loss['bisection'][1]:.9f}",
+                small(abs(abs(multiplier) - 1.0)), small(loss["error"]),
+            )  # fmt: skip
+
+
+def of_period_doubling(numbers: dict[str, Any]) -> Iterator[str]:
+    """Doublings of the rigid seed and of the simplest walker, and its gaits of three footsteps."""
+    yield f"at {numbers['rigid_seed']['slope']:.6f} rad"
+    long, short = numbers["pair"]["long"], numbers["pair"]["short"]
+    yield f"θ = {long['theta']:.12f} and {short['theta']:.12f}"
+    first, second = (value for value, _ in short["multipliers"][:2])
+    yield f"multipliers {first:.4f} and {second:.4f}"
+    cascade = numbers["cascade"]
+    for footsteps, slope in zip(cascade["footsteps"], cascade["slopes"], strict=True):
+        yield row(str(footsteps), f"{slope:.9f}")
+    yield ", ".join(f"{ratio:.3f}" for ratio in cascade["ratios"])
+    chaos = numbers["chaos"]
+    yield f"accumulate at {cascade['accumulation']:.5f} rad"
+    yield f"up to {chaos['last_cycle']:.5f} rad, and none from {chaos['first_without']:.5f} on"
+    (family,) = numbers["period_three"]["branches"]
+    places = {kind: value for kind, value in family["bifurcations"]}
+    yield f"fold at {places['fold']:.6f} rad"
+    yield f"doubling at {places['period-doubling']:.6f}"
