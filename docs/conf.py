@@ -13,6 +13,8 @@ from pygments.lexers.special import TextLexer
 from sphinx.highlighting import lexers
 
 ROOT = Path(__file__).parents[1]
+# Walks are simulated for a page; else JAX tells of accelerators that it does not find.
+os.environ.setdefault("JAX_PLATFORMS", "cpu")
 sys.path[:0] = [str(ROOT / "docs" / "_ext")]
 
 project = "jaxbiped"
@@ -34,6 +36,7 @@ extensions = [
     "gallery",
     "public_names",
     "results",
+    "watched_walks",
 ]
 
 # Lessons are kept with the outputs of a run at full size; EXECUTE=force runs them again.

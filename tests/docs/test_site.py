@@ -80,6 +80,17 @@ def test_every_picture_of_the_gallery_leads_to_its_script(site):
         assert f"{picture.stem.partition('-')[0]}.py" in page
 
 
+def test_a_walk_is_played_on_its_page(served, browser):
+    browser.resize()
+    browser.driver.get(f"{served}/docs/watch.html")
+    browser.driver.switch_to.frame(browser.find("iframe"))
+    WebDriverWait(browser.driver, 20).until(lambda _: browser.run(PLAYED) > 0.0)
+
+
+PLAYED = "return Number(document.querySelector('input[type=range]')?.value ?? 0)"
+"""Where the first range of the viewer's page stands: its time."""
+
+
 def test_the_front_door_leads_to_the_index(site):
     assert 'href="docs/index.html"' in (site / "index.html").read_text()
 

@@ -1,0 +1,34 @@
+"""The walks that a page of the site plays: simulated when the site is built."""
+
+from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
+
+FOOTSTEPS = 12
+
+
+def write_page(app: Sphinx, failure: Exception | None) -> None:
+    """Puts `docs/walks.html` into a site that was built."""
+    if failure is None and app.builder.format == "html":
+        views().save(Path(app.outdir) / "docs" / "walks.html")
+
+
+def views() -> Any:
+    """The seed's walker on compliant and on rigid feet, under one clock."""
+    import jaxbiped as jb
+
+    scene, rigid = jb.seed_scene(slope=0.02), jb.ladder()["rigid"]
+    walk = jb.simulate(scene, jb.seed_state(), footsteps=FOOTSTEPS)
+    start = jb.dynamics.rigid_state(jb.seed_state())
+    rolled = jb.rigid_walk(rigid, start, footsteps=FOOTSTEPS, max_arrivals=FOOTSTEPS)
+    return jb.plot.side_by_side(
+        jb.plot.view(scene, walk, name="on compliant feet"),
+        jb.plot.view(rigid, rolled, start=start, name="on rigid feet"),
+    )
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Writes the page when all others are there."""
+    app.connect("build-finished", write_page)
+    return {"parallel_read_safe": True}
