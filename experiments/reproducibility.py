@@ -81,7 +81,8 @@ def settings_of(count: int, *, quick: bool) -> list[Setting]:
     batches = QUICK_BATCHES if quick else BATCHES
     found += [Setting(f"lanes, batches of {batch}", "lanes", batch) for batch in batches]
     found.append(Setting("lanes, start one ulp away", "lanes", count, ulps=1, sweeps=False))
-    found.append(Setting("XLA", "xla", count))
+    # Labels and the gait take XLA minutes to compile.
+    found.append(Setting("XLA", "xla", count, sweeps=not quick))
     if not quick:
         found += [
             Setting(f"XLA, batches of {batch}", "xla", batch, sweeps=False) for batch in batches
