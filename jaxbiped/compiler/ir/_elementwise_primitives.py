@@ -217,13 +217,6 @@ def _exponential(block: Block, a: Value, **_: object) -> Value:
     return _elementary(elementary.exponential)(block, a)
 
 
-def _power(block: Block, a: Value, b: Value, **_: object) -> Value:
-    """The fourth root, of which step sizes are made, by two square roots: of zero and above."""
-    if b.constant == 0.25:
-        return block.add("sqrt", block.add("sqrt", a))
-    return _elementary(powers.power)(block, a, b)
-
-
 def _same(block: Block, a: Value, **_: object) -> Value:
     return a
 
@@ -248,7 +241,7 @@ ELEMENTWISE: dict[str, Rule] = {
     "sin": _elementary(elementary.sine),
     "cos": _elementary(elementary.cosine),
     "tanh": _elementary(elementary.hyperbolic_tangent),
-    "pow": _power,
+    "pow": _elementary(powers.power),
     "integer_pow": _whole_power,
     "square": _square,
     "eq": _comparison("oeq", "eq"),

@@ -93,13 +93,6 @@ def test_special_powers_are_the_c_librarys():
     _assert_same(evaluate(jnp.power, x, y), expected)
 
 
-def test_the_fourth_root_is_two_square_roots():
-    bases = np.concatenate([10.0 ** np.random.default_rng(3).uniform(-300.0, 300.0, 1000), [0.0]])
-    found = evaluate(lambda x: x**0.25, bases)
-    np.testing.assert_array_equal(found, np.sqrt(np.sqrt(bases)))
-    np.testing.assert_allclose(found, bases**0.25, rtol=4e-16)
-
-
 def test_what_is_hardly_ever_computed_is_marked():
     assert "!prof" in compiled(jnp.log, ()).text(1)
     assert "!prof" not in compiled(jnp.exp, ()).text(1)
