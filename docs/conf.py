@@ -62,7 +62,6 @@ intersphinx_mapping: dict[str, tuple[str, None]] = {}
 
 html_theme = "furo"
 html_title = f"jaxbiped {release}"
-html_static_path = ["_static"]
 html_additional_pages = {"index": "forward.html"}
 templates_path = ["_templates"]
 html_copy_source = False
