@@ -13,7 +13,7 @@ from jaxbiped.gait._poincare_map import LinearisedReturn, seed_directions, state
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.gait._stability import Stability, stability_of
-from jaxbiped.linalg._small_matrices import eigenpairs, invert, solve
+from jaxbiped.linalg._small_matrices import eigensystem, solve
 
 CLOSENESS = 1e-3
 """Distance of a multiplier from the unit circle that is flagged as a bifurcation."""
@@ -146,6 +146,6 @@ def _map_over_rows(
 def _leading_eigenvectors(jacobian: Scalar) -> tuple[Scalar, Scalar]:
     """Right and left eigenvectors of the largest eigenvalue, wᵀ v = 1."""
     finite = jnp.all(jnp.isfinite(jacobian))
-    values, vectors = eigenpairs(jnp.where(finite, jacobian, jnp.eye(jacobian.shape[0])))
-    largest = jnp.argmax(jnp.abs(values))
-    return vectors[:, largest], invert(vectors)[largest]
+    found = eigensystem(jnp.where(finite, jacobian, jnp.eye(jacobian.shape[0])))
+    largest = jnp.argmax(jnp.abs(found.values))
+    return found.right[:, largest], found.left[largest]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.linalg._small_matrices import eigenpairs, solve
+from jaxbiped.linalg._small_matrices import eigenpairs
 
 
 class Bifurcation(enum.IntEnum):
@@ -90,9 +90,8 @@ def _nontrivial(matrix: Scalar, velocity: Scalar) -> tuple[Scalar, Scalar, Scala
     finite = jnp.all(jnp.isfinite(matrix))
     values, vectors = eigenpairs(jnp.where(finite, matrix, 0.0))
     values = jnp.where(finite, values, jnp.nan)
-    # The velocity is an eigenvector: the one that it is made of.
-    parts = solve(vectors, velocity.astype(vectors.dtype))
-    trivial = jnp.argmax(jnp.where(jnp.isfinite(jnp.abs(parts)), jnp.abs(parts), 0.0))
+    # The velocity is an eigenvector: the one that it is parallel to.
+    trivial = jnp.argmax(jnp.where(finite, jnp.abs(velocity.astype(vectors.dtype) @ vectors), 0.0))
     size = jnp.where(jnp.arange(values.shape[0]) == trivial, -1.0, jnp.abs(values))
     order = jnp.argsort(-size)[:-1]
     return values[order], vectors[:, order], jnp.abs(values[trivial] - 1.0)

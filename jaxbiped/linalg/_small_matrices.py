@@ -4,6 +4,8 @@ LAPACK's batched calls share XLA's thread pool on CPUs and wait in it for each o
 two cores wait for ever (seen with jaxlib 0.10.1).
 """
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 from jax.custom_batching import sequential_vmap
@@ -18,16 +20,33 @@ def solve(matrix: Scalar, right: Scalar) -> Scalar:
 
 
 @sequential_vmap
-def invert(matrix: Scalar) -> Scalar:
-    """The inverse."""
-    return jnp.linalg.inv(matrix)
-
-
-@sequential_vmap
 def eigenpairs(matrix: Scalar) -> tuple[Scalar, Scalar]:
     """Eigenvalues (n,) and right eigenvectors, its columns."""
     values, vectors = jax.lax.linalg.eig(matrix, compute_left_eigenvectors=False)
     return values, vectors
+
+
+class Eigensystem(NamedTuple):
+    """Eigenvalues (n,), right eigenvectors (columns) and left ones (rows), wᵀ v = 1 in pairs.
+
+    A left one is infinite or huge where its eigenvalue has fewer eigenvectors than it has places.
+    """
+
+    values: Scalar
+    right: Scalar
+    left: Scalar
+
+
+@sequential_vmap
+def eigensystem(matrix: Scalar) -> Eigensystem:
+    """Eigenvalues with eigenvectors of both sides.
+
+    Each pair is found by itself: the inverse of all right vectors would carry the parallel ones of
+    a multiple eigenvalue (the zeros of a section and of a push) into the rows of all others.
+    """
+    values, left, right = jax.lax.linalg.eig(matrix)
+    left = jnp.conj(left)
+    return Eigensystem(values, right, (left / jnp.sum(left * right, axis=0)).T)
 
 
 @sequential_vmap

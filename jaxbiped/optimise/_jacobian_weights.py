@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.linalg._small_matrices import eigenpairs, invert
+from jaxbiped.linalg._small_matrices import Eigensystem, eigenpairs, eigensystem
 
 MODULI = ("spectral_radius", "modulus_2", "modulus_3")
 """Moduli that are told apart: of a pair of conjugate multipliers once."""
@@ -41,25 +41,18 @@ class Weighed(NamedTuple):
     by_length: Scalar
 
 
-class _Eigen(NamedTuple):
-    """Eigenvalues, right eigenvectors (columns) and left ones (rows), wᵀ v = 1."""
-
-    values: Scalar
-    right: Scalar
-    left: Scalar
-
-
-def _eigen(jacobian: Scalar) -> _Eigen:
+def _eigen(jacobian: Scalar) -> Eigensystem:
     finite = jnp.all(jnp.isfinite(jacobian))
-    values, right = eigenpairs(jnp.where(finite, jacobian, jnp.eye(len(jacobian))))
-    return _Eigen(
-        values * jnp.where(finite, 1.0, jnp.nan).astype(values.dtype), right, invert(right)
-    )
+    found = eigensystem(jnp.where(finite, jacobian, jnp.eye(len(jacobian))))
+    lost = jnp.where(finite, 1.0, jnp.nan).astype(found.values.dtype)
+    return found._replace(values=found.values * lost)
 
 
-def _by_entries(eigen: _Eigen, shares: Scalar) -> Scalar:
+def _by_entries(eigen: Eigensystem, shares: Scalar) -> Scalar:
     """Derivatives Σ Re(share · dλ) with respect to the rows: dλ = wᵀ dP v."""
-    weights = jnp.einsum("i,ia,bi->ab", shares, eigen.left, eigen.right).real
+    # Zeros of multiple eigenvalues have no finite left vectors, and no share.
+    left = jnp.where(shares[:, None] == 0.0, 0.0, eigen.left)
+    weights = jnp.einsum("i,ia,bi->ab", shares, left, eigen.right).real
     return jnp.concatenate([jnp.zeros((2, len(weights))), weights])
 
 
