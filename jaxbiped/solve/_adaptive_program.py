@@ -4,6 +4,8 @@ Rounding differs, and it decides on step sizes after a few steps: the steps are 
 """
 
 import contextlib
+import functools
+import operator
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -12,6 +14,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped._ending import Ending
 from jaxbiped._types import Numbers, RealScalarLike, Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._minimal_motion import vector_field
@@ -81,7 +84,6 @@ class _Now(NamedTuple):
     control: PyTree
     accepted: Scalar
     rejected: Scalar
-    events: tuple[Scalar, ...]
     counted: Scalar
     last: LastStep | None
     extremes: tuple[PyTree, PyTree] | None
@@ -134,30 +136,25 @@ class AdaptiveSolve:
         )
         count = jnp.zeros((), dtype=jnp.int64)
         last = self.saved.first(solve.state, self.solver) if self.saved.within else None
-        events = tuple([none] * len(self.events))
         extremes = None
         if self.saved.extremes is not None:
             values = _numbers(self.saved.extremes(solve.scene, solve.state))
             extremes = (values, values)
-        return _Now(zero, next_t, solve.state, control, count, count, events, none, last, extremes)
+        return _Now(zero, next_t, solve.state, control, count, count, none, last, extremes)
 
     def attempt(self, solve: Solve, now: _Now) -> tuple[_Now, Scalar]:
         with contextlib.nullcontext() if self.fenced else without_barriers():
             y1, error, dense = step_of(
                 self.solver.tableau, _TERM, now.t, now.next_t, now.state, solve.scene
             )
+        ended = self._ended(solve.scene, now)
         error = jtu.tree_map(lambda e: jnp.where(jnp.isnan(e), jnp.inf, e), error)
+        error = error._replace(hip_x=jnp.where(ended, jnp.inf, error.hip_x))
         keep, t, next_t, _, control, result = self._controller(solve).adapt_step_size(
             now.t, now.next_t, now.state, y1, solve.scene, error, self._error_order(), now.control
         )
         t, next_t = clip_step(keep, t, next_t, solve.duration, solve.almost)
         state = select(keep, y1, now.state)
-        one = jnp.where(keep, 1, 0)
-        events, none = [], jnp.asarray(True)
-        for happens in self.events.values():
-            happened = jnp.asarray(happens(t, state, solve.scene))
-            events.append(happened & none)
-            none = none & ~happened
         counted = jnp.asarray(result != diffrax.RESULTS.successful)
         last = now.last
         if last is not None:
@@ -175,15 +172,14 @@ class AdaptiveSolve:
             next_t=next_t,
             state=state,
             control=control,
-            accepted=now.accepted + one,
-            rejected=now.rejected + (1 - one),
-            events=tuple(events),
+            accepted=now.accepted + jnp.where(keep, 1, 0),
+            rejected=now.rejected + jnp.where(keep | ended, 0, 1),
             counted=counted,
             last=last,
             extremes=self._extremes(solve.scene, now, keep, state),
         )
         attempts = (after.accepted + after.rejected).astype(solve.max_attempts.dtype)
-        over = (t >= solve.duration) | (attempts >= solve.max_attempts) | ~none | counted
+        over = (t >= solve.duration) | (attempts >= solve.max_attempts) | ended | counted
         return after, over
 
     def finish(self, solve: Solve, now: _Now) -> Solved:
@@ -195,13 +191,30 @@ class AdaptiveSolve:
             timed_out = done & few & (solve.duration >= solve.patience)
             done = done & ~timed_out
         code = ending_code(
-            dict(zip(self.events, now.events, strict=True)),
+            self._happened(solve.scene, now),
             done=done,
             out_of_steps=jnp.asarray(True),
             timed_out=timed_out,
         )
         low, high = (None, None) if now.extremes is None else now.extremes
         return Solved(now.t, now.state, code, now.accepted, now.rejected, low, high)
+
+    def _happened(self, scene: Scene, now: _Now) -> dict[Ending, Scalar]:
+        """The failure that ends a solve here, the first of them."""
+        happened: dict[Ending, Scalar] = {}
+        none = now.accepted + now.rejected > 0
+        for name, happens in self.events.items():
+            happened[name] = none & jnp.asarray(happens(now.t, now.state, scene))
+            none = none & ~happened[name]
+        return happened
+
+    def _ended(self, scene: Scene, now: _Now) -> Scalar:
+        """Whether a failure ended it before this attempt, which then changes nothing.
+
+        Asked here and not where a step ends: of the state that a step starts from, the step itself
+        needs what failures are told by.
+        """
+        return functools.reduce(operator.or_, self._happened(scene, now).values())
 
     def record(self, solve: Solve, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
         """See `Saved.record`."""

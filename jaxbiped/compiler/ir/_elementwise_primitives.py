@@ -65,13 +65,19 @@ def _extreme(float_how: str, int_how: str) -> Rule:
         if not a.kind.is_float:
             better = block.add(f"icmp {int_how}", a, b, kind=Kind.BOOL)
             return block.add("select", better, a, b, kind=a.kind)
-        # Unordered: a NaN in `a` wins; one in `b` needs a look of its own.
-        better = block.add(f"fcmp {float_how}", a, b, kind=Kind.BOOL)
+        if b.constant is not None and b.constant == 0.0:
+            # Unordered, for zeros of both signs are equal: a NaN in `a` wins.
+            better = block.add(f"fcmp u{float_how}", a, b, kind=Kind.BOOL)
+            return block.add("select", better, a, b, kind=a.kind)
+        if b.constant is not None and b.constant == b.constant:
+            a, b = b, a
+        # In this order one instruction of CPUs, for which a NaN in `b` wins.
+        better = block.add(f"fcmp o{float_how}", a, b, kind=Kind.BOOL)
         chosen = block.add("select", better, a, b, kind=a.kind)
-        if b.constant is not None:
+        if a.constant is not None and a.constant == a.constant:
             return chosen
-        missing = block.add("fcmp uno", b, b, kind=Kind.BOOL)
-        return block.add("select", missing, b, chosen, kind=a.kind)
+        missing = block.add("fcmp uno", a, a, kind=Kind.BOOL)
+        return block.add("select", missing, a, chosen, kind=a.kind)
 
     return rule
 
@@ -230,8 +236,8 @@ ELEMENTWISE: dict[str, Rule] = {
     "neg": _negative,
     "abs": _size,
     "sign": _sign,
-    "max": _extreme("ugt", "sgt"),
-    "min": _extreme("ult", "slt"),
+    "max": _extreme("gt", "sgt"),
+    "min": _extreme("lt", "slt"),
     "sqrt": _direct("sqrt"),
     "round": _round,
     "floor": _direct("floor"),
