@@ -6,8 +6,8 @@ import enum
 class Doubt(enum.IntEnum):
     """Whether a label was, or is, in doubt.
 
-    - none: all three solves gave the same label.
-    - settled: they did not; at two finer tolerances in a row two methods gave this one.
+    - none: all three solves gave the same label, and no foot grazed the ground.
+    - settled: they did not, or one did; at two finer tolerances in a row two methods gave this one.
     - remains: no two tolerances in a row did; the label is that of the finest.
     """
 

@@ -20,6 +20,7 @@ from jaxbiped.solve._solvers import with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.controllers._extremes import Extremes
 from jaxbiped.solve.controllers._footstep_limit import PATIENCE, FootstepLimit
+from jaxbiped.solve.controllers._missed_contacts import MissedContacts
 from jaxbiped.solve.controllers._shallow_contact import ShallowContact
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 
@@ -33,7 +34,7 @@ def by_xla(run: "Simulation") -> Trajectory:
     solver: diffrax.AbstractSolver[PyTree] = run.solver
     controller: PyTree = ShallowContact(step_control(run.rtol, run.atol, rms_norm, run.units))
     if run.dt is not None:
-        controller = diffrax.ConstantStepSize()
+        controller = MissedContacts(diffrax.ConstantStepSize())
         solver = with_root_tolerances(solver, run.rtol, run.atol)
     if run.footsteps is not None:
         controller = FootstepLimit(controller, run.footsteps)
@@ -62,6 +63,10 @@ def by_xla(run: "Simulation") -> Trajectory:
     if run.extremes is not None:
         watched: PyTree = control
         control, lowest, highest = watched
+    missed = None
+    if run.dt is not None:
+        counted: PyTree = control if run.footsteps is None else control[0]
+        _, missed = counted
     return Trajectory(
         t=solution.ts,
         state=solution.ys,
@@ -72,11 +77,12 @@ def by_xla(run: "Simulation") -> Trajectory:
         lowest=lowest,
         highest=highest,
         correction=run.correction,
+        missed_contacts=missed,
     )
 
 
 def _saveat(run: "Simulation") -> diffrax.SaveAt:
-    keeps = run.footsteps is not None or run.extremes is not None
+    keeps = any(each is not None for each in (run.footsteps, run.extremes, run.dt))
     if run.save_steps:
         return diffrax.SaveAt(t0=True, steps=True, dense=True, controller_state=keeps)
     if run.times is not None:

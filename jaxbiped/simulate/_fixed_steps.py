@@ -25,6 +25,19 @@ _MANY = 8
 _LONGER, _SHORTER = (2.0, 2.0**0.5), (1.0 / 2.0, 1.0 / 3.0)
 
 
+def warn_of_missed_contacts(run: Simulation, walk: Trajectory) -> None:
+    """Warns where steps of one size stepped over contacts; nothing is known while tracing."""
+    missed = walk.missed_contacts
+    if missed is None or isinstance(missed, jax.core.Tracer) or not int(missed):
+        return
+    warnings.warn(
+        f"dt = {float(run.dt):g} steps over contacts: a foot dips into the ground and leaves it "
+        f"between two steps, {int(missed)} times; take shorter steps, or tolerances.",
+        RuntimeWarning,
+        stacklevel=3,
+    )
+
+
 def warn_of_long_steps(run: Simulation, walk: Trajectory) -> None:
     """Warns where other steps of one size lead elsewhere; nothing is known while tracing.
 

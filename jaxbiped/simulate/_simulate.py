@@ -10,7 +10,7 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._accurate_walk import accurate_walk, check_accurate_walk
-from jaxbiped.simulate._fixed_steps import warn_of_long_steps
+from jaxbiped.simulate._fixed_steps import warn_of_long_steps, warn_of_missed_contacts
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._accuracy import warn_of_unresolved_slip
 from jaxbiped.solve._ending import WATCHES
@@ -68,7 +68,7 @@ def simulate(
             because friction saturates, and derivatives do not. Outside of `jit`, `vmap` and
             derivatives the walk is solved twice more, by steps 2 and √2 times as long (where there
             are few, a half and a third as long), and a `RuntimeWarning` tells where one of these
-            leads elsewhere.
+            leads elsewhere; so does one where the walk's own steps missed contacts.
         save: "steps" for every step and the continuous solution, "end" for the final state, an
             array of increasing times [s], shape (n,), at which to save, or a section (by lanes
             only), whose `arrivals` to save beside the final state: `HeelStrike()` saves the
@@ -124,5 +124,6 @@ def simulate(
         warn_of_unresolved_slip(rtol, scene.minimal)
     walk = run()
     if dt is not None:
+        warn_of_missed_contacts(run, walk)
         warn_of_long_steps(run, walk)
     return walk

@@ -62,6 +62,8 @@ class Trajectory(eqx.Module, Generic[SomeState]):
             shape (n,).
         error: its estimated errors, an `ErrorEstimate` with bars by field; None unless the
             accuracy was asked for by a number.
+        missed_contacts: how many contacts of a foot lie between two steps of one size, which
+            stepped over them; None where no `dt` was given.
         engine: what computed it, "xla" or "lanes".
     """
 
@@ -77,6 +79,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     correction: PyTree = None
     violation: Float[Array, "..."] | None = None
     error: ErrorEstimate | None = None
+    missed_contacts: Int[Array, "..."] | None = None
     engine: str = eqx.field(static=True, default="xla")
 
     def __repr__(self) -> str:

@@ -62,10 +62,19 @@ def follow_starts(
         solve = Solve(**common, almost=last, atol=atol, units=units, patience=same(np.inf))
     waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
+    # Labels by a number may doubt what grazes.
+    counted = scene.compliant and effort.wanted is not None
     if not count:
-        return _empty_outcome(len(states) - 1)
+        return _empty_outcome(len(states) - 1, grazes=counted)
     embedded = effort.embedded and not scene.compliant
-    program = _program(scene.compliant, effort.solver, cycles, effort.engine, embedded)
+    program = _program(
+        scene.compliant,
+        effort.solver,
+        cycles,
+        effort.engine,
+        embedded,
+        counted,
+    )
     engine = LANES if effort.engine == "lanes" else XLA
     given = jtu.tree_map(np.asarray, starts)
     outcome: Outcome[np.ndarray] = engine.run(Request(program, given, batch=True)).outputs
@@ -79,14 +88,15 @@ def _program(
     cycles: tuple[int, ...],
     engine: str,
     embedded: bool,
+    grazes: bool,
 ) -> Program:
     loop: AbstractLabellingLoop = RigidLabelling(cycles, embedded=embedded)
     if compliant:
-        loop = CompliantLabelling(solver, cycles, fenced=engine == "xla")
+        loop = CompliantLabelling(solver, cycles, fenced=engine == "xla", grazes=grazes)
     return Program(loop.begin, loop.attempt, loop.finish)
 
 
-def _empty_outcome(size: int) -> Outcome[np.ndarray]:
+def _empty_outcome(size: int, *, grazes: bool) -> Outcome[np.ndarray]:
     whole, real = np.zeros(0, dtype=np.int64), np.zeros(0)
     return Outcome(
         label=whole,
@@ -99,4 +109,5 @@ def _empty_outcome(size: int) -> Outcome[np.ndarray]:
         closest=real,
         attempted=whole,
         final=tuple([real] * size),
+        grazes=whole if grazes else None,
     )

@@ -4,6 +4,7 @@ import contextlib
 import json
 import shutil
 import time
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from enum import IntEnum
 from pathlib import Path
@@ -14,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from jaxtyping import PyTree
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.gait._continuation import BranchEnd
@@ -94,6 +96,18 @@ class GaitGrid:
         self.flush()
         return open_store(self._path).drop_vars(_DONE)
 
+    def warn_of_grazing(self) -> None:
+        """Warns where gaits' derivatives are not determined, as `find_gait` does of one."""
+        count = int(np.sum(self._dataset["grazes"].data > 0))
+        if count:
+            warnings.warn(
+                f"{count} of the gaits graze a switch (`grazes`), as a foot that barely touches "
+                "the ground or misses it: their multipliers are those of one side, their "
+                "sensitivities not known.",
+                RuntimeWarning,
+                stacklevel=3,
+            )
+
     @contextlib.contextmanager
     def open(self) -> Iterator[None]:
         """Within, what was found before an interrupt is not lost."""
@@ -153,7 +167,7 @@ def open_gait_grid(
         if path.exists() and any(path.iterdir()):
             check_same(path, settings)
             new = check_writers(path, writer, any_version)
-            dataset = open_store(path).load()
+            dataset = _same_variables(open_store(path).load(), dataset, path)
             if new:
                 others = [*json.loads(dataset.attrs.get(ALSO, "[]")), dict(writer)]
                 _note(path, {ALSO: json.dumps(others)})
@@ -168,6 +182,19 @@ def open_gait_grid(
     except OSError as error:
         raise unwritable(path, error) from None
     return GaitGrid(dataset, state, path)
+
+
+def _same_variables(
+    stored: "xarray.Dataset", here: "xarray.Dataset", path: Path
+) -> "xarray.Dataset":
+    """What a store holds; another version may have kept less in it."""
+    missing = sorted(set(map(str, here.data_vars)) - set(map(str, stored.data_vars)))
+    if missing:
+        raise ArgumentError(
+            f"store = {str(path)!r} was written by a version that kept no {missing[0]}: give it "
+            "another store."
+        )
+    return stored
 
 
 def _note(path: Path, attributes: JsonObject) -> None:
@@ -230,4 +257,5 @@ def _variables(gait: Gait) -> dict[str, tuple[tuple[str, ...], np.ndarray, JsonO
     add("multiplier_imag", np.imag(gait.multipliers), "", "multiplier")
     add("unit_multiplier_error", gait.unit_multiplier_error, "")
     add("residual", gait.residual, "SI")
+    add("grazes", gait.grazes, "")
     return rows

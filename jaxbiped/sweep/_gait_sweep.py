@@ -75,7 +75,8 @@ def gait_sweep(
     Returns:
         A dataset along the swept parameters, SI units: the measures, `state_…`, multipliers,
         `sensitivity_…` and their errors along `parameter`, `ending`, `found_by` and `branch_end`
-        (codes, whose names are in the attributes); NaN where there is no gait.
+        (codes, whose names are in the attributes), and `grazes`, see `Gait`; NaN where there is no
+        gait. A `RuntimeWarning` tells where gaits graze a switch.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled; a store of
@@ -129,6 +130,7 @@ def gait_sweep(
             if not grid.is_done(centre, found=False):
                 grid.write(centre, first)
             GaitWaves(scene, values, (centre, first), grid, options, search_alone, bar.update).run()
+            grid.warn_of_grazing()
             return grid.dataset()
         for again in (False, True):
             for place in order:

@@ -27,6 +27,8 @@ class Labelled(NamedTuple):
         doubt, disagreed, changed: where the accuracy was asked for by a number, codes of `Doubt`,
             sums of codes of `Witness`, and whether finer tolerances gave another label than the
             first; else None.
+        grazes: steps in which a foot touches the ground or misses it by less than the tolerance
+            resolves, where the accuracy was asked for by a number and the walker is compliant.
     """
 
     label: np.ndarray
@@ -42,6 +44,7 @@ class Labelled(NamedTuple):
     doubt: np.ndarray | None = None
     disagreed: np.ndarray | None = None
     changed: np.ndarray | None = None
+    grazes: np.ndarray | None = None
 
     @property
     def names(self) -> np.ndarray:

@@ -100,6 +100,7 @@ class Labelling(eqx.Module):
             closest=outcome.closest,
             attempted=outcome.attempted.astype(np.int32),
             final=np.stack(outcome.final, axis=1),
+            grazes=None if outcome.grazes is None else outcome.grazes.astype(np.int32),
         )
 
     def base(self, parameters: Mapping[str, np.ndarray], count: int) -> PyTree:

@@ -27,13 +27,13 @@ from jaxbiped.solve._rigid_steps import (
 )
 from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.sweep._arrival_time import arrival_time
 from jaxbiped.sweep._convergence_test import UNDECIDED, ArrivalHistory, after_arrival, empty_history
 from jaxbiped.sweep._goals import Goals
+from jaxbiped.sweep._grazes import grazes
 from jaxbiped.sweep._sliding import contact_places, slip_distances
 
 _Number = TypeVar("_Number")
-_SECANTS = 8
-"""By which an arrival within a step is located, to rounding."""
 
 
 class Start(NamedTuple):
@@ -53,7 +53,10 @@ class Start(NamedTuple):
 
 
 class Outcome(NamedTuple, Generic[_Number]):
-    """What became of one start; see `Labelled`. `final` is the last state on the section."""
+    """What became of one start; see `Labelled`. `final` is the last state on the section.
+
+    `grazes` counts steps in which a foot grazed the ground, where that is asked for.
+    """
 
     label: _Number
     goal: _Number
@@ -65,6 +68,7 @@ class Outcome(NamedTuple, Generic[_Number]):
     closest: _Number
     attempted: _Number
     final: tuple[_Number, ...]
+    grazes: _Number | None = None
 
 
 class Progress(NamedTuple):
@@ -75,12 +79,14 @@ class Progress(NamedTuple):
         trace: see there.
         strike: time of the last footstep [s].
         landed: where each foot came down; see `slip_distances`. None for a rigid walker.
+        grazes: steps that grazed so far; None where they are not counted.
     """
 
     solve: PyTree
     trace: ArrivalHistory
     strike: Scalar
     landed: tuple[Scalar, Scalar] | None
+    grazes: Scalar | None = None
 
 
 class AbstractLabellingLoop(abc.ABC):
@@ -105,13 +111,19 @@ class CompliantLabelling(AbstractLabellingLoop):
     Attributes:
         cycles: footsteps in a cycle of each known gait.
         steps: the solver's steps and endings.
+        grazes: whether steps that graze are counted.
     """
 
     def __init__(
-        self, solver: AbstractRosenbrock, cycles: tuple[int, ...], *, fenced: bool
+        self,
+        solver: AbstractRosenbrock,
+        cycles: tuple[int, ...],
+        *,
+        fenced: bool,
+        grazes: bool = False,
     ) -> None:
         """`fenced`: whether XLA is to compile it."""
-        self.cycles = cycles
+        self.cycles, self.grazes = cycles, grazes
         saved = Saved(times=True)  # the last step's continuous solution
         self.steps = AdaptiveSolve(solver, WATCHES, counting=True, saved=saved, fenced=fenced)
 
@@ -120,7 +132,8 @@ class CompliantLabelling(AbstractLabellingLoop):
         zero = jnp.zeros_like(solve.duration)
         trace = empty_history(zero, len(solve.state) - 1, self.cycles)
         landed = contact_places(solve.scene, solve.state)
-        return Progress(self.steps.start(solve), trace, zero, landed)
+        count = jnp.zeros((), dtype=jnp.int64) if self.grazes else None
+        return Progress(self.steps.start(solve), trace, zero, landed, count)
 
     def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
         solve: Solve = start.solve
@@ -135,7 +148,12 @@ class CompliantLabelling(AbstractLabellingLoop):
         verdict = jnp.where(late, int(Label.TIMED_OUT), trace.verdict)
         verdict = jnp.where(slid > solve.scene.walker.l, int(Label.SLID), verdict)
         trace = trace._replace(verdict=verdict)
-        return Progress(after, trace, strike, landed), over | (verdict != UNDECIDED)
+        count = now.grazes
+        if count is not None:
+            span = after.t - now.solve.t
+            grazed = grazes(solve.scene, span, now.solve.state, after.state, solve.rtol)
+            count = count + jnp.where(grazed, 1, 0)
+        return Progress(after, trace, strike, landed, count), over | (verdict != UNDECIDED)
 
     def finish(self, start: Start, now: Progress) -> Outcome[Scalar]:
         solved = self.steps.finish(start.solve, now.solve)
@@ -147,7 +165,7 @@ class CompliantLabelling(AbstractLabellingLoop):
             time=solved.t,
             distance=solved.state.hip_x - start.solve.state.hip_x,
             attempted=solved.accepted + solved.rejected,
-        )
+        )._replace(grazes=now.grazes)
 
     def _traced(self, start: Start, now: Progress, after: PyTree) -> ArrivalHistory:
         """After the last step, within which it may have arrived at mid-stance."""
@@ -173,35 +191,12 @@ class CompliantLabelling(AbstractLabellingLoop):
             def value(time: Scalar) -> Scalar:
                 return section.value(scene, at(time))
 
-            time = _root(value, last.t, after.t)
+            time = arrival_time(value, last.t, after.t)
             return after_arrival(
                 now.trace, _recurring_components(at(time)), start.goals, self.cycles, start.gap
             )
 
         return _trace_or(arrives, on_section, now.trace)
-
-
-def _root(value: Callable[[Scalar], Scalar], low: Scalar, high: Scalar) -> Scalar:
-    """Where a function rises through zero between two times, by the Illinois method."""
-
-    def secant(_: Scalar, now: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
-        a, b, at_a, at_b, side, _ = now
-        rise = at_b - at_a
-        middle = b - at_b * (b - a) / jnp.where(rise == 0.0, 1.0, rise)
-        found = value(middle)
-        left = found < 0.0
-        # An end that stays twice counts half, so that it moves the next time.
-        return (
-            jnp.where(left, middle, a),
-            jnp.where(left, b, middle),
-            jnp.where(left, found, jnp.where(side > 0.0, 0.5 * at_a, at_a)),
-            jnp.where(left, jnp.where(side < 0.0, 0.5 * at_b, at_b), found),
-            jnp.where(left, -1.0, 1.0),
-            middle,
-        )
-
-    start = (low, high, value(low), value(high), jnp.zeros_like(low), high)
-    return jax.lax.fori_loop(0, _SECANTS, secant, start)[-1]
 
 
 class RigidLabelling(AbstractLabellingLoop):

@@ -38,9 +38,10 @@ def settled_labels(
 ) -> Labelled:
     """Labels of n starts, solved again where they are in doubt; no start's depends on another's.
 
-    In doubt is what a ten times looser tolerance or another method of steps labels otherwise. It is
-    solved by both methods at ten times finer tolerances, until all four labels of two tolerances in
-    a row agree; where they never do the doubt remains.
+    In doubt is what a ten times looser tolerance or another method of steps labels otherwise, and
+    what grazes the ground: whether there was a contact may decide. It is solved by both methods at
+    ten times finer tolerances, until all four labels of two tolerances in a row agree; where they
+    never do the doubt remains.
 
     Args:
         follow: labels starts with an effort.
@@ -59,8 +60,9 @@ def settled_labels(
     # A copy: what is settled is written into it.
     label = jtu.tree_map(np.array, first)
     label.attempted[:] += looser.attempted + other.attempted
-    doubt = np.where(disagreed > 0, int(Doubt.REMAINS), int(Doubt.NONE))
-    open_ = np.flatnonzero(disagreed)
+    doubtful = disagreed > 0 if first.grazes is None else (disagreed > 0) | (first.grazes > 0)
+    doubt = np.where(doubtful, int(Doubt.REMAINS), int(Doubt.NONE))
+    open_ = np.flatnonzero(doubtful)
     agree, finer, finest = agree[open_], effort, _FINEST[scene.compliant]
     while len(open_) and finer.rtol > 1.001 * finest:
         finer = finer.at_tolerance(max(finer.rtol / _FINER, finest))

@@ -66,7 +66,14 @@ def seen_of(doubt: np.ndarray, disagreed: np.ndarray, changed: np.ndarray) -> Se
     """What the witnesses saw of some starts, from their `Labelled` fields."""
     moved = (changed > 0) & (doubt == int(Doubt.SETTLED))
     looser, other = (moved & (disagreed & int(who) > 0) for who in Witness)
-    parts = (disagreed > 0, changed > 0, doubt == int(Doubt.REMAINS), looser, other, looser & other)
+    parts = (
+        doubt != int(Doubt.NONE),
+        changed > 0,
+        doubt == int(Doubt.REMAINS),
+        looser,
+        other,
+        looser & other,
+    )
     return Seen(doubt.size, *[int(part.sum()) for part in parts])
 
 

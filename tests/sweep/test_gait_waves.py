@@ -1,5 +1,7 @@
 """Sweeps in waves: gaits are those of single searches, whatever was killed or failed on the way."""
 
+import shutil
+
 import numpy as np
 import pytest
 import xarray
@@ -7,6 +9,7 @@ import xarray
 import jaxbiped as jb
 from jaxbiped.sweep import _gait_waves
 from jaxbiped.sweep._gait_batch import find_each
+from jaxbiped.sweep._zarr_store import consolidate
 
 pytestmark = pytest.mark.slow
 
@@ -98,3 +101,25 @@ def test_where_there_is_no_gait_the_branch_end_is_told():
     assert int(found.branch_end[0]) == int(jb.gait.BranchEnd.FOLD)
     assert np.isnan(float(found.period[0]))
     assert np.all(found.spectral_radius[1:] < 1.0)
+
+
+def test_gaits_of_a_batch_that_graze_are_told(tmp_path):
+    """At that damping the foot that strikes rebounds until it all but leaves the ground."""
+    grazing, path = 152234.28, tmp_path / "gaits"
+    over = {"c": np.sort([grazing, *np.geomspace(1.4e5, 1.66e5, 63)])}
+    with pytest.warns(RuntimeWarning, match="1 of the gaits graze a switch"):
+        found = jb.gait_sweep(jb.seed_scene(), over, store=path, **PLAIN)
+    assert found.grazes.sum() == found.grazes.sel(c=grazing) == 1
+    assert np.all(np.isnan(found.elasticity_period.sel(c=grazing)))
+    assert np.isfinite(found.elasticity_period).sum() == 63
+    with pytest.warns(RuntimeWarning, match="1 of the gaits graze a switch"):
+        jb.gait_sweep(jb.seed_scene(), over, store=path, **PLAIN)  # all of it known
+
+
+def test_a_store_that_kept_less_is_refused(tmp_path):
+    path, over = tmp_path / "gaits", {"slope": [0.02]}
+    jb.gait_sweep(jb.seed_scene(), over, store=path, **PLAIN)
+    shutil.rmtree(path / "grazes")
+    consolidate(path)
+    with pytest.raises(jb.ArgumentError, match="kept no grazes"):
+        jb.gait_sweep(jb.seed_scene(), over, store=path, **PLAIN)

@@ -1,5 +1,6 @@
 """Doubt about labels, on a made-up boundary and on starts whose labels are known to be hard."""
 
+import jax
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -67,6 +68,20 @@ def test_what_never_agrees_is_flagged_and_not_silently_labelled():
     assert seen_of(found.doubt, found.disagreed, found.changed).in_doubt == 1
 
 
+def test_what_grazes_is_in_doubt_whoever_agrees():
+    plain, grazes = _followed(np.ones(4)), np.array([0, 2, 0, 0], dtype=np.int32)
+
+    def follow(places, effort):
+        own = grazes[places] if effort.rtol == EFFORT.rtol else 0 * places
+        return plain(places, effort)._replace(grazes=own)
+
+    found = settled_labels(follow, 4, EFFORT, SCENE)
+    assert found.doubt.tolist() == [0, int(jb.basins.Doubt.SETTLED), 0, 0]
+    assert not found.disagreed.any()
+    counted = seen_of(found.doubt, found.disagreed, found.changed)
+    assert (counted.relabelled, counted.changed, counted.looser, counted.other) == (1, 0, 0, 0)
+
+
 @given(st.lists(st.floats(-1e-3, 1e-3), min_size=1, max_size=12), st.data())
 @settings(max_examples=40, deadline=None)
 def test_no_starts_label_depends_on_another(distances, data):
@@ -74,7 +89,7 @@ def test_no_starts_label_depends_on_another(distances, data):
     whole = settled_labels(_followed(distances), len(distances), EFFORT, SCENE)
     one = data.draw(st.integers(0, len(distances) - 1))
     alone = settled_labels(_followed(distances[[one]]), 1, EFFORT, SCENE)
-    same(alone, Labelled(*[leaf[[one]] for leaf in whole]))
+    same(alone, jax.tree.map(lambda leaf: leaf[[one]], whole))
     settled = whole.doubt == jb.basins.Doubt.SETTLED
     np.testing.assert_array_equal(whole.label[settled], distances[settled] > 0.0)
 

@@ -1,0 +1,73 @@
+"""Fixed steps: contacts between two of them are told, against equations written anew."""
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.extremes._case import check_numbers
+from jaxbiped.extremes._check_solve import scales, states_of
+from jaxbiped.extremes._grazing import _START, _TIME, _lowest
+from jaxbiped.scene._clearance import AlwaysTouching
+
+pytestmark = pytest.mark.slow
+
+LAW = jb.laws.normal_law_like("kelvin-voigt", K=1e6, c=1e7, n=1.5, mass=2.0)
+SCENE = dataclasses.replace(
+    jb.seed_scene(), normal=LAW, clearance=AlwaysTouching()
+)  # its force jumps at touchdown, so that even a shallow contact is felt
+NUMBERS = check_numbers(SCENE)
+DEPTH, LONG, SHORT = 1e-7, 3.196e-4, 1e-5
+"""Of the contact had there been no ground [m]; steps that miss it, and that do not [s]."""
+
+
+def walk(depth, dt, **options):
+    start = _START.copy()
+    start[1] = _START[1] - _lowest(NUMBERS) - depth
+    how = dict(duration=_TIME, dt=dt, solver="rodas5p", watch=(), save="end") | options
+    found = jb.simulate(SCENE, jb.State(*map(jnp.asarray, start)), **how)
+    truth = states_of(start, NUMBERS, _TIME, 1e-13, points=12000)[-1]
+    apart = np.abs(np.array(found.final) - truth) / scales(NUMBERS, 8)
+    return int(found.missed_contacts), float(np.max(apart))
+
+
+def test_a_contact_between_two_steps_is_told():
+    with pytest.warns(RuntimeWarning, match="dt = 0.0003196 steps over contacts") as told:
+        missed, error = walk(DEPTH, LONG)
+    assert missed == 1
+    assert error > 1e-3
+    assert len(told) == 1  # walks by longer steps miss it, too
+
+
+@pytest.mark.parametrize(("depth", "dt"), [(DEPTH, SHORT), (-DEPTH, LONG)])
+def test_where_there_is_none_nothing_is_told(depth, dt, recwarn):
+    missed, error = walk(depth, dt)
+    assert missed == 0
+    assert error < 1e-4
+    assert not [each for each in recwarn if each.category is RuntimeWarning]
+
+
+@pytest.mark.parametrize("options", [{"footsteps": 1}, {"extremes": lambda scene, y: y.hip_z}])
+def test_they_are_counted_beside_footsteps_and_extremes(options):
+    with pytest.warns(RuntimeWarning, match="steps over contacts"):
+        assert walk(DEPTH, LONG, **options)[0] == 1
+
+
+def test_each_of_a_batch_counts_its_own():
+    height = _START[1] - _lowest(NUMBERS)
+
+    def missed(z):
+        start = jb.State(*map(jnp.asarray, _START))._replace(hip_z=z)
+        how = dict(duration=_TIME, dt=LONG, solver="rodas5p", watch=(), save="end")
+        return jb.simulate(SCENE, start, **how).missed_contacts
+
+    found = jax.vmap(missed)(height - jnp.array([DEPTH, -DEPTH]))
+    assert found.tolist() == [1, 0]
+
+
+def test_by_tolerances_nothing_is_counted():
+    found = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=1e-3, save="end")
+    assert found.missed_contacts is None

@@ -1,0 +1,43 @@
+"""Grazes of walks that are labelled: counted where a foot touches or misses by a hair, else not."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.extremes._case import check_numbers
+from jaxbiped.extremes._grazing import _START, _lowest
+from jaxbiped.scene._clearance import AlwaysTouching
+from jaxbiped.sweep._effort import effort_of
+
+pytestmark = pytest.mark.slow
+
+LAW = jb.laws.normal_law_like("kelvin-voigt", K=1e6, c=1e7, n=1.5, mass=2.0)
+SCENE = dataclasses.replace(jb.seed_scene(), normal=LAW, clearance=AlwaysTouching())
+DEPTHS = np.array([1e-4, 2e-8, 1e-9, -1e-9, -2e-8, -1e-4])
+"""How deep a swinging foot would come had there been no ground [m]; known to 1.2e-6 m."""
+
+
+@pytest.fixture(scope="module")
+def states():
+    touching = _START[1] - _lowest(check_numbers(SCENE))
+    columns = [np.full(len(DEPTHS), value) for value in _START]
+    columns[1] = touching - DEPTHS
+    return jb.State(*columns)
+
+
+@pytest.mark.parametrize("solver", ["rodas4", "rodas5p"])
+def test_starts_whose_walk_grazes_are_counted(states, solver):
+    # Of the seed's gait, for only the way is looked at.
+    label = jb.labelling(jb.seed_scene(), accuracy=1e-3)
+    label = dataclasses.replace(label, scene=SCENE)
+    effort = effort_of(SCENE, accuracy=1e-3, solver=solver, footsteps=1)
+    told = label._followed(states, {}, effort)
+    assert np.array_equal(told.grazes > 0, np.abs(DEPTHS) < 1e-6)
+    plain = label._followed(states, {}, effort._replace(wanted=None))
+    assert plain.grazes is None
+    for name in ("label", "footsteps", "time", "distance", "attempted"):
+        np.testing.assert_array_equal(getattr(told, name), getattr(plain, name))
+    found = label(states)
+    assert np.all(found.doubt[np.abs(DEPTHS) < 1e-6] > 0)
