@@ -1,12 +1,14 @@
 """Closed form of a ball that bounces on a spring: the truth for gradients through contact.
 
 A point mass falls on a floor that pushes back with K δ + c dδ/dt where that is positive (δ is the
-depth) and never pulls. Each phase is a linear equation with a known solution, and only the times
-between them are roots; derivatives are central differences at 60 digits. No simulator is involved.
+depth) and never pulls. Floors that damp only while the ball sinks are known, too. Each phase is a
+linear equation with a known solution, and only the times between them are roots; derivatives are
+central differences at 60 digits. No simulator is involved.
 """
 
 import dataclasses
 import functools
+from collections.abc import Callable
 from typing import Any
 
 from mpmath import mp, mpf
@@ -29,7 +31,8 @@ class Problem:
         c: damping of the floor [N s/m].
         duration: when its state is asked for [s].
         weight_in_contact: share of gravity that acts during contact: 1 in nature; the constraints
-            of some simulators cancel most of it.
+            of some simulators cancel most or all of it.
+        damps_rebound: whether the damper acts while the ball rises, too: that of some does not.
     """
 
     name: str
@@ -39,6 +42,7 @@ class Problem:
     c: float
     duration: float
     weight_in_contact: float = 1.0
+    damps_rebound: bool = True
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -118,22 +122,53 @@ def _final(values: dict[str, Any]) -> tuple[Any, Any, int]:
 def _contact(values: dict[str, Any], speed: Any, longest: Any) -> tuple[Any, Any, Any]:
     """Duration of a contact that begins at this speed, with height and velocity at its end."""
     K, c, g = values["K"], values["c"], values["g"] * values["weight_in_contact"]
-    omega = mp.sqrt(K - c * c / 4)
-    rest = g / K
+    if values["damps_rebound"]:
+        return _until_forceless(K, c, g, (mpf(0), speed), longest)
+    sunk = _phase(K, c, g, (mpf(0), speed))
+    turn = mp.findroot(lambda t: sunk(t)[1], _about(K, c, "0.4", "0.6"))
+    if turn >= longest:
+        depth, rate = sunk(longest)
+        return turn, -depth, -rate
+    span, z, v = _until_forceless(K, mpf(0), g, sunk(turn), longest - turn)
+    return turn + span, z, v
 
-    def at(t: Any) -> tuple[Any, Any]:
-        """Depth and its rate: K δ + c δ' + δ'' = g, from δ = 0 and δ' = speed."""
-        sine = (speed - c / 2 * rest) / omega
-        decay, cos, sin = mp.exp(-c / 2 * t), mp.cos(omega * t), mp.sin(omega * t)
-        depth = rest + decay * (sine * sin - rest * cos)
-        rate = decay * ((sine * omega + c / 2 * rest) * cos + (rest * omega - c / 2 * sine) * sin)
-        return depth, rate
+
+def _until_forceless(K: Any, c: Any, g: Any, begin: Any, longest: Any) -> tuple[Any, Any, Any]:
+    """How long the floor pushes from a depth and its rate on, with height and velocity then."""
+    at = _phase(K, c, g, begin)
 
     def force(t: Any) -> Any:
         depth, rate = at(t)
         return K * depth + c * rate
 
-    span = mp.findroot(force, (mpf("0.9") * mp.pi / omega, mpf("1.05") * mp.pi / omega))
-    end = min(span, longest)
-    depth, rate = at(end)
+    first, last = ("0.9", "1.05") if begin[0] == 0 else ("0.4", "0.6")
+    span = mp.findroot(force, _about(K, c, first, last))
+    depth, rate = at(min(span, longest))
     return span, -depth, -rate
+
+
+def _phase(K: Any, c: Any, g: Any, begin: Any) -> Callable[[Any], tuple[Any, Any]]:
+    """Depth and its rate over time: K δ + c δ' + δ'' = g from a depth and its rate."""
+    omega, rest = _frequency(K, c), g / K
+    cosine = begin[0] - rest
+    sine = (begin[1] + c / 2 * cosine) / omega
+
+    def at(t: Any) -> tuple[Any, Any]:
+        decay, cos, sin = mp.exp(-c / 2 * t), mp.cos(omega * t), mp.sin(omega * t)
+        depth = rest + decay * (sine * sin + cosine * cos)
+        rate = decay * (
+            (sine * omega - c / 2 * cosine) * cos - (cosine * omega + c / 2 * sine) * sin
+        )
+        return depth, rate
+
+    return at
+
+
+def _frequency(K: Any, c: Any) -> Any:
+    return mp.sqrt(K - c * c / 4)
+
+
+def _about(K: Any, c: Any, first: str, last: str) -> tuple[Any, Any]:
+    """Two times about a root, in halves of a period."""
+    half = mp.pi / _frequency(K, c)
+    return mpf(first) * half, mpf(last) * half

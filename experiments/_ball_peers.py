@@ -1,4 +1,4 @@
-"""Simulators of others on the bouncing ball, where they are installed: MuJoCo MJX and Warp.
+"""Simulators of others on the bouncing ball, where installed: MuJoCo MJX, Brax, Warp and Newton.
 
 MuJoCo's soft constraints cancel the share `IMPEDANCE` of all other forces while they act: its ball
 has a truth of its own, in the same closed form.
@@ -10,7 +10,10 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
+from _ball_brax import brax_law, by_brax
 from _ball_closed_form import Problem
+from _ball_newton import TIME_STEPS as NEWTON_STEPS
+from _ball_newton import by_newton, newton_law
 from _ball_ways import TIME_STEPS, Answer, Run, Way, differentiate
 
 IMPEDANCE = 0.9999
@@ -128,5 +131,7 @@ def _warp_kernel(wp: Any) -> Any:
 
 PEERS = (
     Way("MuJoCo MJX", "dt", TIME_STEPS, by_mjx, "mujoco", mujoco_law),
+    Way("Brax", "dt", TIME_STEPS, by_brax, "brax", brax_law),
     Way("Warp", "dt", TIME_STEPS, by_warp, "warp"),
+    Way("Newton", "dt", NEWTON_STEPS, by_newton, "newton", newton_law),
 )

@@ -2,6 +2,7 @@
 
 import importlib.util
 from collections.abc import Callable
+from typing import Any
 
 import _independent
 import numpy as np
@@ -12,13 +13,12 @@ def sensitivities(duration: float, rtol: float) -> Callable[[], tuple[np.ndarray
     import casadi
 
     y, logs = casadi.SX.sym("y", 8), casadi.SX.sym("logs", 3)
-    rates = _rates(casadi, y, logs)
-    options = dict(
-        reltol=rtol, abstol=1e-2 * rtol, fsens_err_con=True, max_num_steps=1000000, jit=True,
-        compiler="shell", jit_options=dict(flags="-O3 -march=native", verbose=False),
-    )  # fmt: skip
-    problem = dict(x=y, p=logs, ode=rates)
-    solver = casadi.integrator("walk", "cvodes", problem, 0.0, duration, options)
+    stiffness, damping, decay = (
+        value * casadi.exp(logs[i]) for i, value in enumerate(_independent.LAWS)
+    )
+    seed = (stiffness, damping, *_independent.COEFFICIENTS, decay)
+    problem = dict(x=y, p=logs, ode=rates(casadi, y, seed))
+    solver = casadi.integrator("walk", "cvodes", problem, 0.0, duration, options(rtol))
     both = solver.factory("both", ["x0", "p"], ["xf", "jac:xf:p"])
     zero = np.zeros(3)
 
@@ -33,11 +33,25 @@ def is_installed() -> bool:
     return importlib.util.find_spec("casadi") is not None
 
 
-def _rates(casadi, y, logs):
+def options(rtol: float) -> dict[str, Any]:
+    """Of CVODES: compiled, its sensitivities under the tolerance, too."""
+    return dict(
+        reltol=rtol, abstol=1e-2 * rtol, fsens_err_con=True, max_num_steps=1000000, jit=True,
+        compiler="shell", jit_options=dict(flags="-O3 -march=native", verbose=False),
+    )  # fmt: skip
+
+
+def laws(casadi, logs):
+    """K, c, both coefficients of friction, moved by logarithms, and ξ."""
     w = _independent
-    stiffness, damping, decay = (
-        value * casadi.exp(logs[i]) for i, value in enumerate((w.STIFFNESS, w.DAMPING, w.DECAY))
-    )
+    values = (w.STIFFNESS, w.DAMPING, w.STATIC, w.KINETIC)
+    return *(value * casadi.exp(logs[i]) for i, value in enumerate(values)), w.DECAY
+
+
+def rates(casadi, y, laws):
+    """Rates of the state (8,) by K, c, both coefficients of friction and ξ."""
+    w = _independent
+    stiffness, damping, static, kinetic, decay = laws
     hip_z, vx, vz = y[1], y[4], y[5]
     arm, moment, total = w.LENGTH - w.RADIUS, w.MASS * w.CENTRE, 2.0 * w.MASS
     legs = []
@@ -50,9 +64,9 @@ def _rates(casadi, y, logs):
         normal = casadi.if_else(casadi.logic_and(held, force > 0), force, 0.0)
         slip = vx + arm * c * rate + w.RADIUS * rate
         speed = casadi.fabs(slip)
-        rising = w.STATIC * (1.0 - ((speed - w.PEAK_SPEED) / w.PEAK_SPEED) ** 2)
+        rising = static * (1.0 - ((speed - w.PEAK_SPEED) / w.PEAK_SPEED) ** 2)
         beyond = casadi.fmax(speed - w.PEAK_SPEED, 0.0)
-        falling = w.KINETIC + (w.STATIC - w.KINETIC) * casadi.exp(-decay * beyond)
+        falling = kinetic + (static - kinetic) * casadi.exp(-decay * beyond)
         size = normal * casadi.if_else(speed < w.PEAK_SPEED, rising, falling)
         along = -casadi.sign(slip) * size
         turn = moment * (c * w.PULL_X + s * w.PULL_Z)

@@ -1,14 +1,17 @@
-"""Another way to differentiate a footstep: differences of SciPy's solves.
+"""Other ways to differentiate a footstep, and differences of SciPy's solves.
 
-As its users would write it: an event ends the solve where leg 1 is upright.
+As its users would write these: an event ends the solve where leg 1 is upright.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
+import diffrax
 import numpy as np
 from _ball_ways import Answer, Run, relative_error
+from _footstep_casadi import by_cvodes
 from _footstep_equations import LAWS, PARAMETERS, START
+from _footstep_jax import KVAERNO5, by_diffrax, by_semi_implicit_euler
 from _footstep_ways import INPUTS, UPRIGHT
 from _independent import LAWS as STIFFNESS_DAMPING_DECAY
 from _independent import right_hand_side
@@ -20,24 +23,28 @@ LONGEST = 1.0
 """No footstep takes as long [s]."""
 
 
-def by_scipy(truth: Answer, rtol: float) -> Run:
-    """Central differences of Radau's solves, by the best of four steps: the truth chooses it."""
+def differences_of(method: str) -> Callable[[Answer, float], Run]:
+    """Central differences of a method's solves, by the best of four steps: the truth chooses it."""
 
-    def differences(step: float) -> Answer:
-        columns = []
-        for name in INPUTS:
-            up, down = (_end(name, sign * step, rtol) for sign in (1.0, -1.0))
-            columns.append((up - down) / (2.0 * step))
-        return _without_upright(_end(INPUTS[0], 0.0, rtol), np.stack(columns, axis=1))
+    def prepare(truth: Answer, rtol: float) -> Run:
+        def differences(step: float) -> Answer:
+            columns = []
+            for name in INPUTS:
+                up, down = (_end(method, name, sign * step, rtol) for sign in (1.0, -1.0))
+                columns.append((up - down) / (2.0 * step))
+            middle = _end(method, INPUTS[0], 0.0, rtol)
+            return _without_upright(middle, np.stack(columns, axis=1))
 
-    def off(step: float) -> float:
-        return relative_error(differences(step).gradient, truth.gradient)
+        def off(step: float) -> float:
+            return relative_error(differences(step).gradient, truth.gradient)
 
-    best = min(DIFFERENCES, key=off)
-    return lambda: differences(best)
+        best = min(DIFFERENCES, key=off)
+        return lambda: differences(best)
+
+    return prepare
 
 
-def _end(name: str, change: float, rtol: float) -> np.ndarray:
+def _end(method: str, name: str, change: float, rtol: float) -> np.ndarray:
     """Time and state at the footstep's end, one input changed."""
     start, laws = START.copy(), LAWS.copy()
     if name in PARAMETERS:
@@ -50,7 +57,7 @@ def _end(name: str, change: float, rtol: float) -> np.ndarray:
         return y[UPRIGHT]
 
     upright.terminal, upright.direction = True, -1.0  # type: ignore[attr-defined]
-    how: dict[str, Any] = dict(method="Radau", rtol=rtol, atol=1e-2 * rtol, events=upright)
+    how: dict[str, Any] = dict(method=method, rtol=rtol, atol=1e-2 * rtol, events=upright)
     with np.errstate(over="ignore"):  # of columns of the Jacobian that are zero
         found = solve_ivp(right_hand_side, (0.0, LONGEST), start, args=numbers, **how)
     return np.append(found.t[-1], found.y[:, -1])
@@ -61,7 +68,30 @@ def _without_upright(ends: np.ndarray, rows: np.ndarray) -> Answer:
     return Answer(np.delete(ends, at), np.delete(rows, at, 0))
 
 
-PEERS: tuple[tuple[str, str, tuple[float, ...], Callable[[Answer, float], Run]], ...] = (
-    ("differences of SciPy's Radau", "rtol", (1e-4, 1e-6, 1e-8), by_scipy),
+class Peer(NamedTuple):
+    """Another way, and the settings at which it is asked.
+
+    Attributes:
+        name: a word for it.
+        setting: what is varied.
+        settings: its values, from rough to fine.
+        prepare: from the truth and a setting to what answers.
+        module: what must be installed beside this project's own requirements; "" for nothing.
+    """
+
+    name: str
+    setting: str
+    settings: tuple[float, ...]
+    prepare: Callable[[Answer, float], Run]
+    module: str = ""
+
+
+TOLERANCES, TIME_STEPS = (1e-4, 1e-6, 1e-8), (1e-4, 1e-5, 1e-6)
+PEERS = (
+    Peer("diffrax Tsit5", "rtol", TOLERANCES, by_diffrax(diffrax.Tsit5())),
+    Peer("diffrax Kvaerno5", "rtol", TOLERANCES, by_diffrax(KVAERNO5)),
+    Peer("semi-implicit Euler in JAX", "dt", TIME_STEPS, by_semi_implicit_euler),
+    Peer("CasADi CVODES", "rtol", TOLERANCES, by_cvodes, "casadi"),
+    Peer("differences of SciPy's LSODA", "rtol", (*TOLERANCES, 1e-10), differences_of("LSODA")),
+    Peer("differences of SciPy's Radau", "rtol", TOLERANCES, differences_of("Radau")),
 )
-"""Name, what is varied, its values from rough to fine, and the way."""

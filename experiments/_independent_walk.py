@@ -1,4 +1,4 @@
-"""Heel strikes and energies of the independent equations' walk, by SciPy's Radau."""
+"""Heel strikes and energies of the independent equations' walk, by SciPy's methods."""
 
 import itertools
 import math
@@ -46,10 +46,10 @@ def with_powers(t, y):
     return out
 
 
-def walk(duration: float, rtol: float) -> Walk:
+def walk(duration: float, rtol: float, method: str = "Radau") -> Walk:
     """The seed's walk at a relative tolerance, the absolute one a hundredth of it."""
     start = np.concatenate([eq.START, np.zeros(2)])
-    how = dict(method="Radau", rtol=rtol, atol=1e-2 * rtol, dense_output=True)
+    how = dict(method=method, rtol=rtol, atol=1e-2 * rtol, dense_output=True)
     with np.errstate(over="ignore"):
         found = solve_ivp(with_powers, (0.0, duration), start, **how)
     end = found.y[:, -1]

@@ -60,7 +60,7 @@ def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
             said = "nothing" if each["said"] is None else small(each["said"])
             setting = f"{each['setting']} = {small(each['value'], 0)}"
             errors = small(each["state_error"]), small(each["gradient_error"])
-            yield row(each["problem"], each["way"], setting, *errors, said)
+            yield row(each["problem"], each["way"], setting, *errors, *_cpu_time(each), said)
     damped = {
         (each["way"], each["value"]): each
         for each in numbers["rows"]
@@ -75,11 +75,13 @@ def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
 def of_footstep_truth(numbers: dict[str, Any]) -> Iterator[str]:
     """Errors of a footstep and its gradient by each way and setting, and what it says of them."""
     for each in numbers["rows"]:
-        said = "nothing" if each["said"] is None else small(each["said"])
         setting = f"{each['setting']} = {small(each['value'], 0)}"
-        yield row(
-            each["way"], setting, small(each["state_error"]), small(each["gradient_error"]), said
-        )
+        if each.get("outcome", "answered") != "answered":
+            yield row(each["way"], setting, UNKNOWN, each["outcome"], UNKNOWN, UNKNOWN)
+            continue
+        said = "nothing" if each["said"] is None else small(each["said"])
+        errors = small(each["state_error"]), small(each["gradient_error"])
+        yield row(each["way"], setting, *errors, *_cpu_time(each), said)
     yield f"changes by {small(numbers['problem']['coarser_collocation'])}"
     yield f"differs from our finest solve by {small(numbers['problem']['our_finest'])}"
 
@@ -197,6 +199,11 @@ def of_extremes(numbers: dict[str, Any]) -> Iterator[str]:
 
 _COMPARED = (1, 2, 3, 4, 5)
 """Which of the errors at which ways are compared are quoted: 1e-3 to 1e-7."""
+
+
+def _cpu_time(found: dict[str, Any]) -> tuple[str, ...]:
+    """A cell with the CPU time [ms], where it was measured."""
+    return (_milliseconds(found["cpu_s"]),) if "cpu_s" in found else ()
 
 
 def _milliseconds(seconds: float | str | None) -> str:

@@ -11,9 +11,11 @@ from jaxbiped.plot.style import new_figure
 PANELS = (
     ("walk", "state", "cpu_s", "State after 2 s"),
     ("walk", "state", "attempted", "State after 2 s, steps"),
-    ("walk", "step_time", "attempted", "Times of heel strikes"),
-    ("walk", "energy", "attempted", "Energy ledger"),
+    ("walk", "step_time", "cpu_s", "Times of heel strikes"),
+    ("walk", "energy", "cpu_s", "Energy ledger"),
     ("batch", "state", "cpu_s", "State, a batch"),
+    ("basin", "labels", "cpu_s", "Wrong labels of 4096 starts"),
+    ("basin", "walking", "cpu_s", "Starts wrong about walking or not, of 4096"),
     ("slopes", "slopes", "cpu_s", "State's slopes by K, c, ξ"),
     ("gait", "period", "cpu_s", "Gait's period"),
     ("gait", "multiplier", "cpu_s", "Largest multiplier"),

@@ -24,7 +24,7 @@ STEP, REFERENCE_STEP = 1e-4, 3e-3
 
 
 def cases(store: Store, quick: bool) -> Iterator[Case]:
-    """Ours with and without the tangents in the error norm, differences, and CasADi's CVODES."""
+    """Ours with and without tangents in the error norm, diffrax, differences, CasADi's CVODES."""
     walk = walk_of(jb.seed_scene(), quick)
     duration, units = walk.duration, walk.units()[:, None]
 
@@ -42,8 +42,8 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
 
         return Case("slopes", way, f"rtol={rtol:g}", measure)
 
-    ours = (("rodas5p", "lanes"), ("rodas4", "lanes"), ("rodas4", "xla"))
-    for solver, engine in ours[: 1 if quick else None]:
+    ways = (("rodas5p", "lanes"), ("rodas4", "lanes"), ("rodas4", "xla"), ("kvaerno5", "xla"))
+    for solver, engine in ways[: 1 if quick else None]:
         name = f"{solver} by {engine}" + (", steps for the state alone" if engine == "xla" else "")
         for rtol in tolerances(quick, -3, -8):
             yield case(name, rtol, functools.partial(by_jacobian, solver, engine, duration, rtol))

@@ -2,10 +2,11 @@
 
 Writes footstep_truth.png. Ours differentiates the time and the end of one footstep with respect to
 its start, stiffness, damping and friction. The truth is by collocation on one smooth piece of the
-laws at a time (`_footstep_collocation.py`), which shares nothing with ours. Beside it are
-differences of SciPy's solves.
+laws at a time (`_footstep_collocation.py`), which shares nothing with ours. Beside it are plain
+diffrax, equal steps, CasADi's CVODES where it is installed, and differences of SciPy's solves.
 """
 
+import importlib.util
 import time
 from typing import Any
 
@@ -14,23 +15,28 @@ import numpy as np
 from _ball_ways import Answer, relative_error
 from _footstep_collocation import footstep
 from _footstep_equations import LAWS, PARAMETERS, START
-from _footstep_peers import PEERS
+from _footstep_peers import PEERS, Peer
 from _footstep_ways import INPUTS, OUTPUTS, ours, references
 from _options import Options, parse
+from _truth_table import say_rows, versions
 from tqdm import tqdm
 
-OURS = ("jaxbiped", "rtol", (1e-4, 3e-7, 1e-9), ours)
-"""Name, what is varied, its values from rough to fine, and the way."""
+OURS = Peer("jaxbiped", "rtol", (1e-4, 3e-7, 1e-9), ours)
+NOT_INSTALLED, OVERFLOWED = "not installed", "derivatives overflow"
 
 
 def main() -> None:
     options = parse(__doc__ or "")
+    numbers = measured(options)
+    say_rows(options, numbers["rows"])
+    options.finish(numbers)
+
+
+def measured(options: Options) -> dict[str, Any]:
+    """The problem with its truth, and the rows of all ways; draws them."""
     truth, change, apart = references()
-    work = [(OURS, value) for value in OURS[2]]
-    if options.quick:
-        work.append((PEERS[-1], PEERS[-1][2][0]))
-    else:
-        work += [(way, value) for way in PEERS for value in way[2]]
+    ways = (OURS, PEERS[-1]._replace(settings=(1e-4,))) if options.quick else (OURS, *PEERS)
+    work = [(way, value) for way in ways for value in way.settings]
     rows = [_row(way, value, truth) for way, value in tqdm(work, desc="ways")]
     problem = {
         "start": START.tolist(),
@@ -44,37 +50,42 @@ def main() -> None:
         "our_finest": apart,
     }
     options.say(f"coarser collocation changes it by {change:.1e}; our finest solve by {apart:.1e}")
-    for row in rows:
-        said = "nothing" if row["said"] is None else f"{row['said']:.1e}"
-        options.say(
-            f"{row['way']:28s}{row['setting']} {row['value']:<8.0e}{row['state_error']:>9.1e}"
-            f"{row['gradient_error']:>10.1e}  {row['seconds']:8.3f} s  says {said}"
-        )
-    options.finish({"problem": problem, "rows": rows, "picture": str(_draw(options, rows))})
+    picture = str(_draw(options, rows))
+    return {"problem": problem, "rows": rows, "versions": versions(), "picture": picture}
 
 
-def _row(way: tuple[Any, ...], value: float, truth: Answer) -> dict[str, Any]:
-    """Errors of one way at one setting, and its time once compiled."""
-    name, setting, _, prepare = way
-    run = prepare(truth, value)
-    answer = run()
-    began = time.perf_counter()
-    run()
-    seconds = time.perf_counter() - began
+def _row(way: Peer, value: float, truth: Answer) -> dict[str, Any]:
+    """Errors of one way at one setting, and its time once compiled; or why there are none."""
+    named = {"problem": "footstep", "way": way.name, "setting": way.setting, "value": value}
+    if way.module and importlib.util.find_spec(way.module) is None:
+        return named | {"outcome": NOT_INSTALLED}
+    try:
+        run = way.prepare(truth, value)
+        answer = run()
+        began, before = time.perf_counter(), time.process_time()
+        run()
+    except RuntimeError as error:
+        return named | {"outcome": f"raised {type(error).__name__}"}
+    spent = {"seconds": time.perf_counter() - began, "cpu_s": time.process_time() - before}
     scale = np.maximum(np.abs(truth.state), 1e-2)
-    return {
-        "way": name,
-        "setting": setting,
-        "value": value,
-        "state_error": float(np.max(np.abs(answer.state - truth.state) / scale)),
-        "gradient_error": relative_error(answer.gradient, truth.gradient),
-        "said": answer.said,
-        "seconds": seconds,
-    }
+    off = float(np.max(np.abs(answer.state - truth.state) / scale))
+    if not np.all(np.isfinite(answer.gradient)):
+        return named | {"outcome": OVERFLOWED, "state_error": off} | spent
+    return (
+        named
+        | {
+            "outcome": "answered",
+            "state_error": off,
+            "gradient_error": relative_error(answer.gradient, truth.gradient),
+            "said": answer.said,
+        }
+        | spent
+    )
 
 
 def _draw(options: Options, rows: list[dict[str, Any]]) -> Any:
-    figure, ax = plt.subplots(figsize=(5.5, 4.6), layout="constrained")
+    rows = [row for row in rows if row["outcome"] == "answered"]
+    figure, ax = plt.subplots(figsize=(6.5, 5.4), layout="constrained")
     for name in dict.fromkeys(row["way"] for row in rows):
         own = [row for row in rows if row["way"] == name]
         errors = [[row[key] for row in own] for key in ("state_error", "gradient_error")]
@@ -85,7 +96,7 @@ def _draw(options: Options, rows: list[dict[str, Any]]) -> Any:
     ax.axhline(1.0, color="black", linewidth=0.8)
     ax.set_xlabel("relative error of the footstep [1]")
     ax.set_ylabel("relative error of its gradient [1]")
-    ax.legend()
+    ax.legend(fontsize="small")
     path = options.path("footstep_truth.png")
     figure.savefig(path, dpi=150)
     plt.close(figure)

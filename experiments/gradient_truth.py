@@ -16,23 +16,31 @@ from _ball_closed_form import PROBLEMS, Problem, closed_form
 from _ball_peers import PEERS
 from _ball_ways import OUR_WAYS, Run, Way, relative_error
 from _options import Options, parse
+from _truth_table import say_rows, versions
 from tqdm import tqdm
 
 NOT_INSTALLED, OTHER_LAW = "not installed", "its contact has another law"
-REPEATS = 3
+REPEATS, ENOUGH = 3, 3.0
+"""Runs that took so long together [s] are not repeated again."""
 
 
 def main() -> None:
     options = parse(__doc__ or "")
+    numbers = measured(options)
+    say_rows(options, numbers["rows"])
+    options.finish(numbers)
+
+
+def measured(options: Options) -> dict[str, Any]:
+    """The problems with their truths, and the rows of all ways; draws them."""
     problems = [_problem(problem) for problem in PROBLEMS]
     ways = (*OUR_WAYS, *PEERS)
     work = [(problem, way) for problem in PROBLEMS for way in ways]
     rows: list[dict[str, Any]] = []
     for problem, way in tqdm(work, desc="ways"):
         rows += _rows(problem, way, quick=options.quick)
-    _print(options, rows)
-    picture = _draw(options, rows)
-    options.finish({"problems": problems, "rows": rows, "picture": str(picture)})
+    picture = str(_draw(options, rows))
+    return {"problems": problems, "rows": rows, "versions": versions(), "picture": picture}
 
 
 def _problem(problem: Problem) -> dict[str, Any]:
@@ -70,34 +78,21 @@ def _rows(problem: Problem, way: Way, *, quick: bool) -> list[dict[str, Any]]:
                 "state_error": float(np.max(state)),
                 "gradient_error": relative_error(answer.gradient, truth.gradient),
                 "said": answer.said,
-                "seconds": _seconds(run, 1 if quick else REPEATS),
             }
+            | _work(run, 1 if quick else REPEATS)
         )
     return found
 
 
-def _seconds(run: Run, repeats: int) -> float:
-    """Median time of state and gradient, compiled before."""
-    times = []
-    for _ in range(repeats):
-        began = time.perf_counter()
+def _work(run: Run, repeats: int) -> dict[str, float]:
+    """Median times of state and gradient, compiled before: by the clock, and of all threads."""
+    spans: list[tuple[float, float]] = []
+    while not spans or (len(spans) < repeats and sum(wall for wall, _ in spans) < ENOUGH):
+        began, before = time.perf_counter(), time.process_time()
         run()
-        times.append(time.perf_counter() - began)
-    return float(np.median(times))
-
-
-def _print(options: Options, rows: list[dict[str, Any]]) -> None:
-    options.say(f"{'problem':19s}{'way':28s}{'setting':12s}{'state':>9s}{'gradient':>10s}  said")
-    for row in rows:
-        start = f"{row['problem']:19s}{row['way']:28s}"
-        if row["outcome"] != "answered":
-            options.say(f"{start}{row['outcome']}")
-            continue
-        said = "nothing" if row["said"] is None else f"{row['said']:.1e}"
-        options.say(
-            f"{start}{row['setting']} {row['value']:<8.0e}{row['state_error']:>9.1e}"
-            f"{row['gradient_error']:>10.1e}  {said}"
-        )
+        spans.append((time.perf_counter() - began, time.process_time() - before))
+    seconds, cpu = (float(np.median([span[k] for span in spans])) for k in range(2))
+    return {"seconds": seconds, "cpu_s": cpu}
 
 
 def _draw(options: Options, rows: list[dict[str, Any]]) -> Any:

@@ -1,13 +1,14 @@
 """Work and precision: what each way of solving costs for the error that it has.
 
-Writes trade.png: errors of state, step times, energies, gaits, multipliers and gradients against
-CPU time and steps. Rows lie in trade.jsonl as they come: a run that was cut off goes on. Ways that
-fail stay, in a band of their own.
+Writes trade.png: errors of state, step times, energies, labels, gaits, multipliers and gradients
+against CPU time and steps. Rows lie in trade.jsonl as they come: a run that was cut off goes on.
+Ways that fail stay, in a band of their own.
 """
 
 import dataclasses
 from typing import Any
 
+import _trade_basins
 import _trade_batches
 import _trade_gaits
 import _trade_slopes
@@ -25,6 +26,7 @@ CASES = (
     _trade_slopes.cases,
     _trade_gaits.cases,
     _trade_batches.cases,
+    _trade_basins.cases,
     _trade_gaits.stepping_cases,
     _trade_gaits.cases_through_xla,
     _trade_walks.cases_through_xla,

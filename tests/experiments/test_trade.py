@@ -54,3 +54,14 @@ def test_equal_errors_lie_between_the_settings_that_enclose_them(made):
     least, most = sorted(row["attempted"] for row in rows)
     assert known == sorted(known)
     assert all(0.999 * least <= steps <= 1.001 * most for steps in known)
+
+
+def test_labels_of_a_draw_are_an_axis(made):
+    """Looser tolerances label no fewer starts wrongly; none wrong counts as half a start."""
+    numbers = made[1].numbers
+    rows = {row["setting"]: row for row in numbers["rows"]["basin"] if "rodas4" in row["way"]}
+    loose, tight = (rows[f"rtol={r}"] for r in ("0.0001", "1e-06"))
+    assert loose["errors"]["labels"] > tight["errors"]["labels"] >= 0.5 / 128
+    assert loose["attempted"] < tight["attempted"]
+    for row in rows.values():
+        assert row["errors"]["fraction"] <= row["errors"]["walking"] <= row["errors"]["labels"]
