@@ -12,15 +12,17 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Numbers, RealScalarLike, Scalar, select
+from jaxbiped._types import Numbers, Scalar, select
 from jaxbiped.compiler import Program
-from jaxbiped.dynamics._minimal_motion import vector_field
+from jaxbiped.dynamics._consistent_state import project
+from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._redundant_scene import CompliantScene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import ending_code, ending_events
 from jaxbiped.solve._final_step import clip_step
 from jaxbiped.solve._fusion_barrier import without_barriers
+from jaxbiped.solve._projected_solver import projects
 from jaxbiped.solve._saved_outputs import LastStep, Saved
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
@@ -28,8 +30,6 @@ from jaxbiped.solve.controllers._shallow_contact import ShallowContact
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.controllers._wrapped_control import StepControl
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, step_of
-
-_TERM = diffrax.ODETerm(vector_field)
 
 
 class Solve(NamedTuple):
@@ -45,8 +45,8 @@ class Solve(NamedTuple):
         max_attempts: cap on the solver's steps.
     """
 
-    scene: Scene
-    state: State
+    scene: CompliantScene
+    state: PyTree
     duration: Numbers
     almost: Numbers
     rtol: Numbers
@@ -64,7 +64,7 @@ class Solved(NamedTuple):
     """
 
     t: Scalar
-    state: State
+    state: PyTree
     ending: Scalar
     accepted: Scalar
     rejected: Scalar
@@ -77,7 +77,7 @@ class _Now(NamedTuple):
 
     t: Scalar
     next_t: Scalar
-    state: State
+    state: PyTree
     control: PyTree
     accepted: Scalar
     rejected: Scalar
@@ -122,15 +122,16 @@ class AdaptiveSolve:
 
     def start(self, solve: Solve) -> _Now:
         zero, none = jnp.zeros_like(solve.duration), jnp.asarray(False)
+        term = _term(solve)
         next_t, control = self._controller(solve).init(
-            _TERM,
+            term,
             zero,
             solve.duration,
             solve.state,
             first_step(solve.duration, solve.units.time),
             solve.scene,
             None,
-            self._error_order(),
+            self.solver.error_order(term),
         )
         count = jnp.zeros((), dtype=jnp.int64)
         last = self.saved.first(solve.state, self.solver) if self.saved.within else None
@@ -142,13 +143,17 @@ class AdaptiveSolve:
         return _Now(zero, next_t, solve.state, control, count, count, events, none, last, extremes)
 
     def attempt(self, solve: Solve, now: _Now) -> tuple[_Now, Scalar]:
+        term = _term(solve)
         with contextlib.nullcontext() if self.fenced else without_barriers():
             y1, error, dense = step_of(
-                self.solver.tableau, _TERM, now.t, now.next_t, now.state, solve.scene
+                self.solver.tableau, term, now.t, now.next_t, now.state, solve.scene
             )
+            if projects(solve.scene):
+                y1 = project(solve.scene, y1)
         error = jtu.tree_map(lambda e: jnp.where(jnp.isnan(e), jnp.inf, e), error)
+        order = self.solver.error_order(term)
         keep, t, next_t, _, control, result = self._controller(solve).adapt_step_size(
-            now.t, now.next_t, now.state, y1, solve.scene, error, self._error_order(), now.control
+            now.t, now.next_t, now.state, y1, solve.scene, error, order, now.control
         )
         t, next_t = clip_step(keep, t, next_t, solve.duration, solve.almost)
         state = select(keep, y1, now.state)
@@ -211,7 +216,7 @@ class AdaptiveSolve:
         )
 
     def _extremes(
-        self, scene: Scene, now: _Now, keep: Scalar, state: State
+        self, scene: CompliantScene, now: _Now, keep: Scalar, state: PyTree
     ) -> tuple[PyTree, PyTree] | None:
         if now.extremes is None or self.saved.extremes is None:
             return None
@@ -230,8 +235,9 @@ class AdaptiveSolve:
             return control
         return FootstepLimit(control, solve.footsteps)
 
-    def _error_order(self) -> RealScalarLike | None:
-        return self.solver.error_order(_TERM)
+
+def _term(solve: Solve) -> diffrax.ODETerm:
+    return diffrax.ODETerm(field_of(solve.scene))
 
 
 def _numbers(values: PyTree) -> PyTree:
