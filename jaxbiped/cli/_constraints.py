@@ -64,6 +64,7 @@ def run(options: Constraints) -> int:
         report.say(f"stopped by Ctrl-C after {len(runs)} of {many} runs")
     report.say(
         f"{options.duration:g} s from the start; errors against the minimal formulation at 1e-10"
+        f"{_engines(runs)}"
     )
     numbers = run_numbers(runs)
     if options.out is not None and runs:
@@ -99,6 +100,12 @@ def _lines(found: Iterator[ConstraintRun], runs: list[ConstraintRun]) -> Iterato
         runs.append(run)
         lines = _padded(_row(run, _usual(run, runs))).splitlines()
         yield "\n".join(lines if first else lines[1:])
+
+
+def _engines(runs: Sequence[ConstraintRun]) -> str:
+    """Which engine ran what: times by one are not those by the other."""
+    used = {run.integrator: run.engine for run in runs}
+    return "".join(f"; {integrator} by {engine}" for integrator, engine in used.items())
 
 
 def _usual(run: ConstraintRun, runs: Sequence[ConstraintRun]) -> float | None:

@@ -13,7 +13,6 @@ from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import LANES, Request
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._recorded_steps import recorded_steps
 from jaxbiped.solve._adaptive_program import Solve, Solved
 from jaxbiped.solve._final_step import just_before_end
@@ -69,6 +68,7 @@ def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
         arrivals=arrivals,
         lowest=ended.lowest,
         highest=ended.highest,
+        correction=run.correction,
         engine="lanes",
     )
 
@@ -123,7 +123,6 @@ def _solve(run: "Simulation") -> Solve:
     def number(value: ArrayLike) -> Scalar:
         return jnp.asarray(value, dtype=jnp.float64)
 
-    assert isinstance(run.scene, Scene)
     footsteps = 0 if run.footsteps is None else run.footsteps
     return Solve(
         scene=run.scene,

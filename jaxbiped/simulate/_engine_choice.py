@@ -31,11 +31,12 @@ def choose_engine(
     """
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(leaves))
     obstacle = _hindrance(solver, save_steps, adjoint, leaves, times, traced=traced)
-    if redundant or dt is not None:
-        what = "redundant coordinates are" if redundant else "steps of one size (dt) are"
-        obstacle = f"{what} diffrax's"
+    if redundant and not (isinstance(times, str) and times == "end"):
+        obstacle = 'redundant coordinates are diffrax\'s, but for save="end"'
+    if dt is not None:
+        obstacle = "steps of one size (dt) are diffrax's"
     if section is None:
-        return engine_for(engine, obstacle=obstacle, prefers_xla=traced)
+        return engine_for(engine, obstacle=obstacle, prefers_xla=traced or redundant)
     check_choice("engine", engine, ENGINES)
     if engine == "xla" or obstacle is not None:
         why = f"here {obstacle}" if obstacle is not None else 'engine = "xla" was chosen'

@@ -15,15 +15,17 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import Numbers, RealScalarLike, Scalar, select
+from jaxbiped._types import Numbers, Scalar, select
 from jaxbiped.compiler import Program
-from jaxbiped.dynamics._minimal_motion import vector_field
+from jaxbiped.dynamics._consistent_state import project
+from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._redundant_scene import CompliantScene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import ending_code, ending_events
 from jaxbiped.solve._final_step import clip_step
 from jaxbiped.solve._fusion_barrier import without_barriers
+from jaxbiped.solve._projected_solver import projects
 from jaxbiped.solve._saved_outputs import LastStep, Saved
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
@@ -31,8 +33,6 @@ from jaxbiped.solve.controllers._shallow_contact import ShallowContact
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.controllers._wrapped_control import StepControl
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, step_of
-
-_TERM = diffrax.ODETerm(vector_field)
 
 
 class Solve(NamedTuple):
@@ -48,8 +48,8 @@ class Solve(NamedTuple):
         max_attempts: cap on the solver's steps.
     """
 
-    scene: Scene
-    state: State
+    scene: CompliantScene
+    state: PyTree
     duration: Numbers
     almost: Numbers
     rtol: Numbers
@@ -67,7 +67,7 @@ class Solved(NamedTuple):
     """
 
     t: Scalar
-    state: State
+    state: PyTree
     ending: Scalar
     accepted: Scalar
     rejected: Scalar
@@ -80,7 +80,7 @@ class _Now(NamedTuple):
 
     t: Scalar
     next_t: Scalar
-    state: State
+    state: PyTree
     control: PyTree
     accepted: Scalar
     rejected: Scalar
@@ -124,15 +124,16 @@ class AdaptiveSolve:
 
     def start(self, solve: Solve) -> _Now:
         zero, none = jnp.zeros_like(solve.duration), jnp.asarray(False)
+        term = _term(solve)
         next_t, control = self._controller(solve).init(
-            _TERM,
+            term,
             zero,
             solve.duration,
             solve.state,
             first_step(solve.duration, solve.units.time),
             solve.scene,
             None,
-            self._error_order(),
+            self.solver.error_order(term),
         )
         count = jnp.zeros((), dtype=jnp.int64)
         last = self.saved.first(solve.state, self.solver) if self.saved.within else None
@@ -143,15 +144,21 @@ class AdaptiveSolve:
         return _Now(zero, next_t, solve.state, control, count, count, none, last, extremes)
 
     def attempt(self, solve: Solve, now: _Now) -> tuple[_Now, Scalar]:
+        term = _term(solve)
         with contextlib.nullcontext() if self.fenced else without_barriers():
             y1, error, dense = step_of(
-                self.solver.tableau, _TERM, now.t, now.next_t, now.state, solve.scene
+                self.solver.tableau, term, now.t, now.next_t, now.state, solve.scene
             )
+            if projects(solve.scene):
+                y1 = project(solve.scene, y1)
         ended = self._ended(solve.scene, now)
-        error = jtu.tree_map(lambda e: jnp.where(jnp.isnan(e), jnp.inf, e), error)
-        error = error._replace(hip_x=jnp.where(ended, jnp.inf, error.hip_x))
+        errors, structure = jtu.tree_flatten(error)
+        errors = [jnp.where(jnp.isnan(each), jnp.inf, each) for each in errors]
+        # One of them is enough for a step to be rejected.
+        errors[0] = jnp.where(ended, jnp.inf, errors[0])
+        error, order = jtu.tree_unflatten(structure, errors), self.solver.error_order(term)
         keep, t, next_t, _, control, result = self._controller(solve).adapt_step_size(
-            now.t, now.next_t, now.state, y1, solve.scene, error, self._error_order(), now.control
+            now.t, now.next_t, now.state, y1, solve.scene, error, order, now.control
         )
         t, next_t = clip_step(keep, t, next_t, solve.duration, solve.almost)
         state = select(keep, y1, now.state)
@@ -199,7 +206,7 @@ class AdaptiveSolve:
         low, high = (None, None) if now.extremes is None else now.extremes
         return Solved(now.t, now.state, code, now.accepted, now.rejected, low, high)
 
-    def _happened(self, scene: Scene, now: _Now) -> dict[Ending, Scalar]:
+    def _happened(self, scene: CompliantScene, now: _Now) -> dict[Ending, Scalar]:
         """The failure that ends a solve here, the first of them."""
         happened: dict[Ending, Scalar] = {}
         none = now.accepted + now.rejected > 0
@@ -208,7 +215,7 @@ class AdaptiveSolve:
             none = none & ~happened[name]
         return happened
 
-    def _ended(self, scene: Scene, now: _Now) -> Scalar:
+    def _ended(self, scene: CompliantScene, now: _Now) -> Scalar:
         """Whether a failure ended it before this attempt, which then changes nothing.
 
         Asked here and not where a step ends: of the state that a step starts from, the step itself
@@ -224,7 +231,7 @@ class AdaptiveSolve:
         )
 
     def _extremes(
-        self, scene: Scene, now: _Now, keep: Scalar, state: State
+        self, scene: CompliantScene, now: _Now, keep: Scalar, state: PyTree
     ) -> tuple[PyTree, PyTree] | None:
         if now.extremes is None or self.saved.extremes is None:
             return None
@@ -243,8 +250,9 @@ class AdaptiveSolve:
             return control
         return FootstepLimit(control, solve.footsteps)
 
-    def _error_order(self) -> RealScalarLike | None:
-        return self.solver.error_order(_TERM)
+
+def _term(solve: Solve) -> diffrax.ODETerm:
+    return diffrax.ODETerm(field_of(solve.scene))
 
 
 def _numbers(values: PyTree) -> PyTree:

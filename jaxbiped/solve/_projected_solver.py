@@ -16,7 +16,7 @@ from jaxbiped.constraints._constraint_method import (
     AbstractProjectingMethod,
 )
 from jaxbiped.dynamics._consistent_state import project
-from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._redundant_scene import CompliantScene, RedundantScene
 
 _Solver = TypeVar("_Solver", bound=diffrax.AbstractSolver[PyTree])
 
@@ -118,9 +118,14 @@ def wrap_projected(
     return cast(_Solver, Projected(solver, project))  # as adaptive as what it wraps
 
 
+def projects(scene: CompliantScene) -> bool:
+    """Whether the scene's method projects after each step."""
+    held = isinstance(scene, RedundantScene)
+    return held and isinstance(scene.method, AbstractProjectingMethod)
+
+
 def with_projection(
     scene: RedundantScene, solver: _Solver, adjoint: diffrax.AbstractAdjoint | None = None
 ) -> _Solver:
     """The solver, wrapped where the scene's method projects after each step."""
-    projects = isinstance(scene.method, AbstractProjectingMethod)
-    return wrap_projected(solver, project, adjoint) if projects else solver
+    return wrap_projected(solver, project, adjoint) if projects(scene) else solver

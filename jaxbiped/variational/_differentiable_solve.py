@@ -14,6 +14,7 @@ from jax.custom_derivatives import SymbolicZero
 from jaxtyping import PyTree, PyTreeDef
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
+from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import LANES, Program, Recorded, Request
 from jaxbiped.dynamics._minimal_motion import vector_field
@@ -125,8 +126,13 @@ def _differentiable(setting: Setting, structure: PyTreeDef) -> Callable[..., lis
     def rule(
         primals: Sequence[Scalar], tangents: Sequence[Scalar | SymbolicZero]
     ) -> tuple[list[Scalar], list[Scalar]]:
-        found = run(*primals)
         solve = jtu.tree_unflatten(structure, primals)
+        if solve.scene.redundant:
+            raise ArgumentError(
+                'engine = "lanes" is not allowed here: derivatives in redundant coordinates are '
+                'diffrax\'s; use engine="xla".'
+            )
+        found = run(*primals)
         solve_dot = jtu.tree_unflatten(structure, tangents)
         t, state, *counts = _unflatten(solve.state, found)
         t_dot, state_dot = _tangents(setting, solve, solve_dot, t, state)
@@ -139,10 +145,11 @@ def _differentiable(setting: Setting, structure: PyTreeDef) -> Callable[..., lis
     return run
 
 
-def _unflatten(like: State, found: Sequence[Scalar]) -> tuple[PyTree, ...]:
+def _unflatten(like: PyTree, found: Sequence[Scalar]) -> tuple[PyTree, ...]:
     t, *rest = found
-    size = len(like)
-    return t, type(like)(*rest[:size]), *rest[size:]
+    structure = jtu.tree_structure(like)
+    size = structure.num_leaves
+    return t, jtu.tree_unflatten(structure, rest[:size]), *rest[size:]
 
 
 def _tangents(

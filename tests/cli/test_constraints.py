@@ -44,7 +44,7 @@ def test_compares_methods_and_integrators(capsys, tmp_path):
     marks = points_of(figure.axes[0], "euler, steps of 1e-05 s")[0]
     np.testing.assert_allclose(marks[0, 0], runs[0]["max_violation_m"])
     for run in runs:
-        assert run["integrator"] == "euler"
+        assert (run["integrator"], run["engine"]) == ("euler", "xla")
         assert run["wall_s_run"] > 0.0
     assert runs[0]["ending"] == runs[1]["ending"] == "walking"
     # A step that the contact's stiffness does not stand is told, not dropped.
@@ -58,7 +58,7 @@ def _done(method, integrator, seconds):
     return ConstraintRun(
         method=method, integrator=integrator.solver, rtol_or_dt=integrator.dt or integrator.rtol,
         fixed=integrator.dt is not None, ending="walking", max_violation_m=1e-9,
-        max_violation_rate=1e-8, state_error=1e-6, wall_s_run=seconds, steps=100,
+        max_violation_rate=1e-8, state_error=1e-6, wall_s_run=seconds, steps=100, engine="lanes",
     )  # fmt: skip
 
 
