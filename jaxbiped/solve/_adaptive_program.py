@@ -19,7 +19,6 @@ from jaxbiped._types import Numbers, Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._consistent_state import project
 from jaxbiped.dynamics._formulation import field_of
-from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import CompliantScene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import ending_code, ending_events
