@@ -28,7 +28,7 @@ _LONGER, _SHORTER = (2.0, 2.0**0.5), (1.0 / 2.0, 1.0 / 3.0)
 def warn_of_missed_contacts(run: Simulation, walk: Trajectory) -> None:
     """Warns where steps of one size stepped over contacts; nothing is known while tracing."""
     missed = walk.missed_contacts
-    if missed is None or isinstance(missed, jax.core.Tracer) or not int(missed):
+    if run.dt is None or missed is None or isinstance(missed, jax.core.Tracer) or not int(missed):
         return
     warnings.warn(
         f"dt = {float(run.dt):g} steps over contacts: a foot dips into the ground and leaves it "
