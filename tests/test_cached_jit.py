@@ -12,6 +12,7 @@ import jaxbiped as jb
 from jaxbiped import _compiled_store
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._disk_cache import CACHE_VARIABLE, disk_use
+from jaxbiped.simulate._by_xla import by_xla
 from jaxbiped.solve._final_step import just_before_end
 
 
@@ -36,6 +37,22 @@ def test_what_was_compiled_is_loaded(cache, monkeypatch):
     assert just_before_end(np.float64(2.0)) == first < 2.0
     assert just_before_end(np.float64(-3.0)) < -3.0
     assert list(cache.iterdir()) == [kept]
+
+
+def test_a_walk_by_xla_is_loaded(cache, monkeypatch):
+    """diffrax's checks are calls back to Python, with which a program could not be kept."""
+
+    def walk():
+        how = dict(solver="euler", dt=1e-6, save="end", watch=(), engine="xla", duration=2e-6)
+        scene, start = jb.seed_scene(), jb.seed_state()
+        return jb.Simulation.prepare(scene, start, **how)().final
+
+    by_xla.clear()
+    first = walk()
+    by_xla.clear()
+    monkeypatch.setattr("jaxbiped._cached_jit.trace_call", _refuse)
+    assert walk() == first
+    by_xla.clear()
 
 
 @pytest.mark.parametrize("damage", ["emptied", "garbage", "gone", "foreign"])

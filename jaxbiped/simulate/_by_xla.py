@@ -20,6 +20,7 @@ from jaxbiped.solve._solvers import with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.controllers._extremes import Extremes
 from jaxbiped.solve.controllers._footstep_limit import PATIENCE, FootstepLimit
+from jaxbiped.solve.controllers._given_first_step import GivenFirstStep
 from jaxbiped.solve.controllers._missed_contacts import MissedContacts
 from jaxbiped.solve.controllers._shallow_contact import ShallowContact
 from jaxbiped.solve.controllers._step_control import first_step, step_control
@@ -40,6 +41,7 @@ def by_xla(run: "Simulation") -> Trajectory:
         controller = FootstepLimit(controller, run.footsteps)
     if run.extremes is not None:
         controller = Extremes(controller, run.extremes)
+    size = first_step(run.duration, run.units.time) if run.dt is None else run.dt
     events = ending_events(run.watch)
     zero = jnp.zeros_like(run.duration)
     if isinstance(run.scene, RedundantScene):
@@ -49,11 +51,11 @@ def by_xla(run: "Simulation") -> Trajectory:
         solver,
         t0=zero,
         t1=run.duration,
-        dt0=first_step(run.duration, run.units.time) if run.dt is None else run.dt,
+        dt0=None,
         y0=run.state,
         args=run.scene,
         saveat=_saveat(run),
-        stepsize_controller=controller,
+        stepsize_controller=GivenFirstStep(controller, size),
         event=diffrax.Event(list(events.values())) if events else None,
         max_steps=run.max_solver_steps,
         adjoint=run.adjoint,

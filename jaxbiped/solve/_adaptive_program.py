@@ -19,7 +19,6 @@ from jaxbiped._types import Numbers, Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._consistent_state import project
 from jaxbiped.dynamics._formulation import field_of
-from jaxbiped.scene._redundant_scene import CompliantScene
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import ending_code, ending_events
 from jaxbiped.solve._final_step import clip_step
@@ -38,7 +37,8 @@ class Solve(NamedTuple):
     """One simulation's inputs; every leaf a 64-bit floating-point number.
 
     Attributes:
-        scene, state: what to simulate and from where.
+        scene, state: what to simulate and from where: a `Scene` or a `RedundantScene`, and its kind
+            of state.
         duration: simulated time [s]; from `almost` on, a step that would end there ends it.
         rtol, atol: tolerances, the absolute one in `units`.
         units: of the state's leaves and of time.
@@ -47,7 +47,7 @@ class Solve(NamedTuple):
         max_attempts: cap on the solver's steps.
     """
 
-    scene: CompliantScene
+    scene: PyTree
     state: PyTree
     duration: Numbers
     almost: Numbers
@@ -205,7 +205,7 @@ class AdaptiveSolve:
         low, high = (None, None) if now.extremes is None else now.extremes
         return Solved(now.t, now.state, code, now.accepted, now.rejected, low, high)
 
-    def _happened(self, scene: CompliantScene, now: _Now) -> dict[Ending, Scalar]:
+    def _happened(self, scene: PyTree, now: _Now) -> dict[Ending, Scalar]:
         """The failure that ends a solve here, the first of them."""
         happened: dict[Ending, Scalar] = {}
         none = now.accepted + now.rejected > 0
@@ -214,7 +214,7 @@ class AdaptiveSolve:
             none = none & ~happened[name]
         return happened
 
-    def _ended(self, scene: CompliantScene, now: _Now) -> Scalar:
+    def _ended(self, scene: PyTree, now: _Now) -> Scalar:
         """Whether a failure ended it before this attempt, which then changes nothing.
 
         Asked here and not where a step ends: of the state that a step starts from, the step itself
@@ -230,7 +230,7 @@ class AdaptiveSolve:
         )
 
     def _extremes(
-        self, scene: CompliantScene, now: _Now, keep: Scalar, state: PyTree
+        self, scene: PyTree, now: _Now, keep: Scalar, state: PyTree
     ) -> tuple[PyTree, PyTree] | None:
         if now.extremes is None or self.saved.extremes is None:
             return None
@@ -250,7 +250,7 @@ class AdaptiveSolve:
         return FootstepLimit(control, solve.footsteps)
 
 
-def _term(solve: Solve) -> diffrax.ODETerm:
+def _term(solve: Solve) -> "diffrax.ODETerm[PyTree]":
     return diffrax.ODETerm(field_of(solve.scene))
 
 

@@ -120,8 +120,9 @@ def wrap_projected(
 
 def projects(scene: CompliantScene) -> bool:
     """Whether the scene's method projects after each step."""
-    held = isinstance(scene, RedundantScene)
-    return held and isinstance(scene.method, AbstractProjectingMethod)
+    if not isinstance(scene, RedundantScene):
+        return False
+    return isinstance(scene.method, AbstractProjectingMethod)
 
 
 def with_projection(

@@ -147,8 +147,8 @@ def _differentiable(setting: Setting, structure: PyTreeDef) -> Callable[..., lis
 
 def _unflatten(like: PyTree, found: Sequence[Scalar]) -> tuple[PyTree, ...]:
     t, *rest = found
-    structure = jtu.tree_structure(like)
-    size = structure.num_leaves
+    leaves, structure = jtu.tree_flatten(like)
+    size = len(leaves)
     return t, jtu.tree_unflatten(structure, rest[:size]), *rest[size:]
 
 

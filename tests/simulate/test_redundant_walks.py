@@ -81,7 +81,7 @@ def test_all_walk_at_the_minimal_ones_pace(long_walks):
 def test_what_is_not_allowed_is_one_sentence():
     scene, start = jb.RedundantScene(jb.seed_scene()), jb.seed_state()
     for change, said in (
-        (dict(engine="lanes", save="end"), "redundant coordinates are diffrax's"),
+        (dict(engine="lanes"), "redundant coordinates are diffrax's, but for save"),
         (dict(solver="euler"), "dt = None is not allowed for solver = euler"),
         (dict(dt=0.0), "dt = 0 is not allowed"),
         (dict(dt=1e-9), "more than max_solver_steps = 65536"),
@@ -90,6 +90,39 @@ def test_what_is_not_allowed_is_one_sentence():
         with pytest.raises(jb.ArgumentError) as refused:
             jb.simulate(scene, start, duration=1.0, **change)
         assert said in str(refused.value)
+
+
+@pytest.mark.parametrize("method", ["penalty", "described"])
+def test_lanes_take_the_same_footsteps(method):
+    """Against the minimal formulation at a tight tolerance."""
+    scene = jb.RedundantScene(jb.seed_scene(), method)
+    how = dict(duration=0.9, save="end", extremes=jb.dynamics.violation)
+    found = jb.simulate(scene, jb.seed_state(), engine="lanes", **how)
+    assert found.engine == "lanes"
+    assert found.outcome is jb.Ending.WALKING
+    assert found.correction is not None
+    truth = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=0.9, save="end", rtol=1e-10)
+    final = jb.dynamics.minimal_state(scene, found.final)
+    for name in truth.final._fields:
+        assert float(getattr(final, name)) == pytest.approx(
+            float(getattr(truth.final, name)), abs=1e-4
+        )
+    bound = 1e-14 if method == "described" else 1e-7
+    assert 0.0 < float(found.highest.position) < bound
+
+
+def test_lanes_batch_redundant_walks_and_have_no_derivatives():
+    def end(change):
+        scene = jb.with_parameters(jb.seed_scene(), {"c": 1e7 * (1.0 + change)})
+        held = jb.RedundantScene(scene, "described")
+        walk = jb.simulate(held, jb.seed_state(), duration=0.1, save="end", engine="lanes")
+        return walk.final.theta_2
+
+    several = jax.vmap(end)(jnp.asarray([0.0, 0.2]))
+    np.testing.assert_array_equal(several, [end(0.0), end(0.2)])
+    assert several[0] != several[1]
+    with pytest.raises(jb.ArgumentError, match="derivatives in redundant coordinates"):
+        jax.grad(end)(0.0)
 
 
 def test_projected_walks_differentiate_and_batch():
