@@ -1,5 +1,6 @@
 """Truth of gradients: the ball's closed form against SciPy, and the experiment's quick run."""
 
+import dataclasses
 import sys
 from pathlib import Path
 
@@ -21,14 +22,17 @@ def _followed(problem: Problem) -> np.ndarray:
     def falling(t, y):
         return y[1], -g
 
+    def damping(v):
+        return c * (v if problem.damps_rebound else min(v, 0.0))
+
     def pushed(t, y):
-        return y[1], -g * problem.weight_in_contact - K * y[0] - c * y[1]
+        return y[1], -g * problem.weight_in_contact - K * y[0] - damping(y[1])
 
     def touchdown(t, y):
         return y[0]
 
     def release(t, y):
-        return K * y[0] + c * y[1]
+        return K * y[0] + damping(y[1])
 
     touchdown.direction, touchdown.terminal = -1.0, True
     release.direction, release.terminal = 1.0, True
@@ -41,7 +45,13 @@ def _followed(problem: Problem) -> np.ndarray:
     return y
 
 
-@pytest.mark.parametrize("problem", PROBLEMS, ids=lambda problem: problem.name)
+OTHER_LAWS = (
+    dataclasses.replace(PROBLEMS[0], name="no weight in contact", weight_in_contact=0.0),
+    dataclasses.replace(PROBLEMS[1], name="damped while it sinks", damps_rebound=False),
+)
+
+
+@pytest.mark.parametrize("problem", [*PROBLEMS, *OTHER_LAWS], ids=lambda problem: problem.name)
 def test_the_closed_form_is_what_scipy_finds(problem):
     truth = closed_form(problem)
     assert truth.bounces == 3
