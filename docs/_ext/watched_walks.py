@@ -1,4 +1,4 @@
-"""The walks that a page of the site plays: simulated when the site is built."""
+"""Walks that a page of the site plays, and a page that simulates its own: made with the site."""
 
 from pathlib import Path
 from typing import Any
@@ -9,9 +9,18 @@ FOOTSTEPS = 12
 
 
 def write_page(app: Sphinx, failure: Exception | None) -> None:
-    """Puts `docs/walks.html` into a site that was built."""
+    """Puts `docs/walks.html` and `docs/play.html` into a site that was built."""
     if failure is None and app.builder.format == "html":
-        views().save(Path(app.outdir) / "docs" / "walks.html")
+        folder = Path(app.outdir) / "docs"
+        views().save(folder / "walks.html")
+        playground().save(folder / "play.html")
+
+
+def playground() -> Any:
+    """The seed's walker, with sliders."""
+    import jaxbiped as jb
+
+    return jb.plot.playground(jb.seed_scene(slope=0.02), jb.seed_state())
 
 
 def views() -> Any:
@@ -29,6 +38,6 @@ def views() -> Any:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Writes the page when all others are there."""
+    """Writes the pages when all others are there."""
     app.connect("build-finished", write_page)
     return {"parallel_read_safe": True}

@@ -32,6 +32,8 @@ from jaxbiped.plot._tornado import elasticities as elasticities
 from jaxbiped.plot._work_precision import work_precision as work_precision
 from jaxbiped.plot.viewer._basin_view import BasinView as BasinView
 from jaxbiped.plot.viewer._basin_view import view_basin as view_basin
+from jaxbiped.plot.viewer._playground import Playground as Playground
+from jaxbiped.plot.viewer._playground import playground as playground
 from jaxbiped.plot.viewer._view import View as View
 from jaxbiped.plot.viewer._view import side_by_side as side_by_side
 from jaxbiped.plot.viewer._view import view as view

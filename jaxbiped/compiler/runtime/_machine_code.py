@@ -86,10 +86,17 @@ def _target_machine(host: Host, as_written: bool) -> llvm.TargetMachine:
 
 
 def _module(text: str, machine: llvm.TargetMachine, as_written: bool) -> llvm.ModuleRef:
+    if not as_written:
+        return optimised_module(text, machine)
     module = llvm.parse_assembly(text)
     module.verify()
-    if as_written:
-        return module
+    return module
+
+
+def optimised_module(text: str, machine: llvm.TargetMachine) -> llvm.ModuleRef:
+    """A module after LLVM's passes, ready to be written for a machine."""
+    module = llvm.parse_assembly(text)
+    module.verify()
     # No vectorisers: the vectors are there. Sums are never reordered, so results stay the same.
     options = llvm.create_pipeline_tuning_options(speed_level=1)
     options.slp_vectorization = options.loop_vectorization = False

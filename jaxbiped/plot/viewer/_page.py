@@ -18,10 +18,14 @@ _MODULES = (
     "step_table",
     "view",
     "basin",
+    "simulator",
+    "playground",
 )
 """In the order of their imports."""
 _IMPORT = re.compile(r'^import \{[^}]*\} from "\./\w+\.js";\n', re.MULTILINE)
-_POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'{more}; style-src 'unsafe-inline'; img-src data:"
+)
 _PAGE = """\
 <!doctype html>
 <html lang="en">
@@ -48,18 +52,19 @@ body {{ margin: 0; }}
 """
 
 
-def page_of(sent: JsonObject, title: str) -> str:
+def page_of(sent: JsonObject, title: str, *, computes: bool = False) -> str:
     """A page of HTML that holds everything: what it shows, its script and its look.
 
     Args:
         sent: what `showWalks` takes, ready for JSON.
         title: of the page.
+        computes: whether it runs WebAssembly.
 
     Returns:
         The page's text.
     """
     return _PAGE.format(
-        policy=_POLICY,
+        policy=_POLICY.format(more=" 'wasm-unsafe-eval'" if computes else ""),
         title=html.escape(title),
         style=style(),
         # No text within ends the script.

@@ -1,6 +1,6 @@
 // Channels of a walk: decoding them, and their values between knots.
 
-/** A walk as it was sent, its numbers decoded: `t` [s] and `channels` by name, all of one length. */
+/** A walk as it was sent, numbers decoded where they are text: `t` [s] and `channels`, all of one length. */
 export function decodeWalk(sent) {
   const t = decode(sent.t, Float64Array);
   const channels = {};
@@ -11,6 +11,7 @@ export function decodeWalk(sent) {
 }
 
 function decode(text, Kind) {
+  if (typeof text !== "string") return text;
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   return new Kind(bytes.buffer);
 }

@@ -1,0 +1,123 @@
+"""The playground: a page that simulates what lanes simulate, and shows it."""
+
+import re
+
+import jax
+import jax.tree_util as jtu
+import numpy as np
+import pytest
+from selenium.webdriver.support.ui import WebDriverWait
+
+import jaxbiped as jb
+from jaxbiped.compiler import LANES
+from jaxbiped.plot.viewer._page import page_of, script
+from jaxbiped.plot.viewer._played_program import STEPS, played_request
+from tests.browser import chromium
+
+pytestmark = pytest.mark.slow
+
+FOOTSTEPS = 3
+SOLVES = """
+return makeSimulator(arguments[0]).then((simulator) => arguments[1].map((inputs) => {
+  const { rows, count, code } = simulator.solve(inputs);
+  const strikes = simulator.run(inputs, 0).footprints.filter((each) => each.strike);
+  const bits = [...new BigInt64Array(rows.buffer)].map(String);
+  return [bits, count, code, strikes.map((each) => each.t)];
+}));
+"""
+MOVE = """
+const range = document.querySelector(`[data-leaf="${arguments[0]}"]`);
+range.value = arguments[1];
+range.dispatchEvent(new Event("input"));
+"""
+TOLD = "return document.querySelector('.told')?.textContent ?? ''"
+
+
+@pytest.fixture(scope="module")
+def playground():
+    return jb.plot.playground(jb.seed_scene(slope=0.02), jb.seed_state(), footsteps=FOOTSTEPS)
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with chromium() as page:
+        yield page
+
+
+def moved(slope=0.02, stiffness=1e6, omega=-0.0052):
+    """A scene and a start, as sliders move them."""
+    scene = jb.with_parameters(jb.seed_scene(slope=slope), {"K": stiffness})
+    return scene, jb.seed_state()._replace(omega_1=omega)
+
+
+CASES = [moved(), moved(slope=0.012), moved(stiffness=2.5e5), moved(omega=1.2), moved(omega=4.0)]
+
+
+def natively(scene, state):
+    """Records, their number and the ending by lanes."""
+    request = played_request(scene, state, FOOTSTEPS)
+    inputs = np.array([float(leaf) for leaf in jax.tree.leaves(request.inputs)])
+    found, recorded = LANES.compile(request).run_table(inputs[:, None], room=STEPS)
+    count = int(recorded.counts[0])
+    return inputs, recorded.values[0, :count], found[9, 0]
+
+
+def test_the_page_solves_what_lanes_solve_to_the_last_bit(playground, browser, tmp_path):
+    (tmp_path / "page.html").write_text(
+        f"<script type=module>{script('simulator')}window.makeSimulator = makeSimulator</script>"
+    )
+    browser.open(tmp_path / "page.html")
+    expected = [natively(scene, state) for scene, state in CASES]
+    given = [inputs.tolist() for inputs, _, _ in expected]
+    found = browser.run(SOLVES, playground.sent()["playground"], given)
+    endings = set()
+    for (scene, state), (_, rows, ending), (bits, count, code, strikes) in zip(
+        CASES, expected, found, strict=True
+    ):
+        assert count == len(rows) > 100
+        assert code == ending
+        np.testing.assert_array_equal(np.array(bits, np.int64), rows.view(np.int64).ravel())
+        walk = jb.simulate(scene, state, footsteps=FOOTSTEPS, engine="lanes")
+        np.testing.assert_array_equal(np.asarray(walk.t)[1:], rows[:, 0])
+        np.testing.assert_array_equal(np.array(walk.state)[:, 1:].T, rows[:, 1:9])
+        heels = jb.measure.heel_strikes(scene, walk).time_s
+        # The page tells the end of the step in which a foot comes to touch.
+        np.testing.assert_allclose(strikes, heels, atol=2e-3)
+        endings.add(int(code))
+    assert len(endings) > 1
+
+
+def test_sliders_move_all_that_a_scene_moves(playground):
+    scene, state = moved(slope=0.03, stiffness=3e5, omega=0.5)
+    inputs = natively(scene, state)[0]
+    places = {slider["input"] for slider in playground.sliders}
+    changed = set(np.flatnonzero(inputs != playground.inputs).tolist())
+    assert len(changed) == 3
+    assert changed <= places
+    paths, _ = jtu.tree_flatten_with_path(played_request(scene, state, FOOTSTEPS).inputs)
+    names = [jtu.keystr(path) for path, _ in paths]
+    assert all(names[slider["input"]] == slider["leaf"] for slider in playground.sliders)
+
+
+def test_a_slider_leads_to_another_walk(playground, browser, tmp_path):
+    playground.save(tmp_path / "play.html")
+    browser.errors()
+    for width, dark in ((1200, False), (400, True)):
+        browser.open(tmp_path / "play.html", width=width, dark=dark)
+        waiting = WebDriverWait(browser.driver, 20)
+        waiting.until(lambda _: "walking; slope 0.0200" in browser.run(TOLD))
+        browser.run(MOVE, ".scene.ground.slope", 0.03)
+        waiting.until(lambda _: "slope 0.0300" in browser.run(TOLD))
+        end = jb.simulate(*moved(slope=0.03), footsteps=FOOTSTEPS, engine="lanes").t[-1]
+        assert f"after {float(end):.2f} s" in browser.run(TOLD)
+        wider = "return document.documentElement.scrollWidth - window.innerWidth"
+        assert browser.run(wider) <= 0
+    assert [each for each in browser.errors() if each["level"] == "SEVERE"] == []
+
+
+def test_the_page_asks_for_nothing_and_is_small(playground):
+    page = playground.html()
+    assert "'wasm-unsafe-eval'" in page
+    assert "'wasm-unsafe-eval'" not in page_of({}, "walk")
+    assert re.findall(r"(?:src|href)=\"(?!data:)", page) == []
+    assert len(page) < 250_000
