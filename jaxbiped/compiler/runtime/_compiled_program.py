@@ -124,6 +124,10 @@ class CompiledProgram:
         """The program as LLVM's text."""
         return self._kernel.text(width)
 
+    def device_text(self, threads: int, blocks: int) -> str:
+        """The program as LLVM's text for devices; see `device_target`."""
+        return self._kernel.device_text(threads, blocks)
+
     def instructions(self) -> int:
         """How many machine instructions the program has, for vectors of the host's width."""
         return self._kernel.instructions()

@@ -40,6 +40,10 @@ class DeviceProcessor(AbstractProcessor):
     def ready(self, kernel: Kernel, width: int) -> bool:
         return all(kernel.has_ptx(device.architecture) for device in devices().usable)
 
+    def names(self) -> list[str]:
+        """The devices' names."""
+        return [device.name for device in devices().usable]
+
     def fills(self, count: int) -> bool:
         """Whether there is a device, and `count` simulations keep all of its threads busy."""
         found = devices().usable
