@@ -30,6 +30,23 @@ def end(engine):
     return _walks(engine, save="end")
 
 
+def steps(engine):
+    walk = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=_TIME, engine=engine)
+    assert walk.engine == engine
+    return walk.t, walk.state, walk.ending
+
+
+def gradient(engine):
+    """In reverse mode."""
+    scene, state = jb.seed_scene(slope=0.02), jb.seed_state()
+
+    def final(rate):
+        how = dict(duration=_TIME, save="end", accuracy="draft", engine=engine)
+        return jb.simulate(scene, state._replace(omega_2=rate), **how).state.hip_x[0]
+
+    return jax.grad(final)(-1.2)
+
+
 def times(engine):
     return _walks(engine, save=jnp.linspace(0.01, _TIME, 4))
 
@@ -78,7 +95,7 @@ def rigid_labels(engine):
 CASES = {
     each.__name__: each
     for each in (
-        *(end, times, arrivals, extremes, tangents),
+        *(end, steps, gradient, times, arrivals, extremes, tangents),
         *(labels, rigid, rigid_labels),
     )
 }
