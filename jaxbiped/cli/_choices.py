@@ -19,7 +19,7 @@ ORIENTATIONS = ("angle", "euler")
 CONSTRAINT_METHODS = (
     "standard", "baumgarte", "penalty", "augmented", "index1", "index1aug", "described",
 )  # fmt: skip
-ENGINES = ("auto", "xla", "lanes")
+ENGINES = ("auto", "xla", "lanes", "cuda")
 SOLVERS = (
     "rodas3p", "rodas4", "rodas4p", "rodas5p", "kvaerno3", "kvaerno4", "kvaerno5",
     "bosh3", "tsit5", "dopri5", "dopri8", "euler", "runge2",

@@ -9,7 +9,9 @@ _T = TypeVar("_T")
 
 Group = Annotated[_T, OmitArgPrefixes]
 """Options of a class of their own, whose flags bear their names alone."""
-Engine = Annotated[str, arg(help="What computes: xla, lanes, or auto for the faster one that can.")]
+Engine = Annotated[
+    str, arg(help="What computes: xla, lanes, cuda, or auto for the faster one that can.")
+]
 GaitAccuracy = Annotated[str, arg(help="How accurately to solve: balanced or tight.")]
 """Of a gait with derivatives."""
 

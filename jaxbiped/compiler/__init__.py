@@ -1,10 +1,14 @@
-"""Compiler: programs of JAX as vector machine code for the host's CPU, one simulation a lane.
+"""Compiler: programs of JAX as machine code, one simulation a lane of a CPU or a device's thread.
 
-It knows no walker. The rest of the project uses what is exported here and nothing behind it: two
-engines that run a `Program`, `LANES` and its twin `XLA`, each by `can(request)` and `run(request)`.
+It knows no walker. The rest of the project uses what is exported here and nothing behind it: three
+engines that run a `Program`, `LANES`, `CUDA` and their twin `XLA`, each by `can(request)` and
+`run(request)`.
 """
 
+from jaxbiped.compiler.codegen._ptx_kernel import ARCHITECTURES as ARCHITECTURES
+from jaxbiped.compiler.codegen._ptx_kernel import ptx_text as ptx_text
 from jaxbiped.compiler.passes._operation_counts import count_operations as count_operations
+from jaxbiped.compiler.runtime._device_processor import DeviceProcessor as DeviceProcessor
 from jaxbiped.compiler.runtime._engine import AbstractEngine as AbstractEngine
 from jaxbiped.compiler.runtime._engine import Request as Request
 from jaxbiped.compiler.runtime._engine import Result as Result
@@ -21,5 +25,9 @@ from jaxbiped.compiler.runtime._web_assembly import web_module as web_module
 
 LANES = LaneEngine()
 """Vector machine code for the host's CPU."""
+DEVICES = DeviceProcessor()
+"""This machine's CUDA devices."""
+CUDA = LaneEngine(DEVICES)
+"""The same programs on CUDA devices, one simulation a thread."""
 XLA = LoopEngine()
 """The same programs as loops of XLA."""

@@ -1,4 +1,4 @@
-"""Simulation by lanes."""
+"""Simulation by lanes, or by what runs their programs on devices."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -11,7 +11,7 @@ from jaxtyping import Array, ArrayLike
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import LANES, Request
+from jaxbiped.compiler import LaneEngine, Request
 from jaxbiped.dynamics._state import State
 from jaxbiped.simulate._recorded_steps import recorded_steps
 from jaxbiped.solve._adaptive_program import Solve, Solved
@@ -22,6 +22,7 @@ from jaxbiped.solve.controllers._footstep_limit import PATIENCE
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._differentiable_solve import (
     Setting,
+    lane_engine,
     request_of,
     solve_and_save,
     solve_scene,
@@ -69,7 +70,7 @@ def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
         lowest=ended.lowest,
         highest=ended.highest,
         correction=run.correction,
-        engine="lanes",
+        engine=run.engine,
     )
 
 
@@ -80,10 +81,10 @@ def lane_request(run: "Simulation") -> Request:
 
 def able_request(run: "Simulation") -> Request | None:
     """What is asked of lanes; None where XLA runs it, also for what they lack by "auto"."""
-    if run.engine != "lanes":
+    if run.engine == "xla":
         return None
     request = lane_request(run)
-    hindered = run.replaceable and LANES.can(request) is not None
+    hindered = run.replaceable and _engine(run).can(request) is not None
     return None if hindered else request
 
 
@@ -92,7 +93,7 @@ def prepare_lanes(run: "Simulation", request: Request) -> Callable[["Simulation"
 
     Where only the end is asked for, what JAX does around it is compiled as well.
     """
-    LANES.compile(request).code(1)
+    _engine(run).compile(request).prepare(1)
     return by_lanes if _setting(run).saved.within else _compiled
 
 
@@ -107,6 +108,10 @@ def _step_by_step(
     return ended, *recorded_steps(run.state, rows, setting.solver)
 
 
+def _engine(run: "Simulation") -> LaneEngine:
+    return lane_engine(device=run.engine == "cuda")
+
+
 def _setting(run: "Simulation") -> Setting:
     assert isinstance(run.solver, AbstractRosenbrock)
     quick = run.max_solver_steps <= _QUICK
@@ -116,7 +121,9 @@ def _setting(run: "Simulation") -> Setting:
         section=run.section,
         extremes=run.extremes,
     )
-    return Setting(run.solver, run.watch, run.footsteps is not None, quick, saved)
+    return Setting(
+        run.solver, run.watch, run.footsteps is not None, quick, saved, device=run.engine == "cuda"
+    )
 
 
 def _solve(run: "Simulation") -> Solve:

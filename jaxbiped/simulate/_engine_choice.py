@@ -27,7 +27,7 @@ def choose_engine(
     """The engine that "auto" stands for, or the one that is asked for.
 
     Raises:
-        ArgumentError: an unknown name, or lanes for what they cannot do.
+        ArgumentError: an unknown name, or lanes or CUDA for what they cannot do.
     """
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(leaves))
     obstacle = _hindrance(solver, save_steps, adjoint, leaves, times, traced=traced)
@@ -36,14 +36,16 @@ def choose_engine(
     if dt is not None:
         obstacle = "steps of one size (dt) are diffrax's"
     if section is None:
-        return engine_for(engine, obstacle=obstacle, prefers_xla=traced or redundant)
+        return engine_for(
+            engine, obstacle=obstacle, prefers_xla=traced or redundant, by_device=True
+        )
     check_choice("engine", engine, ENGINES)
     if engine == "xla" or obstacle is not None:
         why = f"here {obstacle}" if obstacle is not None else 'engine = "xla" was chosen'
         raise ArgumentError(
             f"save = {type(section).__name__}() is not allowed here: only lanes do that, and {why}."
         )
-    return "lanes"
+    return engine_for("cuda", obstacle=None, by_device=True) if engine == "cuda" else "lanes"
 
 
 def _hindrance(

@@ -7,8 +7,9 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxbiped._types import Parameter, as_float
-from jaxbiped.compiler import LANES, XLA, Request
+from jaxbiped.compiler import Request
 from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.solve._engine import engine_named
 from jaxbiped.solve._rigid_program import rigid_program
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
@@ -22,7 +23,7 @@ class RigidSimulation(eqx.Module):
         waits: whether the duration only bounds the wait for footsteps.
         embedded: whether steps go on with the embedded solution, one order lower.
         max_arrivals: how many heel strikes to keep.
-        engine: "lanes" or "xla".
+        engine: "lanes", "cuda" or "xla".
     """
 
     walk: RigidWalk
@@ -45,7 +46,7 @@ class RigidSimulation(eqx.Module):
         state = self.walk.state
         program = rigid_program(self.max_arrivals > 0, self.waits, self.embedded)
         request = Request(program, self.walk, room=self.max_arrivals, quick=True)
-        found, recorded, _ = (LANES if self.engine == "lanes" else XLA).run(request)
+        found, recorded, _ = engine_named(self.engine).run(request)
         no_rows = jnp.zeros((0, 1 + len(state)), state.theta_1.dtype)
         rows = no_rows if recorded is None else recorded.values
         t, end = single_time(found.t, found.state)

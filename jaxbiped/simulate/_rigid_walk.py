@@ -58,7 +58,7 @@ def rigid_walk(
         rtol: relative tolerance, in place of the accuracy's.
         max_arrivals: how many heel strikes to keep.
         max_solver_steps: cap on the attempted steps.
-        engine: "xla", "lanes" or "auto" (see `ENGINES`).
+        engine: "xla", "lanes", "cuda" or "auto" (see `ENGINES`).
 
     Returns:
         When, where and how the walk ended: after a footstep, just after the impact, leg 2
@@ -96,7 +96,9 @@ def rigid_walk(
     check_positive("rtol", tolerance)
     leaves = jtu.tree_leaves((scene, state))
     narrow = any(jnp.result_type(leaf) != jnp.float64 for leaf in leaves)
-    chosen = engine_for(engine, obstacle="it computes in 64 bits" if narrow else None)
+    chosen = engine_for(
+        engine, obstacle="it computes in 64 bits" if narrow else None, by_device=True
+    )
     patience = _PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g)
     longest = (1 if footsteps is None else footsteps) * patience if duration is None else duration
     walk = RigidWalk(

@@ -82,8 +82,9 @@ def simulate(
         adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
             needs `diffrax.ForwardMode()`. Where a method projects after each step, only adjoints
             that see the steps are allowed.
-        engine: "xla", "lanes" or "auto" (see `ENGINES`). The results of the two agree to within
-            the tolerance, not bit by bit, nor are their steps the same: rounding decides on them.
+        engine: "xla", "lanes", "cuda" or "auto" (see `ENGINES`). Results of "xla" agree with the
+            others' to within the tolerance, not bit by bit, nor are their steps the same: rounding
+            decides on them.
 
     Returns:
         The motion, and how it ended.

@@ -53,7 +53,7 @@ class Simulation(eqx.Module):
         times: at which to save [s], shape (n,), or None.
         save_steps: whether every step is saved.
         units: scale of each leaf of the state, in which `atol` is measured.
-        engine: "xla" or "lanes".
+        engine: "xla", "lanes" or "cuda".
         replaceable: whether XLA may take over from lanes.
     """
 
@@ -182,7 +182,7 @@ class Simulation(eqx.Module):
         return trim(by_xla(self)) if request is None else by_lanes(self, request)
 
     def lane_request(self) -> Request | None:
-        """What it asks of `jaxbiped.compiler.LANES`; None where XLA runs it."""
+        """What it asks of lanes or devices; None where XLA runs it."""
         return able_request(self)
 
     def compile(self) -> "CompiledSimulation":

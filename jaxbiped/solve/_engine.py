@@ -3,33 +3,60 @@
 import jax
 
 from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped.compiler import CUDA, LANES, XLA, AbstractEngine
 
-ENGINES = ("auto", "xla", "lanes")
+ENGINES = ("auto", "xla", "lanes", "cuda")
 """Names of the engines.
 
 - xla: diffrax, compiled by XLA: on every device, for every solver, in every mode of
   differentiation.
 - lanes: the same method compiled to vector code for this machine's CPU: many times faster.
+- cuda: what lanes run, on this machine's CUDA devices: for walks and labels by the million.
 - auto: lanes where JAX computes on a CPU and they can do what is asked, else xla. `simulate` keeps
   to xla inside `jit`, `vmap` and derivatives, for it is not known what will be asked of it there.
+  Batches of labels that keep a CUDA device busy, where there is one, are its own.
 """
+_BY_NAME = {"xla": XLA, "lanes": LANES, "cuda": CUDA}
 
 
-def engine_for(engine: str, *, obstacle: str | None, prefers_xla: bool = False) -> str:
+def engine_named(name: str) -> AbstractEngine:
+    """The engine of a name that is not "auto"."""
+    return _BY_NAME[name]
+
+
+def engine_for(
+    engine: str, *, obstacle: str | None, prefers_xla: bool = False, by_device: bool = False
+) -> str:
     """The engine to use.
 
     Args:
         engine: one of `ENGINES`.
-        obstacle: why lanes cannot do what is asked; None where they can.
+        obstacle: why lanes, and so devices, cannot do what is asked; None where they can.
         prefers_xla: whether "auto" is "xla" here all the same.
+        by_device: whether CUDA devices do such things at all.
 
     Raises:
-        ArgumentError: an unknown name, or lanes for what they cannot do.
+        ArgumentError: an unknown name, or lanes or devices for what they cannot do, or devices
+            where there is none.
     """
     check_choice("engine", engine, ENGINES)
+    if engine == "cuda":
+        _check_device(obstacle, by_device=by_device)
     if engine == "lanes" and obstacle is not None:
         raise ArgumentError(f'engine = "lanes" is not allowed here: {obstacle}; use engine="xla".')
     if engine != "auto":
         return engine
     able = obstacle is None and jax.default_backend() == "cpu"
     return "lanes" if able and not prefers_xla else "xla"
+
+
+def _check_device(obstacle: str | None, *, by_device: bool) -> None:
+    """Raises `ArgumentError` unless a CUDA device is there and can do what is asked."""
+    why, instead = obstacle, "xla"
+    if why is None:
+        instead = "lanes"
+        why = "CUDA devices run walks and labels, no searches" if not by_device else None
+    if why is None:
+        why = CUDA.processor.hindrance()
+    if why is not None:
+        raise ArgumentError(f'engine = "cuda" is not allowed here: {why}; use engine="{instead}".')

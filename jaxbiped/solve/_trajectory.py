@@ -64,7 +64,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
             accuracy was asked for by a number.
         missed_contacts: how many contacts of a foot lie between two steps of one size, which
             stepped over them; None where no `dt` was given.
-        engine: what computed it, "xla" or "lanes".
+        engine: what computed it, "xla", "lanes" or "cuda".
     """
 
     t: Float[Array, "..."]

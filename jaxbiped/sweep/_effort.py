@@ -7,6 +7,7 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_positive, check_type
 from jaxbiped.basins._arguments import check_whole
+from jaxbiped.compiler import DEVICES
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, resolve_slip_speed
@@ -33,7 +34,8 @@ class Effort(NamedTuple):
         max_attempts: cap on the solver's attempted steps.
         gap: see `after_arrival`.
         solver: of the compliant walker.
-        engine: "lanes" or "xla".
+        engine: "lanes", "cuda" or "xla".
+        may_move: whether large batches go from lanes to a CUDA device where there is one.
         wanted: share of the labels that may be wrong; None where the tolerance decides.
         embedded: whether the rigid walker steps by the embedded method; see `rolling_step`.
     """
@@ -46,6 +48,17 @@ class Effort(NamedTuple):
     engine: str
     wanted: float | None = None
     embedded: bool = False
+    may_move: bool = False
+
+    @property
+    def may_use_device(self) -> bool:
+        """Whether a CUDA device may follow them."""
+        moves = self.may_move and self.engine == "lanes" and DEVICES.hindrance() is None
+        return moves or self.engine == "cuda"
+
+    def engine_of(self, count: int) -> str:
+        """The engine that follows `count` starts: large batches go where a device is kept busy."""
+        return "cuda" if self.may_use_device and DEVICES.fills(count) else self.engine
 
     def at_tolerance(self, rtol: float) -> "Effort":
         """The same at another tolerance."""
@@ -93,7 +106,8 @@ def effort_of(
         max_attempts=int(max_solver_steps),
         gap=_gap(float(tolerance)),
         solver=method,
-        engine=engine_for(engine, obstacle=None),
+        engine=engine_for(engine, obstacle=None, by_device=True),
+        may_move=engine == "auto",
         wanted=wanted,
     )
 

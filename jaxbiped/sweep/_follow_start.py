@@ -1,4 +1,4 @@
-"""Following of starts until each is certain, by either engine."""
+"""Following of starts until each is certain, by any engine."""
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -7,10 +7,11 @@ import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
-from jaxbiped.compiler import LANES, XLA, Program, Request
+from jaxbiped.compiler import Program, Request
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._adaptive_program import Solve
+from jaxbiped.solve._engine import engine_named
 from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._units import units_of
@@ -71,11 +72,11 @@ def follow_starts(
         scene.compliant,
         effort.solver,
         cycles,
-        effort.engine,
+        effort.engine == "xla",
         embedded,
         counted,
     )
-    engine = LANES if effort.engine == "lanes" else XLA
+    engine = engine_named(effort.engine_of(count))
     given = jtu.tree_map(np.asarray, starts)
     outcome: Outcome[np.ndarray] = engine.run(Request(program, given, batch=True)).outputs
     return outcome
@@ -86,13 +87,13 @@ def _program(
     compliant: bool,
     solver: AbstractRosenbrock,
     cycles: tuple[int, ...],
-    engine: str,
+    fenced: bool,
     embedded: bool,
     grazes: bool,
 ) -> Program:
     loop: AbstractLabellingLoop = RigidLabelling(cycles, embedded=embedded)
     if compliant:
-        loop = CompliantLabelling(solver, cycles, fenced=engine == "xla", grazes=grazes)
+        loop = CompliantLabelling(solver, cycles, fenced=fenced, grazes=grazes)
     return Program(loop.begin, loop.attempt, loop.finish)
 
 

@@ -120,8 +120,8 @@ class Labelling(eqx.Module):
         """Everything that the labels depend on, ready for JSON."""
         scene: JsonObject = {k: float(v) for k, v in parameter_values(self.scene).items()}
         effort = self.effort._asdict() | {"solver": type(self.effort.solver).__name__}
-        # Both engines give the same labels; the gap follows from the tolerance.
-        del effort["engine"], effort["gap"], effort["embedded"]
+        # All engines give the same labels; the gap follows from the tolerance.
+        del effort["engine"], effort["may_move"], effort["gap"], effort["embedded"]
         if effort["wanted"] is None:
             del effort["wanted"]
         return {

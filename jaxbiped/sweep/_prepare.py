@@ -51,8 +51,8 @@ def labelling(
         rtol: relative tolerance, in place of the accuracy's; the absolute one is a hundredth.
         solver: of the compliant walker, "rodas3p" to "rodas5p".
         max_solver_steps: cap on a start's attempted steps.
-        engine: "lanes", "xla" or "auto" (see `ENGINES`). Both give the same labels, but for starts
-            nearer to a boundary than the tolerance.
+        engine: "lanes", "cuda", "xla" or "auto" (see `ENGINES`). All give the same labels, but for
+            starts nearer to a boundary than the tolerance.
 
     Returns:
         A `Labelling`: call it with starts, or give it to `sweep`, `label_at` or `nearest_failure`.

@@ -10,6 +10,7 @@ from concurrent.futures import (
     Executor,
     Future,
     ProcessPoolExecutor,
+    ThreadPoolExecutor,
     wait,
 )
 
@@ -41,8 +42,8 @@ def compute_chunks(
         ResourceError: the workers were lost.
     """
     if executor is None:
-        for chunk in map(int, chunks):
-            yield chunk, label_range(labelling, *_part(layout, chunk))
+        ahead = _one_ahead if labelling.effort.may_use_device else _one_by_one
+        yield from ahead(labelling, layout, chunks)
         return
     _check_sent(executor, labelling, layout)
     queue = map(int, chunks)
@@ -60,6 +61,29 @@ def compute_chunks(
     finally:
         for future in running:
             future.cancel()
+
+
+def _one_by_one(
+    labelling: Labelling, layout: Layout, chunks: np.ndarray
+) -> Iterator[tuple[int, Fields]]:
+    for chunk in map(int, chunks):
+        yield chunk, label_range(labelling, *_part(layout, chunk))
+
+
+def _one_ahead(
+    labelling: Labelling, layout: Layout, chunks: np.ndarray
+) -> Iterator[tuple[int, Fields]]:
+    """While a chunk is written, a device labels the next one."""
+    with ThreadPoolExecutor(1) as pool:
+        labelled: list[tuple[int, Future[Fields]]] = []
+        for chunk in map(int, chunks):
+            future = pool.submit(label_range, labelling, *_part(layout, chunk))
+            labelled.append((chunk, future))
+            if len(labelled) > 1:
+                number, first = labelled.pop(0)
+                yield number, first.result()
+        for number, last in labelled:
+            yield number, last.result()
 
 
 def label_range(labelling: Labelling, starts: AbstractStarts, first: int, last: int) -> Fields:

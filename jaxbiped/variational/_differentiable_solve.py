@@ -16,7 +16,7 @@ from jaxtyping import PyTree, PyTreeDef
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
-from jaxbiped.compiler import LANES, Program, Recorded, Request
+from jaxbiped.compiler import CUDA, LANES, LaneEngine, Program, Recorded, Request
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._state import State
 from jaxbiped.dynamics._switches import switches
@@ -47,6 +47,7 @@ class Setting(NamedTuple):
     Attributes:
         solver, watch, counting, saved: see there.
         quick: see `Request`.
+        device: whether CUDA devices solve it.
     """
 
     solver: AbstractRosenbrock
@@ -54,6 +55,12 @@ class Setting(NamedTuple):
     counting: bool
     quick: bool
     saved: Saved = Saved()
+    device: bool = False
+
+
+def lane_engine(*, device: bool) -> LaneEngine:
+    """What runs programs of lanes: devices or the CPU."""
+    return CUDA if device else LANES
 
 
 def solve_scene(solve: Solve, setting: Setting) -> Solved:
@@ -90,7 +97,8 @@ def solve_step_by_step(solve: Solve, setting: Setting, *, most: int) -> tuple[So
     one = jtu.tree_map(lambda leaf: np.asarray(leaf)[None], solve)
 
     def run(room: int) -> tuple[Solved, Recorded]:
-        found = LANES.run(request_of(one, setting)._replace(room=room, batch=True))
+        engine = lane_engine(device=setting.device)
+        found = engine.run(request_of(one, setting)._replace(room=room, batch=True))
         return found.outputs, cast(Recorded, found.records)
 
     outputs, recorded = run(min(most, _ROOM))
@@ -107,12 +115,13 @@ def request_of(solve: Solve, setting: Setting) -> Request:
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
 def _program(setting: Setting) -> Program:
-    solver, watch, counting, _, saved = setting
+    solver, watch, counting, _, saved, _ = setting
     return AdaptiveSolve(solver, watch, counting=counting, saved=saved).program()
 
 
 def _run(solve: Solve, setting: Setting, **options: Any) -> tuple[Solved, Recorded | None]:
-    found = LANES.run(request_of(solve, setting)._replace(**options))
+    engine = lane_engine(device=setting.device)
+    found = engine.run(request_of(solve, setting)._replace(**options))
     return found.outputs, found.records
 
 
@@ -199,4 +208,5 @@ def _columns(
         precision=Precision(solve.rtol, _LOOSER * solve.rtol),
         max_time=t,
         max_solver_steps=_MOST_ATTEMPTS,
+        engine=lane_engine(device=setting.device),
     )[0]

@@ -5,7 +5,7 @@ import jax.tree_util as jtu
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import RealScalarLike, Scalar, Time
-from jaxbiped.compiler import LANES, Program, Recorded, Recording, Request
+from jaxbiped.compiler import LANES, AbstractEngine, Program, Recorded, Recording, Request
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._units import units_of
@@ -31,6 +31,7 @@ def solve_variational(
     max_solver_steps: int,
     carries_parameters: Scalar | bool = True,
     save_nodes: bool = False,
+    engine: AbstractEngine = LANES,
 ) -> tuple[VariationalSolution, Recording | Recorded | None]:
     """Solves from `y0` to the section, a failure or `max_time` [s].
 
@@ -56,7 +57,7 @@ def solve_variational(
         almost=just_before_end(_number(max_time)),
         max_attempts=_number(max_solver_steps),
     )
-    found = LANES.run(
+    found = engine.run(
         Request(
             _program(watch, solver, args.active, save_nodes),
             inputs,

@@ -17,6 +17,7 @@ import jaxbiped as jb
 from jaxbiped.compiler import THREADS_VARIABLE, default_threads
 from jaxbiped.sweep._array_layout import Layout
 from jaxbiped.sweep._workers import _AHEAD, compute_chunks
+from tests.compiler.fake_driver import install
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same, same_results, simplest_grid, with_attractor
 
@@ -39,6 +40,17 @@ def expected():
 def test_threads(expected):
     with concurrent.futures.ThreadPoolExecutor(3) as pool:
         same_results(_swept(executor=pool, workers=3), expected)
+
+
+def test_a_device_labels_the_next_chunk_while_one_is_written(monkeypatch, expected, tmp_path):
+    fake = install(monkeypatch, lanes=4, multiprocessors=1)
+    labelling = gaitless(SCENE, simplest_state(*STABLE), engine="cuda")
+    found = _swept(labelling, store=tmp_path / "store")
+    same_results(found.load(), expected)
+    assert len(fake.launches) == 8
+    # A store does not say by which engine it was filled: lanes go on with it.
+    again = _swept(store=tmp_path / "store")
+    assert again.attrs["labelled_in_this_run"] == 0
 
 
 def test_labellings_and_layouts_travel():

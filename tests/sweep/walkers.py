@@ -23,8 +23,9 @@ def gaitless(scene, state, **options):
 def with_attractor(labelling):
     """A labelling told that its own state is a gait's, which draws in whatever comes near."""
     (state,) = labelling.family.states
-    metric = np.linalg.qr(np.random.default_rng(0).standard_normal((4, 4)))[0][:3]
-    gait = jb.Attractor(1, 3.88, 0.398, state, np.full(3, 0.5), metric, 0.75, 1e-2)
+    size = len(state) - 1
+    metric = np.linalg.qr(np.random.default_rng(0).standard_normal((size, size)))[0][:-1]
+    gait = jb.Attractor(1, 3.88, 0.398, state, np.full(size - 1, 0.5), metric, 0.75, 1e-2)
     family = labelling.family._replace(rows=((gait,),))
     return jb.Labelling(labelling.scene, family, labelling.effort)
 

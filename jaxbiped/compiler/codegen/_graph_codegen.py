@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from jaxbiped.compiler.codegen._instruction_selection import select_fused, select_instruction
+from jaxbiped.compiler.codegen._kernel_target import KernelTarget
 from jaxbiped.compiler.codegen._llvm_function import RARELY, FunctionBuilder, literal, vector
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.passes._liveness import Liveness
@@ -22,15 +23,20 @@ class GraphWriter:
     Attributes:
         width: lanes of a vector, one simulation each.
         inner: lanes of a vector over the entries of a map, where `width` is one.
-        scales: whether the CPU multiplies by powers of two in one instruction.
+        target: what it is written for.
         text: what is written so far.
         padded_rooms: memory whose rows are whole vectors, for maps where `width` is one.
         homes: values that lie in memory, loaded where they are used.
         needed: what is to be computed.
     """
 
-    def __init__(self, width: int, inner: int, scales: bool, needed: Liveness) -> None:
-        self.width, self.inner, self.scales, self.needed = width, inner, scales, needed
+    def __init__(self, target: KernelTarget, needed: Liveness) -> None:
+        self.width, self.inner, self.target, self.needed = (
+            target.width,
+            target.inner,
+            target,
+            needed,
+        )
         self.text = FunctionBuilder()
         self.homes: dict[int, Place] = {}
         self.padded_rooms: set[str] = set()
@@ -94,7 +100,7 @@ class GraphWriter:
         values = [arg for arg in value.args if isinstance(arg, Value)]
         kinds = [value.kind, *(arg.kind for arg in values)]
         operands = [self.use(arg, width) for arg in values]
-        return select_instruction(self.text, value.op, kinds, operands, width, scales=self.scales)
+        return select_instruction(self.text, value.op, kinds, operands, width, self.target)
 
     def _named(self, value: Value) -> tuple[str, int]:
         place = self.homes.get(id(value))

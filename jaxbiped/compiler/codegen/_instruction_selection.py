@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from jaxbiped.compiler.codegen._kernel_target import KernelTarget
 from jaxbiped.compiler.codegen._llvm_function import BYTES, FunctionBuilder, vector
 from jaxbiped.compiler.ir._graph import Kind
 
@@ -29,8 +30,7 @@ def select_instruction(
     kinds: Sequence[Kind],
     operands: Sequence[str],
     width: int,
-    *,
-    scales: bool,
+    target: KernelTarget,
 ) -> str:
     """Writes an operation; the name of its result.
 
@@ -40,7 +40,7 @@ def select_instruction(
         kinds: of the result, and of each operand.
         operands: names of vectors of `width` lanes.
         width: see above.
-        scales: whether the CPU multiplies by powers of two in one instruction.
+        target: what it is written for.
     """
     kind, of = kinds[0], vector(kinds[1], width)
     if op in _PLAIN:
@@ -59,9 +59,12 @@ def select_instruction(
         chosen = f"{result} {operands[1]}, {result} {operands[2]}"
         return text.assign(f"select {of} {operands[0]}, {chosen}")
     if op.startswith("libm "):
-        return _per_lane(text, op.removeprefix("libm "), operands, width)
+        name = target.library + op.removeprefix("libm ")
+        return _per_lane(text, name, operands, width)
     if op == "ldexp":
-        return (_scale if scales else _scale_by_halves)(text, operands[0], operands[1], width)
+        return (_scale if target.scales else _scale_by_halves)(
+            text, operands[0], operands[1], width
+        )
     return _convert(text, op, kinds[1], kind, operands[0], width)
 
 

@@ -9,34 +9,34 @@ from collections.abc import Iterable
 import numpy as np
 
 from jaxbiped.compiler.codegen._graph_codegen import GraphWriter, Place
+from jaxbiped.compiler.codegen._kernel_target import WARP_ANY, KernelTarget
 from jaxbiped.compiler.codegen._lane_scheduler import LaneScheduler, Sizes
 from jaxbiped.compiler.codegen._llvm_function import BYTES, WEIGHTS, vector
 from jaxbiped.compiler.ir._elementwise_primitives import Array
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.passes._liveness import Liveness
-from jaxbiped.compiler.runtime._host_cpu import Host
 from jaxbiped.compiler.runtime._program import Graph
 
 ENTRY = "jaxbiped_run"
 
 
-def kernel_text(graph: Graph, width: int, host: Host) -> str:
-    """LLVM's text of a graph's loop over simulations, `width` at once.
+def kernel_text(graph: Graph, target: KernelTarget) -> str:
+    """LLVM's text of a graph's loop over simulations, many at once.
 
     Its entry takes the address of `FIELDS`. Simulations are taken from the queue, a counter that
     every thread shares, until there are none left or `stop` is not zero.
     """
-    return _Kernel(graph, width, host).text()
+    return _Kernel(graph, target).text()
 
 
 class _Kernel:
-    def __init__(self, graph: Graph, width: int, host: Host) -> None:
-        self.graph, self.width = graph, width
+    def __init__(self, graph: Graph, target: KernelTarget) -> None:
+        self.graph, self.target, self.width = graph, target, target.width
         self.needed = Liveness(graph.results())
-        self.writer = GraphWriter(width, host.width, host.scales, self.needed)
+        self.writer = GraphWriter(target, self.needed)
         self.t = self.writer.text
         sizes = Sizes(len(graph.inputs), len(graph.outputs), len(graph.recorded), len(graph.row))
-        self.lanes = LaneScheduler(self.t, width, sizes, scheduled=graph.scheduled)
+        self.lanes = LaneScheduler(self.t, self.width, sizes, scheduled=graph.scheduled)
         self.kept: list[tuple[Value, Place]] = []
 
     def text(self) -> str:
@@ -49,8 +49,10 @@ class _Kernel:
         t.line(f"br i1 {any_done}, label %refill, label %attempt")
         t.begin("leave")
         t.line("ret void")
-        head = [*sorted(t.declarations), f"define void @{ENTRY}(ptr noalias %fields) {{", "entry:"]
-        return "\n".join([*head, *t.allocations, *t.lines, "}", WEIGHTS]) + "\n"
+        before, behind = self.target.convention, self.target.attributes
+        entry = f"define {before}void @{ENTRY}(ptr noalias %fields) {behind}{{"
+        head = [*self.target.declarations(t.declarations), entry, "entry:"]
+        return "\n".join([*head, *t.allocations, *t.lines, "}", WEIGHTS]) + "\n" + self.target.rest
 
     def _rooms(self) -> None:
         """Memory for what outlives an attempt."""
@@ -97,7 +99,7 @@ class _Kernel:
         t.store(none, lanes.bits["fresh"], Kind.BOOL, self.width)
         lanes.visit_where("exchange", "done", lanes.exchange)
         with t.scope():
-            live = t.any_lane(self._mark("live"), self.width)
+            live = self._any(self._mark("live"))
             t.line(f"br i1 {live}, label %prepare, label %leave")
         t.begin("prepare")
         self._keep(False)
@@ -136,6 +138,9 @@ class _Kernel:
         t.begin("attempt")
         stop = t.assign(f"load volatile i64, ptr {lanes.field['stop']}")
         going = t.assign(f"icmp eq i64 {stop}, 0")
+        if self.target.votes:
+            # No thread of a warp may leave before the others.
+            going = self._any(going)
         t.line(f"br i1 {going}, label %step, label %leave")
         t.begin("step")
         if graph.row:
@@ -153,7 +158,7 @@ class _Kernel:
                 self._store(text, value.kind, w.homes[id(value)])
             done = self._live(done)
             t.store(done, lanes.bits["done"], Kind.BOOL, self.width)
-            return t.any_lane(done, self.width)
+            return self._any(done)
 
     def _records(self) -> None:
         """Records, once or as long as any lane has another."""
@@ -166,13 +171,21 @@ class _Kernel:
             w.write(graph.notes)
             wants = self._live(w.use(graph.recording))
             t.store(wants, lanes.bits["wants"], Kind.BOOL, self.width)
-            t.line(f"br i1 {t.any_lane(wants, self.width)}, label %note, label %recorded")
+            t.line(f"br i1 {self._any(wants)}, label %note, label %recorded")
             t.begin("note")
             for place, value in enumerate(graph.recorded):
                 self._store(w.use(value), value.kind, Place(lanes.rooms.noted, place))
         lanes.visit_where("noting", "wants", lanes.note)
         t.line(f"br label %{'record' if graph.scheduled else 'recorded'}")
         t.begin("recorded")
+
+    def _any(self, mask: str) -> str:
+        """Whether a mask holds in any of the simulations that go on together."""
+        mask = self.t.any_lane(mask, self.width)
+        if not self.target.votes:
+            return mask
+        self.t.declarations.add(f"declare i1 @{WARP_ANY}(i1)")
+        return self.t.assign(f"call i1 @{WARP_ANY}(i1 {mask})")
 
     def _mark(self, name: str) -> str:
         return self.t.load(self.lanes.bits[name], Kind.BOOL, self.width)

@@ -155,23 +155,28 @@ def split_exponent(m: Arithmetic, x: Value) -> tuple[Value, Value]:
     return m.floated(exponent), m.sub(m.from_bits(fraction), 1.0)
 
 
-def logarithm(m: Arithmetic, x: Value) -> Value:
-    """The natural logarithm (FreeBSD's msun, e_log.c)."""
+def normal_logarithm(m: Arithmetic, x: Value) -> Value:
+    """log x for x above zero, normal and finite (FreeBSD's msun, e_log.c)."""
     k, f = split_exponent(m, x)
     s = m.div(f, m.add(f, 2.0))
     z = m.mul(s, s)
     series = m.mul(z, m.series(z, _LOG_SERIES))
     half = m.mul(m.mul(f, f), 0.5)
     inner = m.fma(s, m.add(half, series), m.mul(k, LN2_LOW))
-    value = m.sub(m.mul(k, LN2_HIGH), m.sub(m.sub(half, inner), f))
+    return m.sub(m.mul(k, LN2_HIGH), m.sub(m.sub(half, inner), f))
+
+
+def logarithm(m: Arithmetic, x: Value) -> Value:
+    """The natural logarithm."""
+    value = normal_logarithm(m, x)
     normal = m.both(m.compare("oge", x, TINIEST_NORMAL), m.compare("olt", x, math.inf))
     rare = m.block.add("not", normal)
     return m.where_rare(rare, value, lambda inside: inside.per_lane("log", x, rare))
 
 
-_HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
+HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
 """π/2 in three parts."""
-_LARGE_ANGLE = 2.0**20
+LARGE_ANGLE = 2.0**20
 _SINE = (
     1.58969099521155010221e-10,
     -2.50507602534068634195e-08,
@@ -195,9 +200,15 @@ def _quarter_turns(m: Arithmetic, x: Value) -> tuple[Value, Value, Value]:
     """Quadrant, sine and cosine of the angle that is left."""
     q = m.rint(m.mul(x, 2.0 / math.pi))
     minus = m.neg(q)
-    first = m.fma(minus, _HALF_PI[0], x)
-    rest = m.fma(minus, _HALF_PI[1], first)
-    low = m.fma(minus, _HALF_PI[2], m.fma(minus, _HALF_PI[1], m.sub(first, rest)))
+    first = m.fma(minus, HALF_PI[0], x)
+    rest = m.fma(minus, HALF_PI[1], first)
+    low = m.fma(minus, HALF_PI[2], m.fma(minus, HALF_PI[1], m.sub(first, rest)))
+    sine, cosine = within_quarter(m, rest, low)
+    return m.truncated(q), sine, cosine
+
+
+def within_quarter(m: Arithmetic, rest: Value, low: Value) -> tuple[Value, Value]:
+    """Sine and cosine of `rest` + `low`, at most π/4 and a little."""
     z = m.mul(rest, rest)
     cubed = m.mul(m.mul(rest, z), m.series(z, _SINE))
     half = m.mul(z, 0.5)
@@ -205,21 +216,25 @@ def _quarter_turns(m: Arithmetic, x: Value) -> tuple[Value, Value, Value]:
     lost = m.sub(m.sub(1.0, near), half)
     curved = m.fma(m.mul(z, z), m.series(z, _COSINE), lost)
     cosine = m.add(near, m.fma(m.neg(rest), low, curved))
-    sine = m.add(rest, m.fma(low, near, cubed))
-    return m.truncated(q), sine, cosine
+    return m.add(rest, m.fma(low, near, cubed)), cosine
+
+
+def turned(m: Arithmetic, number: Value, quarter: int, sine: Value, cosine: Value) -> Value:
+    """Sine, or cosine one `quarter` on, of an angle after a `number` of quarter turns."""
+    number = m.integer("add", number, quarter)
+    odd = m.block.add("icmp ne", m.integer("and", number, 1), m.whole(0), kind=Kind.BOOL)
+    back = m.block.add("icmp ne", m.integer("and", number, 2), m.whole(0), kind=Kind.BOOL)
+    value = m.choose(odd, cosine, sine)
+    return m.choose(back, m.neg(value), value)
 
 
 def _circular(name: str, quarter: int) -> Callable[[Arithmetic, Value], Value]:
     def function(m: Arithmetic, x: Value) -> Value:
         number, sine, cosine = _quarter_turns(m, x)
-        number = m.integer("add", number, quarter)
-        odd = m.block.add("icmp ne", m.integer("and", number, 1), m.whole(0), kind=Kind.BOOL)
-        back = m.block.add("icmp ne", m.integer("and", number, 2), m.whole(0), kind=Kind.BOOL)
-        value = m.choose(odd, cosine, sine)
-        value = m.choose(back, m.neg(value), value)
+        value = turned(m, number, quarter, sine, cosine)
         if quarter == 0:
             value = _near_zero(m, x, value)
-        large = m.block.add("not", m.compare("olt", m.abs(x), _LARGE_ANGLE))
+        large = m.block.add("not", m.compare("olt", m.abs(x), LARGE_ANGLE))
         return m.where_rare(large, value, lambda inside: inside.per_lane(name, x, large))
 
     return function

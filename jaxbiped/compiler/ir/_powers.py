@@ -16,7 +16,7 @@ from jaxbiped.compiler.ir._graph import Value
 
 def power(m: Arithmetic, x: Value, y: Value) -> Value:
     """x ** y; what is not above zero, normal and finite by the C library."""
-    high, low = _precise_logarithm(m, x)
+    high, low = precise_logarithm(m, x)
     product = m.mul(y, high)
     rest = m.fma(y, low, m.fma(y, high, m.neg(product)))
     value = exponential(m, product, rest)
@@ -40,7 +40,7 @@ def power_of_root(m: Arithmetic, x: Value, y: Value) -> Value:
 _TWO_THIRDS = (0.6666666666666666, 3.700743415417188e-17)
 
 
-def _precise_logarithm(m: Arithmetic, x: Value) -> tuple[Value, Value]:
+def precise_logarithm(m: Arithmetic, x: Value) -> tuple[Value, Value]:
     """log x in two parts, to about 2⁻⁶⁴ of itself, for x above zero and finite."""
     k, f = split_exponent(m, x)
     total = m.add(f, 2.0)
@@ -56,15 +56,15 @@ def _precise_logarithm(m: Arithmetic, x: Value) -> tuple[Value, Value]:
     third_low = m.fma(cube_low, _TWO_THIRDS[0], m.fma(cube, _TWO_THIRDS[1], third_low))
     tail = m.mul(m.mul(cube, z), m.series(z, _ATANH_TAIL))
     high, low = m.add(s, s), m.add(s_low, s_low)
-    high, low = _sum(m, high, m.add(low, m.add(third_low, tail)), third)
-    shifted, shifted_low = _sum(m, m.mul(k, LN2_HIGH), low, high)
-    return _sum(m, shifted, m.fma(k, LN2_LOW, shifted_low), m.real(0.0))
+    high, low = sum_in_two(m, high, m.add(low, m.add(third_low, tail)), third)
+    shifted, shifted_low = sum_in_two(m, m.mul(k, LN2_HIGH), low, high)
+    return sum_in_two(m, shifted, m.fma(k, LN2_LOW, shifted_low), m.real(0.0))
 
 
 _ATANH_TAIL = tuple(2.0 / k for k in range(23, 4, -2))
 
 
-def _sum(m: Arithmetic, a: Value, low: Value, b: Value) -> tuple[Value, Value]:
+def sum_in_two(m: Arithmetic, a: Value, low: Value, b: Value) -> tuple[Value, Value]:
     """a + b + low in two parts, the second below the first's last place."""
     total = m.add(a, b)
     part = m.sub(total, a)

@@ -1,7 +1,6 @@
 """Compiled programs, run over many simulations at once: queues, threads and arrays."""
 
 import contextlib
-import ctypes
 import pickle
 import threading
 import weakref
@@ -12,21 +11,24 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped.compiler.codegen._lane_scheduler import FIELDS
 from jaxbiped.compiler.runtime._buffer_pool import BufferPool
-from jaxbiped.compiler.runtime._host_cpu import host
+from jaxbiped.compiler.runtime._host_processor import HostProcessor
 from jaxbiped.compiler.runtime._input_streams import input_streams_of
 from jaxbiped.compiler.runtime._kernel import Kernel
 from jaxbiped.compiler.runtime._machine_code import MachineCode
+from jaxbiped.compiler.runtime._processor import AbstractProcessor, Launch
 from jaxbiped.compiler.runtime._program import Graph, Outline, Program, leaves_of
 from jaxbiped.compiler.runtime._recorded import Recorded
 from jaxbiped.compiler.runtime._threads import default_threads, run_in_threads
 
-_MANY = 8
-"""Vectors for each thread from which on two are computed side by side."""
+HOST = HostProcessor()
 _KNOWING = threading.Lock()
-_KNOWN: "weakref.WeakValueDictionary[str, CompiledProgram]" = weakref.WeakValueDictionary()
-"""Programs that somebody has, by their fingerprints."""
+_KNOWN: "weakref.WeakValueDictionary[tuple[str, str], CompiledProgram]" = (
+    weakref.WeakValueDictionary()
+)
+"""Programs that somebody has, by their fingerprints and processors."""
+_KERNELS: "weakref.WeakValueDictionary[str, Kernel]" = weakref.WeakValueDictionary()
+"""What is traced once for all processors, by fingerprints."""
 
 
 class Ran(NamedTuple):
@@ -39,51 +41,61 @@ class Ran(NamedTuple):
 class CompiledProgram:
     """A program compiled for inputs of one structure."""
 
-    def __init__(self, program: Program, inputs: PyTree) -> None:
+    def __init__(
+        self, program: Program, inputs: PyTree, processor: AbstractProcessor = HOST
+    ) -> None:
         """A program is traced when it is needed; `inputs` are one simulation's, or their shapes."""
-        self._hold(Kernel.of_program(program, inputs))
+        self._hold(Kernel.of_program(program, inputs), processor)
 
-    def _hold(self, kernel: Kernel) -> None:
-        self._kernel = kernel
+    def _hold(self, kernel: Kernel, processor: AbstractProcessor) -> None:
+        self._kernel, self._processor = kernel, processor
         self._begun: set[int] = set()
         self._lock = threading.Lock()
 
     @staticmethod
-    def of(program: Program, inputs: PyTree) -> "CompiledProgram":
+    def of(
+        program: Program, inputs: PyTree, processor: AbstractProcessor = HOST
+    ) -> "CompiledProgram":
         """The one of a program, which may be in use already without having been traced."""
-        made = CompiledProgram(program, inputs)
+        made = CompiledProgram(program, inputs, processor)
         digest = made._kernel.digest
         if digest is None:
             return made
+        fresh = made._kernel
         with _KNOWING:
-            known = _KNOWN.setdefault(digest, made)
-        known._kernel.trace_from(made._kernel)
+            known = _KNOWN.setdefault((digest, processor.name), made)
+            kernel = _KERNELS.setdefault(digest, known._kernel)
+            if known is made:
+                made._kernel = kernel
+            known._kernel.trace_from(fresh)
         return known
 
     @staticmethod
-    def kept(digest: str) -> "CompiledProgram":
+    def kept(digest: str, processor: AbstractProcessor = HOST) -> "CompiledProgram":
         """The one with this fingerprint.
 
         Raises:
             KeyError: neither the process nor the disk keeps it.
         """
         with _KNOWING:
-            known = _KNOWN.get(digest)
+            known = _KNOWN.get((digest, processor.name))
             if known is None:
                 known = CompiledProgram.__new__(CompiledProgram)
-                known._hold(Kernel.kept(digest))
-                _KNOWN[digest] = known
+                kernel = _KERNELS.get(digest) or Kernel.kept(digest)
+                known._hold(_KERNELS.setdefault(digest, kernel), processor)
+                _KNOWN[digest, processor.name] = known
         return known
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Another process has it by its fingerprint."""
         if self._kernel.digest is None:
             raise pickle.PicklingError("a program that has no fingerprint")
-        return CompiledProgram.kept, (self._kernel.digest,)
+        return CompiledProgram.kept, (self._kernel.digest, self._processor)
 
     def __fingerprint__(self) -> object:
         """See `jaxbiped._fingerprint`."""
-        return self._kernel.digest or object()
+        digest = self._kernel.digest
+        return object() if digest is None else (digest, self._processor.name)
 
     @property
     def size(self) -> int:
@@ -112,6 +124,10 @@ class CompiledProgram:
         """The program as LLVM's text."""
         return self._kernel.text(width)
 
+    def device_text(self, threads: int, blocks: int) -> str:
+        """The program as LLVM's text for devices; see `device_target`."""
+        return self._kernel.device_text(threads, blocks)
+
     def instructions(self) -> int:
         """How many machine instructions the program has, for vectors of the host's width."""
         return self._kernel.instructions()
@@ -122,19 +138,15 @@ class CompiledProgram:
 
     def runs_at_once(self, count: int) -> bool:
         """Whether it can run `count` simulations without being traced or compiled."""
-        return self._kernel.has_code(self.width(count, default_threads()))
+        return self._processor.ready(self._kernel, self.width(count, default_threads()))
 
     def width(self, count: int, threads: int) -> int:
-        """Simulations in one vector: a thread that has only one is faster with it alone.
+        """Simulations in one vector; see `AbstractProcessor.width`."""
+        return self._processor.width(self._kernel, count, threads)
 
-        Where there are many, two of the host's vectors side by side: while one waits, the other one
-        is computed. What a map loops over fills the caches instead.
-        """
-        if count <= threads:
-            return 1
-        if count < _MANY * threads * host().width:
-            return host().width
-        return host().width * (1 if self._kernel.signature.maps else 2)
+    def prepare(self, width: int) -> None:
+        """Traces and compiles what vectors of this width need."""
+        self._processor.prepare(self._kernel, width)
 
     def make_ready(self, count: int) -> None:
         """Begins to trace and compile, in the background, what running `count` of them needs."""
@@ -143,12 +155,12 @@ class CompiledProgram:
             begun = width in self._begun
             self._begun.add(width)
         if not begun:
-            threading.Thread(target=self._prepare, args=(width,)).start()
+            threading.Thread(target=self._begin, args=(width,)).start()
 
-    def _prepare(self, width: int) -> None:
+    def _begin(self, width: int) -> None:
         # Who needs the program is told why there is none.
         with contextlib.suppress(Exception):
-            self.code(width)
+            self.prepare(width)
 
     def run(
         self,
@@ -222,7 +234,8 @@ class CompiledProgram:
             records[:] = np.nan
         record_counts = np.zeros(count, dtype=np.int64)
         queue, stop = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
-        chosen = self.width(count, threads or default_threads()) if width is None else width
+        many = threads or default_threads()
+        chosen = self.width(count, many) if width is None else width
         arrays = dict(
             queue=queue,
             stop=stop,
@@ -237,21 +250,11 @@ class CompiledProgram:
         numbers = dict(
             count=count, record_room=room, schedule_length=len(times), stream_stride=streams.stride
         )
-        fields = np.array(
-            [arrays[n].ctypes.data if n in arrays else numbers[n] for n in FIELDS], dtype=np.int64
-        )
         if count:
-            code = self.code(chosen)
-            entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(code.address)
-            # What a thread runs and where it writes lives as long as the thread, even where a
-            # second interrupt leaves it behind.
-            used = code, fields, arrays, streams
-
-            def work(_: object = used) -> None:
-                entry(fields.ctypes.data)
-
-            workers = min(threads or default_threads(), -(-count // chosen))
-            run_in_threads(work, workers, stop, quick=quick)
+            launch = Launch(arrays, numbers, streams)
+            job = self._processor.job(self._kernel, launch, chosen, many)
+            run_in_threads(job.run, job.workers, stop, quick=quick)
+            job.finish()
         recorded = Recorded(records, record_counts) if signature.records else None
         return self._whole(outputs), recorded
 

@@ -10,7 +10,15 @@ from jaxtyping import PyTree
 
 from jaxbiped._fingerprint import as_leaves, fingerprint
 from jaxbiped._paused_collection import paused_collection
+from jaxbiped.compiler.codegen._kernel_target import host_target
 from jaxbiped.compiler.codegen._lane_kernel import ENTRY, kernel_text
+from jaxbiped.compiler.codegen._ptx_kernel import (
+    BLOCKS,
+    THREADS,
+    Architecture,
+    device_target,
+    ptx_text,
+)
 from jaxbiped.compiler.runtime._host_cpu import host
 from jaxbiped.compiler.runtime._machine_code import (
     MachineCode,
@@ -22,9 +30,11 @@ from jaxbiped.compiler.runtime._program import Graph, Outline, Program, graph_of
 from jaxbiped.compiler.runtime._program_store import (
     Signature,
     read_code,
+    read_ptx,
     read_signature,
     signature_of,
     write_code_name,
+    write_ptx,
     write_signature,
 )
 
@@ -43,6 +53,7 @@ class Kernel:
         self._program, self.inputs, self.digest = program, inputs, digest
         self._graph: Graph | None = None
         self._code: dict[int, MachineCode] = {}
+        self._ptx: dict[str, str] = {}
         self._making = threading.Lock()
 
     @staticmethod
@@ -116,7 +127,7 @@ class Kernel:
         """The program as LLVM's text."""
         graph = self.graph
         with paused_collection():
-            return kernel_text(graph, width, host())
+            return kernel_text(graph, host_target(width, host()))
 
     def instructions(self) -> int:
         """How many machine instructions it has, for vectors of the host's width."""
@@ -138,6 +149,35 @@ class Kernel:
             if code is not None:
                 self._code[width] = code
             return code is not None
+
+    def device_text(self, threads: int = THREADS, blocks: int = BLOCKS) -> str:
+        """The program as LLVM's text for devices; see `device_target`."""
+        graph = self.graph
+        with paused_collection():
+            return kernel_text(graph, device_target(threads, blocks))
+
+    def ptx(self, architecture: Architecture) -> str:
+        """The program as PTX for a kind of device."""
+        with self._making:
+            if not self._has_ptx(architecture):
+                text = ptx_text(self.device_text(), architecture)
+                self._ptx[architecture.name] = text
+                if self.digest is not None:
+                    write_ptx(self.digest, architecture, text)
+            return self._ptx[architecture.name]
+
+    def has_ptx(self, architecture: Architecture) -> bool:
+        """Whether `ptx` takes no tracing and no compiling."""
+        with self._making:
+            return self._has_ptx(architecture)
+
+    def _has_ptx(self, architecture: Architecture) -> bool:
+        name = architecture.name
+        if name not in self._ptx and self.digest is not None:
+            kept = read_ptx(self.digest, architecture)
+            if kept is not None:
+                self._ptx[name] = kept
+        return name in self._ptx
 
     def _read_code(self, width: int) -> MachineCode | None:
         if self.digest is None or self._graph is not None:

@@ -1,4 +1,4 @@
-"""Lane engine: programs as vector machine code for the host's CPU, one simulation a lane."""
+"""Lane engine: programs as machine code, one simulation a lane of a vector or a device's thread."""
 
 from collections.abc import Callable, Sequence
 
@@ -10,19 +10,31 @@ from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.compiler.passes._vertex_elimination import jacobian
-from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
+from jaxbiped.compiler.runtime._compiled_program import HOST, CompiledProgram
 from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result, Shapes
 from jaxbiped.compiler.runtime._lane_call import Schedule
 from jaxbiped.compiler.runtime._primitive import call, call_recording
+from jaxbiped.compiler.runtime._processor import AbstractProcessor
 from jaxbiped.compiler.runtime._program import Program
 
 
 class LaneEngine(AbstractEngine):
-    """Compiles a program on its first request. Computes in 64 bits; has no derivatives."""
+    """Compiles a program on its first request. Computes in 64 bits; has no derivatives.
+
+    Attributes:
+        processor: what the programs run on.
+    """
+
+    def __init__(self, processor: AbstractProcessor = HOST) -> None:
+        self.processor = processor
 
     def can(self, request: Request) -> str | None:
-        """None, or which operation of the program lanes do not have. Traces the program."""
-        return _hindrance(request.program, *request.shapes())
+        """None, or that there is no processor, or which operation of the program lanes do not have.
+
+        Traces the program.
+        """
+        missing = self.processor.hindrance()
+        return missing or _hindrance(request.program, *request.shapes(), self.processor)
 
     def run(self, request: Request) -> Result:
         """See `AbstractEngine.run`.
@@ -69,19 +81,23 @@ class LaneEngine(AbstractEngine):
 
     def compile(self, request: Request) -> CompiledProgram:
         """The compiled program of requests with inputs of these shapes, traced when needed."""
-        return _compiled(request.program, *request.shapes())
+        return _compiled(request.program, *request.shapes(), self.processor)
 
 
 @bounded_cache(PROGRAMS)
-def _compiled(program: Program, structure: jtu.PyTreeDef, shapes: Shapes) -> CompiledProgram:
+def _compiled(
+    program: Program, structure: jtu.PyTreeDef, shapes: Shapes, processor: AbstractProcessor
+) -> CompiledProgram:
     leaves = [jax.ShapeDtypeStruct(shape, jnp.float64) for shape in shapes]
-    return CompiledProgram.of(program, jtu.tree_unflatten(structure, leaves))
+    return CompiledProgram.of(program, jtu.tree_unflatten(structure, leaves), processor)
 
 
 @bounded_cache(PROGRAMS)
-def _hindrance(program: Program, structure: jtu.PyTreeDef, shapes: Shapes) -> str | None:
+def _hindrance(
+    program: Program, structure: jtu.PyTreeDef, shapes: Shapes, processor: AbstractProcessor
+) -> str | None:
     try:
-        _compiled(program, structure, shapes).check()
+        _compiled(program, structure, shapes, processor).check()
     except UnknownPrimitiveError as error:
         return str(error)
     return None

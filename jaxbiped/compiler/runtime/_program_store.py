@@ -13,6 +13,7 @@ import numpy as np
 
 from jaxbiped._disk_cache import read_entry, write_entry
 from jaxbiped.compiler.codegen._lane_kernel import ENTRY
+from jaxbiped.compiler.codegen._ptx_kernel import Architecture
 from jaxbiped.compiler.runtime._host_cpu import Host
 from jaxbiped.compiler.runtime._machine_code import MachineCode, stored_code
 from jaxbiped.compiler.runtime._program import Graph, Outline
@@ -89,6 +90,17 @@ def read_code(digest: str, width: int, host: Host, *, maps: bool) -> MachineCode
 def write_code_name(digest: str, width: int, host: Host, name: str) -> None:
     """Keeps by what name to find a program's machine code."""
     write_entry(_KIND, _code_entry(digest, width, host), name.encode())
+
+
+def read_ptx(digest: str, architecture: Architecture) -> str | None:
+    """A program's PTX for a kind of device; None where it is not kept."""
+    kept = read_entry(_KIND, f"{digest}-{architecture.name}")
+    return None if kept is None else kept.decode()
+
+
+def write_ptx(digest: str, architecture: Architecture, text: str) -> None:
+    """Keeps it."""
+    write_entry(_KIND, f"{digest}-{architecture.name}", text.encode())
 
 
 def _code_entry(digest: str, width: int, host: Host) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import llvmlite.binding as llvm
 
+from jaxbiped.compiler.codegen._kernel_target import host_target
 from jaxbiped.compiler.codegen._lane_kernel import ENTRY, kernel_text
 from jaxbiped.compiler.codegen._software_fma import with_software_fma
 from jaxbiped.compiler.runtime._host_cpu import Host
@@ -37,7 +38,7 @@ def web_module(graph: Graph) -> bytes:
     llvm.initialize_all_asmprinters()
     target = llvm.Target.from_triple(_PAGE.triple)
     machine = target.create_target_machine(cpu=_PAGE.cpu, features=_PAGE.features, opt=2)
-    text = with_software_fma(kernel_text(graph, 1, _PAGE))
+    text = with_software_fma(kernel_text(graph, host_target(1, _PAGE)))
     head = f'target datalayout = "{machine.target_data}"\ntarget triple = "{_PAGE.triple}"\n'
     return _exporting(bytes(machine.emit_object(optimised_module(head + text, machine))), ENTRY)
 

@@ -1,0 +1,194 @@
+"""Batches on an emulated CUDA device: the queue, endings, refill, failures, several devices."""
+
+import ctypes
+import threading
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxbiped._checks import ResourceError
+from jaxbiped.compiler import CUDA, LANES, LaneEngine, Program, Request
+from jaxbiped.compiler.runtime import _cuda_device, _device_processor
+from jaxbiped.compiler.runtime._cuda_device import find_devices
+from jaxbiped.compiler.runtime._cuda_driver import CudaDriver, CudaError
+from tests.compiler.fake_driver import FakeDriver, install
+
+NEVER = 2000.0
+
+
+def _attempt(inputs, carried):
+    length, growth = inputs
+    x, turns = carried
+    x = jnp.sin(x) * growth + x
+    ended = (turns + 1).astype(jnp.float64) >= jnp.where(jnp.isnan(length), NEVER, length)
+    return (x, turns + 1), ended
+
+
+def _record(inputs, carried, _):
+    x, turns = carried
+    return jnp.sin(3.0 * turns.astype(jnp.float64)) > 0.0, [x, turns.astype(jnp.float64)]
+
+
+COUNTING = Program(
+    start=lambda inputs: (inputs[1], jnp.zeros((), jnp.int64)),
+    attempt=_attempt,
+    finish=lambda inputs, carried: carried,
+    record=_record,
+)
+
+
+def _inputs(lengths):
+    lengths = np.asarray(lengths, dtype=float)
+    return lengths, np.linspace(0.1, 0.9, len(lengths))
+
+
+def _run(engine, lengths, room=5):
+    found = engine.run(Request(COUNTING, _inputs(lengths), room=room, batch=True))
+    return [*found.outputs, *found.records]
+
+
+def _same(found, expected):
+    for a, b in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("count", [1, 3, 8, 9, 100])
+def test_every_start_is_taken_once_and_gives_the_lanes_bits(monkeypatch, count):
+    fake = install(monkeypatch, lanes=4, multiprocessors=1)
+    lengths = 1 + np.random.default_rng(count).integers(0, 40, count)
+    found = _run(CUDA, lengths)
+    _same(found, _run(LANES, lengths))
+    np.testing.assert_array_equal(found[1], lengths)
+    assert fake.launches == [1]
+    assert not fake.memory
+
+
+def test_an_empty_batch_launches_nothing(monkeypatch):
+    fake = install(monkeypatch)
+    found = CUDA.run(Request(COUNTING, _inputs([]), batch=True))
+    assert [len(each) for each in found.outputs] == [0, 0]
+    assert not fake.launches
+
+
+def test_an_endless_or_poisoned_start_does_not_hold_up_the_others(monkeypatch):
+    fake = install(monkeypatch, lanes=4, multiprocessors=1)
+    lengths, growths = _inputs(np.full(400, 100.0))
+    lengths[7], growths[[90, 150]] = np.nan, np.nan
+    found = CUDA.run(Request(COUNTING, (lengths, growths), batch=True)).outputs
+    expected = np.where(np.isnan(lengths), NEVER, lengths)
+    np.testing.assert_array_equal(found[1], expected)
+    np.testing.assert_array_equal(np.isnan(found[0]), np.isnan(growths))
+    # What all threads of the warps went through, idle or not: to stop, to record, to refill.
+    assert np.sum(expected) <= fake.attempts(votes=3) < 1.05 * np.sum(expected)
+
+
+def test_several_devices_share_a_batch(monkeypatch):
+    fake = install(monkeypatch, devices=3, lanes=2, multiprocessors=1)
+    lengths = 1 + np.arange(300) % 17
+    _same(_run(CUDA, lengths), _run(LANES, lengths))
+    assert len(fake.launches) == 3
+    assert not fake.memory
+
+
+def test_parts_have_room_on_a_device(monkeypatch):
+    fake = install(monkeypatch, lanes=2, multiprocessors=1)
+    monkeypatch.setattr(_device_processor, "_MOST_BYTES", 4000)
+    lengths = 1 + np.arange(200) % 17
+    _same(_run(CUDA, lengths), _run(LANES, lengths))
+    assert len(fake.launches) > 4
+
+
+def test_streams_are_read_in_both_directions(monkeypatch):
+    install(monkeypatch, lanes=4, multiprocessors=1)
+    for backwards in (False, True):
+        program = Program(
+            start=lambda inputs: (jnp.zeros(()), jnp.zeros(())),
+            attempt=lambda inputs, now, row: (
+                (now[0] * 0.5 + row[0] - row[1], now[1] + 1),
+                now[1] + 1 >= inputs,
+            ),
+            finish=lambda inputs, now: now[0],
+            stream=2,
+            backwards=backwards,
+        )
+        random = np.random.default_rng(3)
+        rows = [random.standard_normal((length, 2)) for length in (1, 4, 7, 2, 9)]
+        request = Request(program, np.array([3.0, 4.0, 5.0, 6.0, 7.0]), stream=rows, batch=True)
+        _same([CUDA.run(request).outputs], [LANES.run(request).outputs])
+
+
+def test_under_jit_and_vmap(monkeypatch):
+    install(monkeypatch, lanes=4, multiprocessors=1)
+
+    def run(engine):
+        def one(length, growth):
+            return engine.run(Request(COUNTING, (length, growth), room=5)).outputs
+
+        return jax.jit(jax.vmap(one))(*map(jnp.asarray, _inputs([3, 9, 1, 12])))
+
+    _same(run(CUDA), run(LANES))
+
+
+def test_a_device_without_room_says_so_in_a_sentence(monkeypatch):
+    fake = install(monkeypatch, room=100)
+    with pytest.raises(ResourceError, match=r"out of memory.*smaller batches or chunks"):
+        _run(CUDA, [3.0] * 50)
+    assert not fake.memory
+
+
+def test_an_interrupt_stops_the_kernel(monkeypatch):
+    fake = install(monkeypatch, lanes=2, multiprocessors=1)
+    _run(CUDA, [1.0])
+    stop = threading.Timer(0.3, lambda: ctypes.pythonapi.PyErr_SetInterrupt())
+    stop.start()
+    with pytest.raises(KeyboardInterrupt):
+        _run(CUDA, [1e15, 1e15])
+    assert not fake.memory
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (dict(devices=0), "there is no CUDA device"),
+        (dict(capability=(7, 5)), "older than compute capability 8.0"),
+    ],
+)
+def test_why_there_is_no_device(monkeypatch, options, why):
+    fake = FakeDriver(**options)
+    monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
+    found = find_devices()
+    assert not found.usable
+    assert why in found.missing
+
+
+def test_a_driver_that_fails_is_no_device(monkeypatch):
+    fake = FakeDriver()
+    fake.cuInit = _Failing()
+    monkeypatch.setattr(_cuda_device, "load_library", lambda: fake)
+    assert "finds no device" in find_devices().missing
+    monkeypatch.setattr(_cuda_device, "load_library", lambda: None)
+    assert find_devices().missing == "no CUDA driver is installed"
+    with pytest.raises(CudaError, match="cuInit: launch failed"):
+        CudaDriver(fake).call("cuInit", 0)
+
+
+class _Failing:
+    def __call__(self, *args):
+        return 100
+
+
+def test_batches_fill_a_device(monkeypatch):
+    install(monkeypatch, multiprocessors=100)
+    processor = CUDA.processor
+    assert processor.fills(30_000)
+    assert not processor.fills(20_000)
+    assert processor.hindrance() is None
+
+
+def test_without_a_device_the_engine_cannot(monkeypatch):
+    install(monkeypatch, devices=0)
+    engine = LaneEngine(CUDA.processor)
+    assert engine.can(Request(COUNTING, _inputs([1]), batch=True)) == "there is no CUDA device"
+    assert not CUDA.processor.fills(1 << 30)

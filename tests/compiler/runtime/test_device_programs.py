@@ -1,0 +1,45 @@
+"""Programs of walks and labels on devices: the lanes' bits, registers and spills."""
+
+import jax.tree_util as jtu
+import numpy as np
+import pytest
+
+from jaxbiped.compiler.codegen._ptx_kernel import ARCHITECTURES, ptx_text
+from tests.compiler.assembler import assembled
+from tests.compiler.device_programs import CASES
+from tests.compiler.fake_driver import install
+
+pytestmark = pytest.mark.slow
+MOST = {
+    "steps": (255, 188, 164),
+    "end": (255, 172, 140),
+    "times": (255, 212, 184),
+    "arrivals": (255, 184, 160),
+    "extremes": (255, 264, 228),
+    "tangents": (255, 6384, 11620),
+    "labels": (255, 1560, 1816),
+    "rigid": (230, 0, 0),
+    "rigid_labels": (255, 140, 108),
+}
+"""Registers of a thread, bytes that are stored to and loaded from memory for want of them: the
+most of the three kinds of devices, by `ptxas` 12.9."""
+_SLACK = 1.25
+"""For other versions of LLVM and of the assembler."""
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_lanes_bits_and_registers(monkeypatch, name):
+    fake = install(monkeypatch, lanes=4, multiprocessors=1)
+    found, expected = CASES[name]("cuda"), CASES[name]("lanes")
+    assert fake.launches
+    for a, b in zip(jtu.tree_leaves(found), jtu.tree_leaves(expected), strict=True):
+        np.testing.assert_array_equal(a, b)
+    # A gradient's programs are those of the end and of tangents.
+    registers, stores, loads = MOST.get(name, (0, 0, 0))
+    for text in fake.modules if name in MOST else ():
+        for architecture in ARCHITECTURES.values():
+            taken = assembled(ptx_text(text, architecture), architecture)
+            print(name, architecture.name, taken)
+            assert taken.registers <= max(registers, 255)
+            assert taken.spill_stores <= _SLACK * stores + 64
+            assert taken.spill_loads <= _SLACK * loads + 64

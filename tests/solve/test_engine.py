@@ -1,0 +1,70 @@
+"""Engines by name: what is refused, and in which words."""
+
+import diffrax
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.compiler import CUDA, LANES, XLA
+from jaxbiped.solve._engine import engine_for, engine_named
+from jaxbiped.sweep._effort import effort_of
+from tests.compiler.fake_driver import install
+
+SCENE, STATE = jb.seed_scene(), jb.seed_state()
+
+
+def test_names():
+    assert [engine_named(name) for name in jb.ENGINES[1:]] == [XLA, LANES, CUDA]
+
+
+def test_devices_are_refused_where_there_is_none(monkeypatch):
+    install(monkeypatch, devices=0)
+    sentence = (
+        r'^engine = "cuda" is not allowed here: there is no CUDA device; use engine="lanes"\.$'
+    )
+    for ask in (
+        lambda: jb.simulate(SCENE, STATE, duration=0.1, engine="cuda"),
+        lambda: jb.simulate(SCENE, STATE, duration=0.1, save=jb.MidStance(), engine="cuda"),
+        lambda: jb.labelling(SCENE, engine="cuda"),
+    ):
+        with pytest.raises(jb.ArgumentError, match=sentence):
+            ask()
+
+
+@pytest.mark.parametrize(
+    ("ask", "why"),
+    [
+        (lambda: jb.find_gait(SCENE, engine="cuda"), "run walks and labels, no searches"),
+        (
+            lambda: jb.simulate(SCENE, STATE, duration=0.1, solver="tsit5", engine="cuda"),
+            "Tsit5 is not one of its solvers",
+        ),
+        (
+            lambda: jb.simulate(
+                SCENE, STATE, duration=0.1, adjoint=diffrax.ForwardMode(), engine="cuda"
+            ),
+            "an adjoint is diffrax's",
+        ),
+        (
+            lambda: engine_for("cuda", obstacle="it computes in 64 bits", by_device=True),
+            'in 64 bits; use engine="xla"',
+        ),
+    ],
+)
+def test_what_devices_cannot_do(monkeypatch, ask, why):
+    install(monkeypatch)
+    with pytest.raises(jb.ArgumentError, match=why):
+        ask()
+
+
+def test_auto_takes_a_device_for_labels_that_keep_it_busy(monkeypatch):
+    def engines(**options):
+        effort = effort_of(SCENE, **options)
+        return [effort.engine_of(count) for count in (1, 100_000)]
+
+    install(monkeypatch, multiprocessors=132)
+    assert engines() == ["lanes", "cuda"]
+    assert engines(engine="cuda") == ["cuda", "cuda"]
+    assert engines(engine="lanes") == ["lanes", "lanes"]
+    assert engine_for("auto", obstacle=None, by_device=True) == "lanes"
+    install(monkeypatch, devices=0)
+    assert engines() == ["lanes", "lanes"]
