@@ -1,6 +1,7 @@
 """Program that a page runs: a solve whose every step records what the viewer shows."""
 
 import dataclasses
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -66,7 +67,7 @@ def _played(program: Program) -> Program:
     return dataclasses.replace(program, record=record)
 
 
-def _shown(scene: Scene, state: State) -> list[Scalar]:
+def _shown(scene: Any, state: State) -> list[Scalar]:
     found, energy = contacts(scene, state), energies(scene, state)
     zero = jnp.zeros_like(state.hip_x)
     normal = [force.normal for force in found.forces]
