@@ -35,7 +35,8 @@ def by_xla(run: "Simulation") -> Trajectory:
     solver: diffrax.AbstractSolver[PyTree] = run.solver
     controller: PyTree = ShallowContact(step_control(run.rtol, run.atol, rms_norm, run.units))
     if run.dt is not None:
-        controller = MissedContacts(diffrax.ConstantStepSize())
+        constant: PyTree = diffrax.ConstantStepSize()
+        controller = MissedContacts(constant)
         solver = with_root_tolerances(solver, run.rtol, run.atol)
     if run.footsteps is not None:
         controller = FootstepLimit(controller, run.footsteps)

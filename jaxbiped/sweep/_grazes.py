@@ -5,10 +5,10 @@ Whether there was a contact is then open at the tolerance; near a boundary the l
 
 import jax.numpy as jnp
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._redundant_scene import CompliantScene
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_cubic import StepCubic
 
@@ -16,7 +16,9 @@ _REACH = 2.0
 """Way that a foot can rise in a step, in units of the one at the speed it begins with."""
 
 
-def grazes(scene: Scene, span: Scalar, before: State, after: State, rtol: Scalar) -> Scalar:
+def grazes(
+    scene: CompliantScene, span: Scalar, before: State, after: State, rtol: Numbers
+) -> Scalar:
     """Whether a foot's depth turns nearer to zero within a step than it is known to (boolean).
 
     Args:
@@ -39,7 +41,7 @@ def grazes(scene: Scene, span: Scalar, before: State, after: State, rtol: Scalar
     return either & fusion_barrier(either, near)
 
 
-def _turns(span: Scalar, known: Scalar, old: Foot, new: Foot) -> Scalar:
+def _turns(span: Scalar, known: Numbers, old: Foot, new: Foot) -> Scalar:
     """Whether a foot that may touch turns within a step, or comes down and may soon (boolean).
 
     Not one that stands too deep to come near the surface.
