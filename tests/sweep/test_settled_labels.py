@@ -95,7 +95,7 @@ def test_no_starts_label_depends_on_another(distances, data):
 
 
 HARD = {591: 1, 826: 4, 1269: 4, 2980: 4, 3278: 0, 3436: 4, 4820: 4, 5372: 4, 6546: 4, 8280: 4}
-"""Numbers of starts of a sample of which the draft labels most wrongly, and labels by Rodas5P at 1e-10."""
+"""Starts of a sample, most of which the draft labels wrongly, and labels by Rodas5P at 1e-10."""
 
 
 @pytest.mark.slow
@@ -113,7 +113,8 @@ def test_labels_that_the_draft_has_wrong_are_put_right():
     assert before.doubt is None
     wrong = before.label != exact
     # Rounding decides about some of them.
-    assert wrong[place].sum() > len(HARD) / 2 and not wrong[~place].any()
+    assert wrong[place].sum() > len(HARD) / 2
+    assert not wrong[~place].any()
     certain = found.doubt != jb.basins.Doubt.REMAINS
     assert (found.label != exact)[certain].sum() <= 3
     assert np.all(found.label[~place] == exact[~place])
