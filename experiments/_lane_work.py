@@ -18,7 +18,9 @@ _CHAINS, _LENGTH = 24, 2000
 _FLOPS = {"fadd": 1, "fsub": 1, "fmul": 1, "fdiv": 1, "sqrt": 1, "fma": 2}
 
 
-def final_slopes(duration: float, rtol: float) -> Callable[[], tuple[np.ndarray, np.ndarray]]:
+def final_slopes(
+    duration: float, rtol: float, *, solver: str = "rodas4"
+) -> Callable[[], tuple[np.ndarray, np.ndarray]]:
     """Final state (8,) and its derivatives in log K, log c and log ξ (8, 3), by lanes."""
     scene, state = jb.seed_scene(), jb.seed_state()
 
@@ -27,7 +29,8 @@ def final_slopes(duration: float, rtol: float) -> Callable[[], tuple[np.ndarray,
         moved = [leaf * jnp.exp(logs[i]) for i, leaf in enumerate(leaves)]
         new = eqx.tree_at(lambda s: (s.normal.K, s.normal.c, s.friction.xi), scene, moved)
         options: dict[str, Any] = dict(save="end", rtol=rtol, atol=1e-2 * rtol, engine="lanes")
-        end = jnp.stack(jb.simulate(new, state, duration=duration, **options).final)
+        walk = jb.simulate(new, state, duration=duration, solver=solver, **options)
+        end = jnp.stack(walk.final)
         return end, end
 
     both = jax.jit(jax.jacfwd(final, has_aux=True))

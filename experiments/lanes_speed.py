@@ -35,7 +35,14 @@ SINGLES, QUICK_SINGLES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8), (1e-6,)
 """Tolerances of single walks."""
 SLOPES, QUICK_SLOPES = (1e-6, 1e-7, 1e-8), (1e-6,)
 """Tolerances of walks with their derivatives."""
-TOLERANCES = {"lanes": 2e-6, "xla": 2e-6, "numbalsoda": 1e-7}
+WAYS = {
+    "lanes": ("lanes", "rodas4"),
+    "lanes, rodas4p": ("lanes", "rodas4p"),
+    "xla": ("xla", "rodas4"),
+}
+"""Ours: the engine and the solver; `rodas4` is the default."""
+LANES = ("lanes", "lanes, rodas4p")
+TOLERANCES = {"lanes": 2e-6, "lanes, rodas4p": 7e-6, "xla": 2e-6, "numbalsoda": 1e-7}
 """Of batches: those that give errors of about 2e-5."""
 
 
@@ -45,16 +52,20 @@ def perturbed(count: int) -> np.ndarray:
     return _independent.START * (1.0 + PERTURBATION * noise)
 
 
-def ours(engine: str, rtol: float) -> Callable[[np.ndarray], tuple[np.ndarray, int]]:
+def options_of(way: str, rtol: float) -> dict[str, Any]:
+    engine, solver = WAYS[way]
+    return dict(rtol=rtol, atol=1e-2 * rtol, save="end", engine=engine, solver=solver)
+
+
+def ours(way: str, rtol: float) -> Callable[[np.ndarray], tuple[np.ndarray, int]]:
     """Runs starts (n, 8): their final states, and attempted steps."""
     scene = jb.seed_scene()
 
     def one(*start: Any) -> Any:
-        options: dict[str, Any] = dict(rtol=rtol, atol=1e-2 * rtol, save="end", engine=engine)
-        end = jb.simulate(scene, jb.State(*start), duration=DURATION, **options)
+        end = jb.simulate(scene, jb.State(*start), duration=DURATION, **options_of(way, rtol))
         return end.final, end.attempted
 
-    many = jax.vmap(one) if engine == "lanes" else jax.jit(jax.vmap(one))
+    many = jax.vmap(one) if way in LANES else jax.jit(jax.vmap(one))
 
     def run(starts: np.ndarray) -> tuple[np.ndarray, int]:
         finals, steps = jax.block_until_ready(many(*map(jnp.asarray, starts.T)))
@@ -82,9 +93,9 @@ def timed(work: dict[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
 
 
 def batches(
-    sizes: list[int], rounds: int, exact: np.ndarray, engines: tuple[str, ...]
+    sizes: list[int], rounds: int, exact: np.ndarray, ways: tuple[str, ...]
 ) -> list[dict[str, Any]]:
-    runners = {engine: ours(engine, TOLERANCES[engine]) for engine in engines}
+    runners = {way: ours(way, TOLERANCES[way]) for way in ways}
     if _independent.lsoda_address() is not None:
         runners["numbalsoda"] = numbalsoda(TOLERANCES["numbalsoda"])
     rows = []
@@ -110,12 +121,11 @@ def batches(
     return rows
 
 
-def one_walk(engine: str, rtol: float) -> Callable[[], np.ndarray]:
+def one_walk(way: str, rtol: float) -> Callable[[], np.ndarray]:
     """One walk from the seed's start: its final state."""
 
     def solve(state: jb.State) -> Any:
-        options: dict[str, Any] = dict(rtol=rtol, atol=1e-2 * rtol, save="end", engine=engine)
-        end = jb.simulate(jb.seed_scene(), state, duration=DURATION, **options)
+        end = jb.simulate(jb.seed_scene(), state, duration=DURATION, **options_of(way, rtol))
         return jnp.stack(end.final)
 
     program, state = jax.jit(solve), jb.seed_state()
@@ -126,8 +136,8 @@ def singles(rounds: int, exact: np.ndarray, tolerances: tuple[float, ...]) -> li
     """One walk at several tolerances; error against time."""
     work: dict[tuple[str, float], Callable[[], np.ndarray]] = {}
     for rtol in tolerances:
-        for engine in ("lanes", "xla"):
-            work[engine, rtol] = one_walk(engine, rtol)
+        for way in WAYS:
+            work[way, rtol] = one_walk(way, rtol)
         if _independent.lsoda_address() is not None:
             atol = 1e-2 * rtol
             work["numbalsoda", rtol] = lambda r=rtol, a=atol: _independent.lsoda(DURATION, r, a)
@@ -180,7 +190,11 @@ def gaits(rounds: int, engines: tuple[str, ...]) -> tuple[dict[str, float], dict
 def derivatives(rounds: int, tolerances: tuple[float, ...]) -> list[dict[str, Any]]:
     """The final state and its derivatives in log K, log c and log ξ."""
     exact = _lane_work.final_slopes(DURATION, 1e-9)()[1]
-    work = {("lanes", rtol): _lane_work.final_slopes(DURATION, rtol) for rtol in tolerances}
+    work = {
+        (way, rtol): _lane_work.final_slopes(DURATION, rtol, solver=WAYS[way][1])
+        for way in LANES
+        for rtol in tolerances
+    }
     if _casadi.is_installed():
         for rtol in tolerances:
             work["CasADi CVODES", rtol] = _casadi.sensitivities(DURATION, rtol)
@@ -245,7 +259,7 @@ def main() -> None:
     exact = np.stack([_independent.reference(DURATION, start) for start in starts])
     sizes = [64] if options.quick else [8, 64, 512, 8192]
     # XLA's programs for batches and gaits compile for long: a quick version leaves them out.
-    rows = batches(sizes, rounds, exact, ("lanes",) if options.quick else ("lanes", "xla"))
+    rows = batches(sizes, rounds, exact, LANES if options.quick else tuple(WAYS))
     levels = QUICK_SINGLES if options.quick else SINGLES
     alone = singles(rounds, _independent.reference(DURATION), levels)
     slopes = derivatives(rounds, QUICK_SLOPES if options.quick else SLOPES)

@@ -61,7 +61,7 @@ def test_labels_of_a_draw_are_an_axis(made):
     numbers = made[1].numbers
     rows = {row["setting"]: row for row in numbers["rows"]["basin"] if "rodas4" in row["way"]}
     loose, tight = (rows[f"rtol={r}"] for r in ("0.0001", "1e-06"))
-    assert loose["errors"]["labels"] > tight["errors"]["labels"] >= 0.5 / 128
+    assert loose["errors"]["labels"] > tight["errors"]["labels"] > 0.49 / 128
     assert loose["attempted"] < tight["attempted"]
     for row in rows.values():
         assert row["errors"]["fraction"] <= row["errors"]["walking"] <= row["errors"]["labels"]
