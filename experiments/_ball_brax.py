@@ -10,24 +10,8 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 from _ball_closed_form import Problem
+from _ball_mjcf import IMPEDANCE, RADIUS, ball_model
 from _ball_ways import Run, differentiate
-
-IMPEDANCE, RADIUS = 0.9999, 0.05
-_MODEL = """
-<mujoco>
-  <option timestep="{dt}" gravity="0 0 -9.81" iterations="20"/>
-  <default>
-    <geom solref="-1 -1" solimp="{d} {d} 0.001 0.5 2" friction="0 0 0" condim="3"/>
-  </default>
-  <worldbody>
-    <geom type="plane" size="1 1 0.1"/>
-    <body>
-      <joint type="slide" axis="0 0 1"/>
-      <geom type="sphere" size="{radius}" mass="1"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
 
 
 def brax_law(problem: Problem) -> Problem | None:
@@ -42,7 +26,7 @@ def by_brax(problem: Problem, dt: float) -> Run:
     from brax.generalized import pipeline
     from brax.io import mjcf
 
-    system = mjcf.loads(_MODEL.format(dt=dt, d=IMPEDANCE, radius=RADIUS))
+    system = mjcf.loads(ball_model(dt, contact='friction="0 0 0" condim="3"'))
 
     def final(problem: Problem, values: dict[str, Any]) -> jax.Array:
         zero = jnp.zeros(())

@@ -12,28 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 from _ball_brax import brax_law, by_brax
 from _ball_closed_form import Problem
+from _ball_mjcf import IMPEDANCE, RADIUS, ball_model
 from _ball_newton import TIME_STEPS as NEWTON_STEPS
 from _ball_newton import by_newton, newton_law
 from _ball_ways import TIME_STEPS, Answer, Run, Way, differentiate
-
-IMPEDANCE = 0.9999
-"""The largest that MuJoCo allows."""
-RADIUS = 0.05
-_MODEL = """
-<mujoco>
-  <option timestep="{dt}" gravity="0 0 -9.81" solver="Newton" iterations="20"/>
-  <default>
-    <geom solref="-1 -1" solimp="{d} {d} 0.001 0.5 2" condim="1"/>
-  </default>
-  <worldbody>
-    <geom type="plane" size="1 1 0.1"/>
-    <body>
-      <joint type="slide" axis="0 0 1"/>
-      <geom type="sphere" size="{radius}" mass="1"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
 
 
 def mujoco_law(problem: Problem) -> Problem | None:
@@ -51,7 +33,7 @@ def by_mjx(problem: Problem, dt: float) -> Run:
     import mujoco
     from mujoco import mjx
 
-    text = _MODEL.format(dt=dt, d=IMPEDANCE, radius=RADIUS)
+    text = ball_model(dt, contact='condim="1"', solver='solver="Newton" ')
     model = mjx.put_model(mujoco.MjModel.from_xml_string(text))
     data = mjx.make_data(model)
 
