@@ -208,7 +208,7 @@ class AdaptiveSolve:
     def _happened(self, scene: PyTree, now: _Now) -> dict[Ending, Scalar]:
         """The failure that ends a solve here, the first of them."""
         happened: dict[Ending, Scalar] = {}
-        none = now.accepted + now.rejected > 0
+        none = _has_begun(now)
         for name, happens in self.events.items():
             happened[name] = none & jnp.asarray(happens(now.t, now.state, scene))
             none = none & ~happened[name]
@@ -220,7 +220,8 @@ class AdaptiveSolve:
         Asked here and not where a step ends: of the state that a step starts from, the step itself
         needs what failures are told by.
         """
-        return functools.reduce(operator.or_, self._happened(scene, now).values())
+        found = [jnp.asarray(each(now.t, now.state, scene)) for each in self.events.values()]
+        return _has_begun(now) & functools.reduce(operator.or_, found)
 
     def record(self, solve: Solve, now: _Now, time: Scalar) -> tuple[Scalar, list[Scalar]]:
         """See `Saved.record`."""
@@ -252,6 +253,11 @@ class AdaptiveSolve:
 
 def _term(solve: Solve) -> "diffrax.ODETerm[PyTree]":
     return diffrax.ODETerm(field_of(solve.scene))
+
+
+def _has_begun(now: _Now) -> Scalar:
+    """Whether anything was attempted: a solve may begin in what would end it."""
+    return now.accepted + now.rejected > 0
 
 
 def _numbers(values: PyTree) -> PyTree:

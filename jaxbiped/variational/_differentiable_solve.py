@@ -138,7 +138,8 @@ def _differentiable(setting: Setting, structure: PyTreeDef) -> Callable[..., lis
         solve = jtu.tree_unflatten(structure, primals)
         if solve.scene.redundant:
             raise ArgumentError(
-                'engine = "lanes" is not allowed here: derivatives in redundant coordinates are '
+                f'engine = "{"cuda" if setting.device else "lanes"}" is not allowed here: '
+                "derivatives in redundant coordinates are "
                 'diffrax\'s; use engine="xla".'
             )
         found = run(*primals)

@@ -6,12 +6,11 @@ done, all go through the refill together, in which those that are not keep what 
 
 from typing import NamedTuple
 
-import llvmlite.binding as llvm
-
-from jaxbiped._caches import Once, bounded_cache
+from jaxbiped._caches import bounded_cache
 from jaxbiped.compiler.codegen._device_library import library_text
 from jaxbiped.compiler.codegen._kernel_target import OWN_LIBRARY, WARP_ANY, KernelTarget
 from jaxbiped.compiler.codegen._lane_kernel import ENTRY
+from jaxbiped.compiler.runtime._machine_code import foreign_machine, optimised_module
 
 THREADS, BLOCKS = 64, 1
 """Threads of a block, and blocks of one multiprocessor that there must be registers for: few, so
@@ -79,25 +78,5 @@ def ptx_text(text: str, architecture: Architecture) -> str:
 
     Sums and products are rounded one by one (`.rn`), so that no assembler fuses them anew.
     """
-    _INITIALISED(_initialise)
-    target = llvm.Target.from_triple(_TRIPLE)
-    machine = target.create_target_machine(
-        cpu=architecture.name, features=architecture.features, opt=2
-    )
-    module = llvm.parse_assembly(text)
-    module.triple, module.data_layout = _TRIPLE, str(machine.target_data)
-    module.verify()
-    # No vectorisers: see `machine_code`.
-    options = llvm.create_pipeline_tuning_options(speed_level=1)
-    options.slp_vectorization = options.loop_vectorization = False
-    builder = llvm.create_pass_builder(machine, options)
-    builder.getModulePassManager().run(module, builder)
-    return str(machine.emit_assembly(module))
-
-
-_INITIALISED = Once[None]()
-
-
-def _initialise() -> None:
-    llvm.initialize_all_targets()
-    llvm.initialize_all_asmprinters()
+    machine = foreign_machine(_TRIPLE, cpu=architecture.name, features=architecture.features)
+    return str(machine.emit_assembly(optimised_module(text, machine, triple=_TRIPLE)))

@@ -10,7 +10,7 @@ import threading
 import numpy as np
 
 from jaxbiped.compiler.codegen._ptx_kernel import THREADS
-from jaxbiped.compiler.runtime._cuda_device import WRITTEN, DevicePart, devices
+from jaxbiped.compiler.runtime._cuda_device import DevicePart, devices
 from jaxbiped.compiler.runtime._kernel import Kernel
 from jaxbiped.compiler.runtime._processor import AbstractProcessor, Job, Launch
 
@@ -114,5 +114,4 @@ def _part(launch: Launch, place: slice) -> DevicePart:
 
 def _give(launch: Launch, place: slice, part: DevicePart) -> None:
     """Puts what a part gave where it belongs; its records are there already."""
-    name = WRITTEN[0]
-    launch.arrays[name][:, place] = part.arrays[name]
+    launch.arrays["outputs"][:, place] = part.arrays["outputs"]

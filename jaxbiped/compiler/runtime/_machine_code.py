@@ -7,6 +7,7 @@ import weakref
 import llvmlite
 import llvmlite.binding as llvm
 
+from jaxbiped._caches import Once
 from jaxbiped._disk_cache import read_entry, write_entry
 from jaxbiped.compiler.runtime._host_cpu import Host
 
@@ -93,9 +94,28 @@ def _module(text: str, machine: llvm.TargetMachine, as_written: bool) -> llvm.Mo
     return module
 
 
-def optimised_module(text: str, machine: llvm.TargetMachine) -> llvm.ModuleRef:
-    """A module after LLVM's passes, ready to be written for a machine."""
+def foreign_machine(triple: str, *, cpu: str, features: str) -> llvm.TargetMachine:
+    """A machine that code is made for but that is not the host."""
+    _FOREIGN(_initialise_all)
+    target = llvm.Target.from_triple(triple)
+    return target.create_target_machine(cpu=cpu, features=features, opt=2)
+
+
+_FOREIGN = Once[None]()
+
+
+def _initialise_all() -> None:
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+
+
+def optimised_module(
+    text: str, machine: llvm.TargetMachine, *, triple: str | None = None
+) -> llvm.ModuleRef:
+    """A module after LLVM's passes, ready to be written for a machine; `triple` if not the host."""
     module = llvm.parse_assembly(text)
+    if triple is not None:
+        module.triple, module.data_layout = triple, str(machine.target_data)
     module.verify()
     # No vectorisers: the vectors are there. Sums are never reordered, so results stay the same.
     options = llvm.create_pipeline_tuning_options(speed_level=1)

@@ -7,13 +7,11 @@ gives, and its constants lie at the start of the memory. So nothing has to be li
 
 from collections.abc import Iterator
 
-import llvmlite.binding as llvm
-
 from jaxbiped.compiler.codegen._kernel_target import host_target
 from jaxbiped.compiler.codegen._lane_kernel import ENTRY, kernel_text
 from jaxbiped.compiler.codegen._software_fma import with_software_fma
 from jaxbiped.compiler.runtime._host_cpu import Host
-from jaxbiped.compiler.runtime._machine_code import optimised_module
+from jaxbiped.compiler.runtime._machine_code import foreign_machine, optimised_module
 from jaxbiped.compiler.runtime._program import Graph
 
 _PAGE = Host("wasm32-unknown-unknown", "generic", "+bulk-memory", 1, False)
@@ -34,13 +32,10 @@ def web_module(graph: Graph) -> bytes:
     Returns:
         The module. Imports from `env`: memory, its stack's pointer, the C library's functions.
     """
-    llvm.initialize_all_targets()
-    llvm.initialize_all_asmprinters()
-    target = llvm.Target.from_triple(_PAGE.triple)
-    machine = target.create_target_machine(cpu=_PAGE.cpu, features=_PAGE.features, opt=2)
+    machine = foreign_machine(_PAGE.triple, cpu=_PAGE.cpu, features=_PAGE.features)
     text = with_software_fma(kernel_text(graph, host_target(1, _PAGE)))
-    head = f'target datalayout = "{machine.target_data}"\ntarget triple = "{_PAGE.triple}"\n'
-    return _exporting(bytes(machine.emit_object(optimised_module(head + text, machine))), ENTRY)
+    module = optimised_module(text, machine, triple=_PAGE.triple)
+    return _exporting(bytes(machine.emit_object(module)), ENTRY)
 
 
 def _exporting(written: bytes, name: str) -> bytes:

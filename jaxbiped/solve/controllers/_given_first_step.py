@@ -4,7 +4,6 @@ diffrax checks a size that it is given by a call back to Python, and a program w
 cannot be kept on disk. Sizes are checked before a solve begins.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 import jax.numpy as jnp
@@ -26,19 +25,11 @@ class GivenFirstStep(AbstractWrappedControl):
     size: RealScalarLike
 
     def init(
-        self,
-        terms: Any,
-        t0: Time,
-        t1: Time,
-        y0: PyTree,
-        dt0: Scalar | None,
-        args: PyTree,
-        func: Callable[..., PyTree],
-        error_order: RealScalarLike | None,
+        self, terms: Any, t0: Time, t1: Time, y0: PyTree, dt0: Scalar | None, *rest: Any
     ) -> tuple[Scalar, Any]:
         """The first step's end and the controller's state, as diffrax asks."""
         size = jnp.asarray(self.size, dtype=jnp.result_type(t0))
-        return self.controller.init(terms, t0, t1, y0, size, args, func, error_order)
+        return self.controller.init(terms, t0, t1, y0, size, *rest)
 
     def adapt_step_size(self, *step: Any) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does."""

@@ -8,7 +8,7 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, Time
+from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.solve._step_cubic import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
@@ -31,20 +31,12 @@ class MissedContacts(AbstractWrappedControl):
         return first, (inner, jnp.zeros((), dtype=jnp.int32))
 
     def adapt_step_size(
-        self,
-        t0: Time,
-        t1: Time,
-        y0: PyTree,
-        y1_candidate: PyTree,
-        args: PyTree,
-        y_error: PyTree,
-        error_order: RealScalarLike | None,
-        controller_state: Any,
+        self, t0: Time, t1: Time, y0: PyTree, y1_candidate: PyTree, args: PyTree, *rest: Any
     ) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, and counts."""
-        inner, count = controller_state
+        *others, (inner, count) = rest
         keep, next_t0, next_t1, jump, inner, result = self.controller.adapt_step_size(
-            t0, t1, y0, y1_candidate, args, y_error, error_order, inner
+            t0, t1, y0, y1_candidate, args, *others, inner
         )
         span = jnp.asarray(t1 - t0)
         before, after = feet(args, y0), feet(args, y1_candidate)

@@ -50,19 +50,20 @@ function settings({ time, end, start, speed, follow, span }) {
 
 function row(slider, inputs, changed) {
   const reading = html("output", {});
-  const tell = (value) => {
-    inputs[slider.input] = slider.power ? 10 ** value : value;
+  const tell = () => {
     const text = inputs[slider.input].toPrecision(3).replace("-", "−");
     reading.textContent = `${text} ${slider.unit}`;
   };
   const range = html("input", {
     type: "range", class: "time", min: slider.least, max: slider.most, step: "any",
     value: slider.value, "data-leaf": slider.leaf, oninput: () => {
-      tell(Number(range.value));
+      const value = Number(range.value);
+      inputs[slider.input] = slider.power ? 10 ** value : value;
+      tell();
       changed();
     },
   });
-  reading.textContent = `${inputs[slider.input].toPrecision(3).replace("-", "−")} ${slider.unit}`;
+  tell();
   return html("label", {}, html("span", {}, slider.words), range, reading);
 }
 
