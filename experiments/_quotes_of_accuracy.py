@@ -166,6 +166,13 @@ def of_trade(numbers: dict[str, Any]) -> Iterator[str]:
             times = table.get("cpu_s", {}).get(way, [UNKNOWN] * len(steps))
             if any(each is not None for each in times):
                 yield row(way, *(_milliseconds(times[k]) for k in _COMPARED))
+    for found in numbers["rows"]["basin"]:
+        tolerance = f"{float(found['setting'].removeprefix('rtol=')):.0e}".replace("e-0", "e-")
+        wrong = found["errors"]
+        labels = small(wrong["labels"]) if "labels" in wrong else "–"
+        yield row(
+            found["way"], tolerance, labels, small(wrong["walking"]), _milliseconds(found["cpu_s"])
+        )
     for found in numbers["rows"].get("stepping", ()):
         if found["setting"] == "rtol=1e-06":
             yield row(
