@@ -45,8 +45,10 @@ def parameter(
         default: the value unless given; with None, None stays and the law does without it.
 
     Example:
-        class Sticky(jaxbiped.laws.AbstractFrictionLaw):
-            grip: float = jaxbiped.laws.parameter("grip", "$G$", "s/m", minimum=0.0)
+        A law of one's own begins so::
+
+            class Sticky(jaxbiped.laws.AbstractFrictionLaw):
+                grip: float = jaxbiped.laws.parameter("grip", "$G$", "s/m", minimum=0.0)
 
     Returns:
         The field, for the body of an `equinox.Module`; it makes floating-point arrays of what it is

@@ -31,6 +31,7 @@ import("data:text/javascript;base64," + script).then(({ default: { render } }) =
 });
 """
 TIME = "return Number(document.querySelector('.stage').dataset.time)"
+TOP = "return document.querySelector(arguments[0]).getBoundingClientRect().top"
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +46,12 @@ def test_time_is_shared_with_python(viewed, tmp_path):
         page.open(tmp_path / "empty.html")
         assert page.driver.execute_async_script(MODEL, script, style(), viewed.sent())
         assert page.run(TIME) == 0.25
+        # A notebook's cell has no lower edge in sight: the player is above the walker, and charts
+        # stand beside it only where the cell, not the window, is wide.
+        assert page.run(TOP, ".player") < page.run(TOP, ".stage")
+        assert page.run(TOP, ".charts") < page.run(TOP, ".reading")
+        page.run("document.body.style.width = '900px'")
+        assert page.run(TOP, ".charts") > page.run(TOP, ".reading")
         page.run("model.set('time', 1.5)")
         assert page.run(TIME) == 1.5
         page.find(".play").send_keys("\ue010")

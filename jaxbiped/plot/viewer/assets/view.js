@@ -8,8 +8,11 @@ import { strikesUntil } from "./pose.js";
 import { Stage } from "./stage.js";
 import { stepTable } from "./step_table.js";
 
-/** Shows walks in an element; returns what moves them. `autoplay` starts them at once. */
-export function showWalks(sent, el, { autoplay = false } = {}) {
+/**
+ * Shows walks in an element; returns what moves them. `autoplay` starts them at once;
+ * `playerFirst` puts the player above them, where no window holds it at its lower edge.
+ */
+export function showWalks(sent, el, { autoplay = false, playerFirst = false } = {}) {
   const walks = sent.walks.map(decodeWalk);
   const root = html("div", { class: "jaxbiped-view", role: "region", "aria-label": "Walks" });
   setColours(root, sent.colours);
@@ -24,7 +27,7 @@ export function showWalks(sent, el, { autoplay = false } = {}) {
   const keys = html("p", { class: "keys" }, KEYS);
   const all = { class: walks.length === 1 ? "panels single" : "panels" };
   const shown = html("div", all, ...panels.map((each) => each.element));
-  root.append(shown, player.element, keys);
+  root.append(...(playerFirst ? [player.element, shown] : [shown, player.element]), keys);
   root.addEventListener("keydown", (event) => player.key(event));
   const draw = () => {
     for (const each of panels) {

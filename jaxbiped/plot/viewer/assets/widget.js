@@ -7,7 +7,7 @@ export function render({ model, el }) {
   const show = () => {
     const before = shown?.player;
     shown?.stop();
-    shown = showWalks(model.get("sent"), el);
+    shown = showWalks(model.get("sent"), el, { playerFirst: true });
     if (before) shown.player.resume(before);
     else shown.player.scrub(model.get("time"));
     shown.player.onrest = (time) => {
