@@ -97,7 +97,8 @@ def _part_above(span: Scalar, before: Foot, after: Foot) -> Scalar:
     """The part of a step after which a foot comes into the ground, barely; 1 if it does not.
 
     Or that after which it is lowest, where it may come into the ground. A step that is tried again
-    to there ends in the air, or in the ground at no speed: then the contact has begun before.
+    to there ends in the air, or in the ground at no speed: then the contact has begun before. So it
+    has where the foot is on its way out of the ground, and a damper's force is over by then.
     """
     rates = span * before.penetration_rate, span * after.penetration_rate
     depth = StepCubic(before.penetration, after.penetration, *rates)
@@ -105,8 +106,9 @@ def _part_above(span: Scalar, before: Foot, after: Foot) -> Scalar:
     if before.admitted is not None and after.admitted is not None:
         off = off & before.admitted & after.admitted
     leaves = off & (depth.end <= 0.0) & depth.may_touch()
-    stays = off & (depth.end > 0.0) & (depth.end < -_BARELY * depth.start)
-    stays = stays & (jnp.abs(depth.end_slope) < _BARELY * depth.start_slope)
+    slow = jnp.abs(depth.end_slope) < _BARELY * depth.start_slope
+    barely = (depth.end < -_BARELY * depth.start) & slow
+    stays = off & (depth.end > 0.0) & (barely | (depth.end_slope < 0.0))
     lowest = jnp.where(leaves, depth.turning_point(), 1.0)
     deepest = depth.at(lowest)
     contact = (leaves | stays) & (deepest > 0.0)

@@ -53,3 +53,26 @@ def test_a_shallow_contact_is_not_stepped_over(ends, engine, accuracy, within):
     found = np.stack(jax.vmap(end)(jnp.asarray(heights)), axis=1)
     error = np.max(np.abs(found - expected) / scales(check_numbers(SCENE), 8), axis=1)
     assert np.all(error < within)
+
+
+def test_contacts_are_found_wherever_a_step_ends():
+    """A step may end in such a contact, on the way out again and past the damper's force."""
+    random = np.random.default_rng(3)
+    depths, tolerances = (
+        10.0 ** random.uniform(*span, 1000) for span in ((-8.5, -4.0), (-9.0, -4.5))
+    )
+    touching = _START[1] - _lowest(check_numbers(SCENE))
+
+    def end(depth, rtol):
+        start = jb.State(*map(jnp.asarray, _START))._replace(hip_z=touching - depth)
+        return jb.simulate(
+            SCENE, start, duration=_TIME, save="end", watch=(), rtol=rtol, atol=1e-2 * rtol,
+            engine="lanes",
+        ).final  # fmt: skip
+
+    found, exact = (
+        np.stack(jax.vmap(end)(jnp.asarray(depths), jnp.asarray(each)), axis=1)
+        for each in (tolerances, np.full_like(tolerances, 1e-11))
+    )
+    error = np.max(np.abs(found - exact) / scales(check_numbers(SCENE), 8), axis=1)
+    assert np.all(error < np.maximum(300.0 * tolerances, 1e-6))
