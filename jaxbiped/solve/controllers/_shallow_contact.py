@@ -61,7 +61,7 @@ class ShallowContact(AbstractWrappedControl):
             t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state
         )
         start, span = cast(Scalar, t0), cast(Scalar, t1 - t0)
-        found = _touchdown(args, start, span, y0, y1_candidate)
+        found = _touchdown(args, start, span, keep, y0, y1_candidate)
         again, target = jax.lax.stop_gradient(found)
         next_t1 = jnp.where(again, jnp.where(keep, target, jnp.minimum(next_t1, target)), next_t1)
         next_t0 = jnp.where(again, t0, next_t0)
@@ -70,9 +70,9 @@ class ShallowContact(AbstractWrappedControl):
 
 
 def _touchdown(
-    scene: PyTree, t0: Scalar, span: Scalar, y0: PyTree, y1: PyTree
+    scene: PyTree, t0: Scalar, span: Scalar, keep: Scalar, y0: PyTree, y1: PyTree
 ) -> tuple[Scalar, Scalar]:
-    """Whether a step is to end at a contact that it would step over, and when [s]."""
+    """Whether a step, which is to be kept or not, is to end at a contact instead, and when [s]."""
     before = feet(scene, y0)
     places = [k for k in range(2) if before[k].admitted is not False]
     within_reach = jnp.zeros_like(span, dtype=bool)
@@ -85,7 +85,7 @@ def _touchdown(
     def first() -> Scalar:
         after, part = feet(scene, y1), jnp.ones_like(span)
         for k in places:
-            part = jnp.minimum(part, _part_above(span, before[k], after[k]))
+            part = jnp.minimum(part, _part_above(span, keep, before[k], after[k]))
         return part
 
     part = jnp.where(within_reach, fusion_barrier(within_reach, first), 1.0)
@@ -93,12 +93,13 @@ def _touchdown(
     return (part < _ALL) & (target < t0 + span), target
 
 
-def _part_above(span: Scalar, before: Foot, after: Foot) -> Scalar:
+def _part_above(span: Scalar, keep: Scalar, before: Foot, after: Foot) -> Scalar:
     """The part of a step after which a foot comes into the ground, barely; 1 if it does not.
 
     Or that after which it is lowest, where it may come into the ground. A step that is tried again
     to there ends in the air, or in the ground at no speed: then the contact has begun before. So it
-    has where the foot is on its way out of the ground, and a damper's force is over by then.
+    has where the foot is on its way out of the ground, and a damper's force is over by then; but of
+    a step that is not kept the end tells nothing of that.
     """
     rates = span * before.penetration_rate, span * after.penetration_rate
     depth = StepCubic(before.penetration, after.penetration, *rates)
@@ -108,7 +109,7 @@ def _part_above(span: Scalar, before: Foot, after: Foot) -> Scalar:
     leaves = off & (depth.end <= 0.0) & depth.may_touch()
     slow = jnp.abs(depth.end_slope) < _BARELY * depth.start_slope
     barely = (depth.end < -_BARELY * depth.start) & slow
-    stays = off & (depth.end > 0.0) & (barely | (depth.end_slope < 0.0))
+    stays = off & (depth.end > 0.0) & (barely | (keep & (depth.end_slope < 0.0)))
     lowest = jnp.where(leaves, depth.turning_point(), 1.0)
     deepest = depth.at(lowest)
     contact = (leaves | stays) & (deepest > 0.0)
