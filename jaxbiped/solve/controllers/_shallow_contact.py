@@ -1,7 +1,8 @@
 """Shallow contact: a step that would step over one ends just past its beginning instead.
 
-A foot that is off the ground at both ends of a step may touch it in between. No error estimate
-sees that where no stage of the step falls on it.
+A foot that is off the ground at both ends of a step may touch it in between, and one that is barely
+in it at an end may have been deeper. No error estimate sees that where no stage of the step feels
+its force.
 """
 
 from typing import Any, cast
@@ -24,10 +25,12 @@ _MARGIN = 1e-12
 _BARELY = 1e-2
 """Depth and speed in the ground at a step's end, in units of height and speed at its beginning,
 below which a contact is shallow."""
+_BARELY_WHERE_KEPT = 0.1
+"""That depth where the step would be kept."""
 _ALL = 0.999
 """Part of a step that is as good as all of it."""
 _REACH = 2.0
-"""Way that a foot can sink in a step, in units of the one at the speed it begins with."""
+"""Way that a foot can sink or rise in a step, in units of the one at the speed it begins with."""
 
 
 class ShallowContact(AbstractWrappedControl):
@@ -78,8 +81,7 @@ def _touchdown(
     within_reach = jnp.zeros_like(span, dtype=bool)
     for k in places:
         foot = before[k]
-        reached = foot.penetration + _REACH * span * foot.penetration_rate
-        near = (foot.penetration <= 0.0) & (reached > 0.0)
+        near = jnp.abs(foot.penetration) < _REACH * span * foot.penetration_rate
         within_reach = within_reach | (near if foot.admitted is None else near & foot.admitted)
 
     def first() -> Scalar:
@@ -98,19 +100,22 @@ def _part_above(span: Scalar, keep: Scalar, before: Foot, after: Foot) -> Scalar
 
     Or that after which it is lowest, where it may come into the ground. A step that is tried again
     to there ends in the air, or in the ground at no speed: then the contact has begun before. So it
-    has where the foot is on its way out of the ground, and a damper's force is over by then; but of
-    a step that is not kept the end tells nothing of that.
+    has where the foot is on its way out of the ground, and a damper's force is over by then. Or the
+    part after which a foot is deepest that begins barely in the ground and ends out of it: a smooth
+    force is not felt yet where the step begins. Of a step that is not kept the end tells nothing.
     """
     rates = span * before.penetration_rate, span * after.penetration_rate
     depth = StepCubic(before.penetration, after.penetration, *rates)
-    off = depth.start <= 0.0
+    off, rises = depth.start <= 0.0, keep & (depth.end_slope < 0.0)
+    brief = ~off & (depth.start_slope > 0.0) & (depth.end <= 0.0) & rises
     if before.admitted is not None and after.admitted is not None:
-        off = off & before.admitted & after.admitted
+        admitted = before.admitted & after.admitted
+        off, brief = off & admitted, brief & admitted
     leaves = off & (depth.end <= 0.0) & depth.may_touch()
     slow = jnp.abs(depth.end_slope) < _BARELY * depth.start_slope
-    barely = (depth.end < -_BARELY * depth.start) & slow
-    stays = off & (depth.end > 0.0) & (barely | (keep & (depth.end_slope < 0.0)))
-    lowest = jnp.where(leaves, depth.turning_point(), 1.0)
+    barely = slow & (depth.end < -jnp.where(keep, _BARELY_WHERE_KEPT, _BARELY) * depth.start)
+    stays = off & (depth.end > 0.0) & (barely | rises)
+    lowest = jnp.where(leaves | brief, depth.turning_point(), 1.0)
     deepest = depth.at(lowest)
     contact = (leaves | stays) & (deepest > 0.0)
 
