@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 import numpy as np
-from _ball_ways import Answer, Run, relative_error
+from _ball_ways import Answer, Run, relative_error, with_estimate
 from _footstep_collocation import Footstep, footstep
 from _footstep_equations import PARAMETERS, START
 
@@ -40,8 +40,7 @@ def ours(truth: Answer, rtol: float) -> Run:
     def run() -> Answer:
         fine, loose = (_linearised(each, 10.0 * each) for each in (rtol, 10.0 * rtol))
         other = _linearised(rtol, 10.0 * rtol, solver="rodas5p")
-        apart = (relative_error(each.gradient, fine.gradient) for each in (loose, other))
-        return fine._replace(said=max(map(float.__mul__, (1.0, 2.0), apart)))
+        return with_estimate(fine, loose=loose, other=other)
 
     return run
 
