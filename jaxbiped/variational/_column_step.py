@@ -15,13 +15,8 @@ from jaxbiped._types import Scalar, VectorField
 from jaxbiped.compiler import LANES
 from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve.rosenbrock._linearisation import Components, split
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
-    RosenbrockTableau,
-    Stages,
-    end_weights,
-    error_weights,
-    stages_of,
-)
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import Stages, stages_of
+from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau, end_weights, error_weights
 from jaxbiped.variational._rosenbrock_tangents import kept_in_order
 from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
 

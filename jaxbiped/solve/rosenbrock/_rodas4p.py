@@ -2,7 +2,8 @@
 
 from typing import Any, ClassVar
 
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, RosenbrockTableau
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau
 
 
 class Rodas4P(AbstractRosenbrock):
@@ -13,6 +14,7 @@ class Rodas4P(AbstractRosenbrock):
     Wanner.
     """
 
+    switch_weight: ClassVar[float] = 10.0
     tableau: ClassVar[RosenbrockTableau] = RosenbrockTableau(
         gamma=0.25,
         a=(

@@ -2,7 +2,8 @@
 
 from typing import Any, ClassVar
 
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, RosenbrockTableau
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau
 
 _LAST_ROW = (
     -7.502846399306121,

@@ -3,7 +3,7 @@
 import functools
 import operator
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import diffrax
 import jax.numpy as jnp
@@ -21,41 +21,12 @@ from jaxbiped.solve.rosenbrock._linearisation import (
     linearise,
     split,
 )
+from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau, error_weights, last_stage
 
 if TYPE_CHECKING:
     from typing import ClassVar as AbstractClassVar
 else:
     from equinox import AbstractClassVar
-
-Row: TypeAlias = tuple[float, ...]
-
-
-class RosenbrockTableau(NamedTuple):
-    """Coefficients of a stiffly accurate Rosenbrock method, in the form without products by J.
-
-    With W = I − h γ J and f_t = ∂f/∂t, the stages are
-    W u_i = γ (h f(t + α_i h, y + Σ_j a_ij u_j) + Σ_j c_ij u_j + γ_i h² f_t).
-    The last stage's argument plus u_s is the new value.
-
-    Source of the form: Hairer and Wanner, Solving Ordinary Differential Equations II, eq. IV.7.25.
-
-    Attributes:
-        gamma: diagonal coefficient γ.
-        a: rows a_ij of the stages from the second on.
-        c: rows c_ij of the stages from the second on.
-        alpha: times α_i of the stages.
-        gammas: coefficients γ_i of the time derivative.
-        dense: rows that make the coefficients of the dense output from the stages.
-        error: weights that make the error estimate from the stages; u_s where left empty.
-    """
-
-    gamma: float
-    a: tuple[Row, ...]
-    c: tuple[Row, ...]
-    alpha: Row
-    gammas: Row
-    dense: tuple[Row, ...]
-    error: Row = ()
 
 
 class RosenbrockInterpolation(diffrax.AbstractLocalInterpolation):
@@ -101,10 +72,12 @@ class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):  # type: ignore[type-a
 
     Attributes:
         tableau: the method's coefficients.
+        switch_weight: how often the error estimate of a walk's step counts that crosses a switch.
         term_structure, interpolation_cls: as diffrax asks of its solvers.
     """
 
     tableau: AbstractClassVar[RosenbrockTableau]
+    switch_weight: ClassVar[float] = 1.0
     term_structure: ClassVar = diffrax.AbstractTerm
     interpolation_cls: ClassVar[Callable[..., RosenbrockInterpolation]] = RosenbrockInterpolation
 
@@ -128,15 +101,18 @@ class AbstractRosenbrock(diffrax.AbstractAdaptiveSolver):  # type: ignore[type-a
     ) -> tuple[PyTree, PyTree, dict[str, PyTree], None, Any]:
         """One step, as `diffrax.AbstractSolver.step` describes it."""
         del solver_state, made_jump
-        y1, error, coefficients = _cached_step(self.tableau, terms, t0, t1, y0, args)
+        y1, error, coefficients, _ = _cached_step(self.tableau, terms, t0, t1, y0, args)
         dense_info = dict(y0=y0, y1=y1, coefficients=coefficients)
         return y1, error, dense_info, None, diffrax.RESULTS.successful
 
 
 def step_of(
     tableau: RosenbrockTableau, terms: Any, t0: Time, t1: Time, y0: PyTree, args: PyTree
-) -> tuple[PyTree, PyTree, tuple[PyTree, ...]]:
-    """The new value, its error estimate and the coefficients of the dense output."""
+) -> tuple[PyTree, PyTree, tuple[PyTree, ...], PyTree]:
+    """The new value, its error estimate, the dense output's coefficients, and the last argument.
+
+    That is where the last stage evaluates the field: as far from the new value as its correction.
+    """
     start, join = split(y0)
     dtype = jnp.result_type(*start)
 
@@ -146,25 +122,16 @@ def step_of(
     span = jnp.asarray(t1 - t0, dtype=dtype)
     control = jnp.asarray(terms.contr(t0, t1), dtype=dtype)
     stages = stages_of(tableau, field, jnp.asarray(t0), start, span, control)
-    end = _plus(start, stages.weighted(end_weights(tableau)))
+    last = _plus(start, stages.weighted(tableau.a[-1]))
+    end = _plus(last, stages.weighted(last_stage(tableau)))
     error = stages.weighted(error_weights(tableau))
     dense = tuple(join(stages.weighted(row)) for row in tableau.dense)
-    return join(end), join(error), dense
+    return join(end), join(error), dense, join(last)
 
 
 _cached_step = cached_jit(step_of)
 """Jitted for its cache alone: diffrax traces a step many times over, and this makes every time
 but the first free."""
-
-
-def end_weights(tableau: RosenbrockTableau) -> Row:
-    """Weights of the stages that make the new value from the old."""
-    return (*tableau.a[-1], 1.0)
-
-
-def error_weights(tableau: RosenbrockTableau) -> Row:
-    """Weights of the stages that make the error estimate."""
-    return tableau.error or (*[0.0] * (len(tableau.alpha) - 1), 1.0)
 
 
 class Stages(NamedTuple):

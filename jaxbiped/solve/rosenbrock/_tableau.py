@@ -1,0 +1,48 @@
+"""Tableau: the coefficients of a Rosenbrock method."""
+
+from typing import NamedTuple, TypeAlias
+
+Row: TypeAlias = tuple[float, ...]
+
+
+class RosenbrockTableau(NamedTuple):
+    """Coefficients of a stiffly accurate Rosenbrock method, in the form without products by J.
+
+    With W = I − h γ J and f_t = ∂f/∂t, the stages are
+    W u_i = γ (h f(t + α_i h, y + Σ_j a_ij u_j) + Σ_j c_ij u_j + γ_i h² f_t).
+    The last stage's argument plus u_s is the new value.
+
+    Source of the form: Hairer and Wanner, Solving Ordinary Differential Equations II, eq. IV.7.25.
+
+    Attributes:
+        gamma: diagonal coefficient γ.
+        a: rows a_ij of the stages from the second on.
+        c: rows c_ij of the stages from the second on.
+        alpha: times α_i of the stages.
+        gammas: coefficients γ_i of the time derivative.
+        dense: rows that make the coefficients of the dense output from the stages.
+        error: weights that make the error estimate from the stages; u_s where left empty.
+    """
+
+    gamma: float
+    a: tuple[Row, ...]
+    c: tuple[Row, ...]
+    alpha: Row
+    gammas: Row
+    dense: tuple[Row, ...]
+    error: Row = ()
+
+
+def end_weights(tableau: RosenbrockTableau) -> Row:
+    """Weights of the stages that make the new value from the old."""
+    return (*tableau.a[-1], 1.0)
+
+
+def error_weights(tableau: RosenbrockTableau) -> Row:
+    """Weights of the stages that make the error estimate."""
+    return tableau.error or last_stage(tableau)
+
+
+def last_stage(tableau: RosenbrockTableau) -> Row:
+    """Weights of the stages that make the last one alone."""
+    return (*[0.0] * (len(tableau.alpha) - 1), 1.0)
