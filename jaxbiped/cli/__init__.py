@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import os
 import sys
 from typing import Annotated, Protocol
 
@@ -57,7 +58,17 @@ def main(arguments: list[str] | None = None) -> None:
 
     With one sentence and 2 for an argument that is not allowed, 1 for a full disk or lost workers.
     """
-    given = sys.argv[1:] if arguments is None else list(arguments)
+    try:
+        try:
+            _run(sys.argv[1:] if arguments is None else list(arguments))
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:  # who reads wants no more, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+def _run(given: list[str]) -> None:
     command = None if given == ["--version"] else _parse(given)
     if command is None:
         from importlib.metadata import version
@@ -68,6 +79,8 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         command.check()
         sys.exit(command.run())
+    except BrokenPipeError:
+        raise
     except (ArgumentError, ResourceError, OSError) as error:
         print(f"jaxbiped: {error}", file=sys.stderr)
         sys.exit(2 if isinstance(error, ArgumentError) else 1)
