@@ -67,7 +67,8 @@ def refined(labelling: jb.Labelling, cells: int, levels: int) -> jb.basins.Refin
 
 def tolerances(scene: jb.Scene, side: int) -> list[dict[str, Any]]:
     """How labels change with the tolerance, against the finest: which share, and where."""
-    efforts = {"draft": 1e-5, "balanced": 1e-6, "1e-7": 1e-7, "1e-8": 1e-8}
+    efforts = {name: jb.ACCURACIES[name].walk for name in ("draft", "balanced")}
+    efforts |= {"1e-7": 1e-7, "1e-8": 1e-8}
     found = {
         name: codes_on_grid(jb.labelling(scene, rtol=rtol), side)[0]
         for name, rtol in efforts.items()

@@ -18,7 +18,7 @@ LANES, QUICK_LANES = 4096, 64
 CHECKED, QUICK_CHECKED = 8, 2
 """Walks of the batch whose errors are looked at."""
 PERTURBATION = 1e-3
-WAYS = (("rodas4", "lanes"), ("rodas5p", "lanes"), ("rodas4", "xla"))
+WAYS = (("rodas4p", "lanes"), ("rodas5p", "lanes"), ("rodas4", "lanes"), ("rodas4p", "xla"))
 
 
 def starts_of(count: int) -> np.ndarray:

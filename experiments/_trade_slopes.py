@@ -42,7 +42,10 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
 
         return Case("slopes", way, f"rtol={rtol:g}", measure)
 
-    ways = (("rodas5p", "lanes"), ("rodas4", "lanes"), ("rodas4", "xla"), ("kvaerno5", "xla"))
+    ways = (
+        *(("rodas4p", "lanes"), ("rodas5p", "lanes"), ("rodas4", "lanes")),
+        *(("rodas4p", "xla"), ("kvaerno5", "xla")),
+    )
     for solver, engine in ways[: 1 if quick else None]:
         name = f"{solver} by {engine}" + (", steps for the state alone" if engine == "xla" else "")
         for rtol in tolerances(quick, -3, -8):

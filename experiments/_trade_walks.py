@@ -17,8 +17,8 @@ from jaxbiped.trade import Row, Truth, WalkTrade, Way, failed_row, row_of, work_
 
 DURATION, QUICK_DURATION = 2.0, 0.45
 FINEST = 1e-12
-LANES = ("rodas4", "rodas5p", "rodas4p", "rodas3p")
-THROUGH_XLA = ("rodas4", "rodas5p", "kvaerno3", "kvaerno5", "tsit5", "dopri8")
+LANES = ("rodas4p", "rodas5p", "rodas4", "rodas3p")
+THROUGH_XLA = ("rodas4p", "rodas4", "rodas5p", "kvaerno3", "kvaerno5", "tsit5", "dopri8")
 PEERS = ("Radau", "BDF", "LSODA")
 METHODS = ("index1", "baumgarte", "penalty")
 FIXED_STEPS = (1e-4, 1e-5, 1e-6)
@@ -60,7 +60,7 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
     for solver in LANES[: 2 if quick else None]:
         yield from _ours(walk, "walk", solver, "lanes", tolerances(quick), truth)
     for name, accuracy in jb.ACCURACIES.items():
-        way = Way("rodas4", "lanes", name, accuracy.walk)
+        way = Way("rodas4p", "lanes", name, accuracy.walk)
         yield Case("named walk", way.name, name, lambda way=way: walk.row(way, truth()))
     for name in PEERS[:1] if quick else PEERS:
         for rtol in tolerances(quick, last=-9):
@@ -92,7 +92,7 @@ def cases_through_xla(store: Store, quick: bool) -> Iterator[Case]:
         yield from _ours(walk, "walk", solver, "xla", tolerances(quick, last=last), truth)
     for rtol in tolerances(quick, last=-6):
         how = functools.partial(_single_precision, walk, rtol, truth)
-        yield Case("walk", "rodas4 in float32", f"rtol={rtol:g}", how)
+        yield Case("walk", "rodas4p in float32", f"rtol={rtol:g}", how)
     for method in METHODS:
         scene = jb.RedundantScene(seed, jb.constraints.CONSTRAINT_METHODS[method]())
         for rtol in (1e-4, 1e-6, 1e-8):
@@ -127,7 +127,7 @@ def _laws(store: Store) -> Iterator[Case]:
 
             return store.truth(name, references)
 
-        yield from _ours(walk, name, "rodas4", "lanes", tolerances(False), truth)
+        yield from _ours(walk, name, "rodas4p", "lanes", tolerances(False), truth)
 
 
 def _peer(walk: WalkTrade, name: str, rtol: float, truth: Callable[[], Truth]) -> Row:
@@ -170,8 +170,8 @@ def _numbalsoda(walk: WalkTrade, rtol: float, truth: Callable[[], Truth]) -> Row
 def _single_precision(walk: WalkTrade, rtol: float, truth: Callable[[], Truth]) -> Row:
     """In 32 bits, which lanes do not have."""
     start = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), walk.start)
-    row = walk._replace(start=start).row(Way("rodas4", "xla", f"rtol={rtol:g}", rtol), truth())
-    return row._replace(way="rodas4 in float32")
+    row = walk._replace(start=start).row(Way("rodas4p", "xla", f"rtol={rtol:g}", rtol), truth())
+    return row._replace(way="rodas4p in float32")
 
 
 def _semi_implicit(walk: WalkTrade, dt: float, truth: Callable[[], Truth]) -> Row:

@@ -1,11 +1,11 @@
 """Coverage of error bars: true errors of walks and gaits of random scenes against their bars.
 
 Writes accuracy_coverage.png. Scenes are the seed's with parameters and start drawn at random, and
-each accuracy a number drawn at random. References are ours by Rodas4P at the finest tolerance, a
-method that neither the results nor their bars come from; its own error is its difference from
-Rodas5P. Rigid walks are held against the finest tolerance of their one method, whose error is the
-difference from a ten times looser one. Scenes lie in accuracy_coverage.jsonl as they come: a run
-that was cut off goes on.
+each accuracy a number drawn at random. References are ours at the finest tolerance, of walks by
+Rodas4 and of gaits by Rodas4P, methods that neither the results nor their bars come from; their own
+error is their difference from Rodas5P. Rigid walks are held against the finest tolerance of their
+one method, whose error is the difference from a ten times looser one. Scenes lie in
+accuracy_coverage.jsonl as they come: a run that was cut off goes on.
 """
 
 import dataclasses
@@ -123,7 +123,7 @@ def _walk(random: np.random.Generator) -> dict[str, Any]:
         walk = jb.simulate(scene, start, accuracy=wanted, **how)
     exact, checked = (
         jb.simulate(scene, start, solver=solver, rtol=FINEST, max_solver_steps=1 << 18, **how)
-        for solver in ("rodas4p", "rodas5p")
+        for solver in ("rodas4", "rodas5p")
     )
     met, fell = walk.error.met, walk.outcome != exact.outcome
     same = not fell and len({int(each.arrivals.total) for each in (walk, exact, checked)}) == 1

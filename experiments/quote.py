@@ -45,6 +45,10 @@ class Options:
     """Leave timings out."""
 
 
+_LINE = re.compile(r"\[[^][{}]*\]|\{(?:[^][{}]|\{[^][{}]*\})*\}")
+"""What is written on one line: numbers, and rows of them."""
+
+
 def without(numbers: Any, keys: set[str]) -> Any:
     """The same numbers without the entries of these keys, at any depth."""
     if isinstance(numbers, dict):
@@ -87,7 +91,7 @@ def keep(path: Path, *, untimed: bool) -> Path:
     numbers = without(run, PICTURES | (TIMINGS if untimed else set()))
     numbers["made"] = {"date": datetime.date.today().isoformat(), "machine": machine()}
     text = json.dumps(numbers, indent=1, ensure_ascii=False)
-    text = re.sub(r"\[[^][{}]*\]", lambda found: " ".join(found[0].split()), text)
+    text = _LINE.sub(lambda found: " ".join(found[0].split()), text)
     RESULTS.mkdir(exist_ok=True)
     kept = RESULTS / path.name
     kept.write_text(text + "\n")

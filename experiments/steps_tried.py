@@ -28,7 +28,7 @@ import jaxbiped as jb
 
 DURATION = 2.0
 SOLVERS, QUICK_SOLVERS = ("rodas4", "rodas4p", "rodas5p", "rodas3p"), ("rodas4", "rodas4p")
-TOLERANCES, QUICK_TOLERANCES = (1e-5, 5e-6, 3e-6, 1e-6, 3e-7, 1e-7), (1e-6,)
+TOLERANCES, QUICK_TOLERANCES = (2e-5, 1e-5, 5e-6, 1e-6, 3e-7, 1e-7), (1e-6,)
 SPREADS = np.array([0.0, 0.0, 0.01, 0.01, 0.05, 0.05, 0.05, 0.05])
 """Standard deviations of the starts: angles [rad], velocities [m/s] and rates [rad/s]."""
 ROUNDS = 5

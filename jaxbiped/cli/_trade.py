@@ -20,16 +20,17 @@ _ERRORS = (1e-2, 1e-4, 1e-6, 1e-8)
 _MOST_ROWS = 200
 _WALK_AXES = ("state", "step_time", "energy")
 _GAIT_AXES = ("period", "multiplier", "gradient")
-_QUICK = (("rodas4", "lanes"), ("rodas5p", "lanes"))
+_QUICK = (("rodas4p", "lanes"), ("rodas5p", "lanes"))
 _FULL = (
     *_QUICK,
-    ("rodas4p", "lanes"),
+    ("rodas4", "lanes"),
     ("rodas3p", "lanes"),
-    ("rodas4", "xla"),
+    ("rodas4p", "xla"),
     ("rodas5p", "xla"),
     ("kvaerno5", "xla"),
 )
-_QUICK_GAITS, _FULL_GAITS = (("rodas4", "lanes"),), (*_QUICK, ("rodas4", "xla"))
+_QUICK_GAITS = (("rodas4", "lanes"),)
+_FULL_GAITS = (*_QUICK_GAITS, ("rodas5p", "lanes"), ("rodas4", "xla"))
 _FULL_TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 
 

@@ -223,7 +223,7 @@ class SolveOptions:
 
     duration: float = 10.0
     """Simulated time [s]."""
-    solver: str = "rodas4"
+    solver: str = "rodas4p"
     """Name of a solver: ours (rodas3p, rodas4, rodas4p, rodas5p) or one of diffrax's."""
     accuracy: str | None = None
     """In place of tolerances: draft, balanced or tight; or a relative error, such as 1e-4."""

@@ -22,8 +22,8 @@ from jaxbiped.solve._units import relative_to_scene, sizes_of
 from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
 
 _FIRST = 1e-2
-"""First tolerance as a share of the relative error wanted: errors of walks are about 6 to 80
-tolerances (the seed's walk of two seconds, 1e-5 to 1e-10), and bars a few times that."""
+"""First tolerance as a share of the relative error wanted: errors of walks are about 0.5 to 6
+tolerances (the seed's walk of two seconds, 1e-5 to 1e-9), and bars some fifteen times that."""
 
 _FINEST_FIRST = 1e-10
 """Finest tolerance to begin with."""

@@ -13,7 +13,6 @@ from jaxbiped._cached_jit import cached_jit
 from jaxbiped._ending import Ending
 from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import ending_code, ending_events
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.solve._solvers import with_root_tolerances
@@ -22,8 +21,8 @@ from jaxbiped.solve.controllers._extremes import Extremes
 from jaxbiped.solve.controllers._footstep_limit import PATIENCE, FootstepLimit
 from jaxbiped.solve.controllers._given_first_step import GivenFirstStep
 from jaxbiped.solve.controllers._missed_contacts import MissedContacts
-from jaxbiped.solve.controllers._shallow_contact import ShallowContact
-from jaxbiped.solve.controllers._step_control import first_step, step_control
+from jaxbiped.solve.controllers._step_control import first_step
+from jaxbiped.solve.controllers._walk_control import walk_control
 
 if TYPE_CHECKING:
     from jaxbiped.simulate._simulation import Simulation
@@ -33,7 +32,8 @@ if TYPE_CHECKING:
 def by_xla(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`. A trajectory saved step by step keeps its full length."""
     solver: diffrax.AbstractSolver[PyTree] = run.solver
-    controller: PyTree = ShallowContact(step_control(run.rtol, run.atol, rms_norm, run.units))
+    weight: float = getattr(solver, "switch_weight", 1.0)
+    controller: PyTree = walk_control(run.rtol, run.atol, run.units, switch_weight=weight)
     if run.dt is not None:
         constant: PyTree = diffrax.ConstantStepSize()
         controller = MissedContacts(constant)

@@ -23,7 +23,7 @@ def simulate(
     *,
     duration: float | None = None,
     footsteps: int | None = None,
-    solver: str | diffrax.AbstractSolver[PyTree] = "rodas4",
+    solver: str | diffrax.AbstractSolver[PyTree] = "rodas4p",
     accuracy: str | float = "balanced",
     rtol: float | None = None,
     atol: float | None = None,

@@ -85,7 +85,7 @@ class Simulation(eqx.Module):
         *,
         duration: float | None = None,
         footsteps: int | None = None,
-        solver: str | diffrax.AbstractSolver[PyTree] = "rodas4",
+        solver: str | diffrax.AbstractSolver[PyTree] = "rodas4p",
         accuracy: str = "balanced",
         rtol: float | None = None,
         atol: float | None = None,

@@ -19,16 +19,16 @@ from jaxbiped._types import Numbers, Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._consistent_state import project
 from jaxbiped.dynamics._formulation import field_of
-from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._ending import ending_code, ending_events
 from jaxbiped.solve._final_step import clip_step
 from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve._projected_solver import projects
 from jaxbiped.solve._saved_outputs import LastStep, Saved
 from jaxbiped.solve._units import Units
+from jaxbiped.solve.controllers._crossed_switches import weigh_crossed
 from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
-from jaxbiped.solve.controllers._shallow_contact import ShallowContact
-from jaxbiped.solve.controllers._step_control import first_step, step_control
+from jaxbiped.solve.controllers._step_control import first_step
+from jaxbiped.solve.controllers._walk_control import walk_control
 from jaxbiped.solve.controllers._wrapped_control import StepControl
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, step_of
 
@@ -145,14 +145,16 @@ class AdaptiveSolve:
     def attempt(self, solve: Solve, now: _Now) -> tuple[_Now, Scalar]:
         term = _term(solve)
         with contextlib.nullcontext() if self.fenced else without_barriers():
-            y1, error, dense = step_of(
+            y1, error, dense, last = step_of(
                 self.solver.tableau, term, now.t, now.next_t, now.state, solve.scene
             )
             if projects(solve.scene):
                 y1 = project(solve.scene, y1)
+        if self.solver.switch_weight != 1.0:
+            # The last stage knows the contact there; at the new value it would cost as much again.
+            error = weigh_crossed(solve.scene, self.solver.switch_weight, now.state, last, error)
         ended = self._ended(solve.scene, now)
         errors, structure = jtu.tree_flatten(error)
-        errors = [jnp.where(jnp.isnan(each), jnp.inf, each) for each in errors]
         # One of them is enough for a step to be rejected.
         errors[0] = jnp.where(ended, jnp.inf, errors[0])
         error, order = jtu.tree_unflatten(structure, errors), self.solver.error_order(term)
@@ -244,8 +246,7 @@ class AdaptiveSolve:
         return chosen(jnp.minimum, low), chosen(jnp.maximum, high)
 
     def _controller(self, solve: Solve) -> StepControl:
-        control: StepControl = step_control(solve.rtol, solve.atol, rms_norm, solve.units)
-        control = ShallowContact(control)
+        control = walk_control(solve.rtol, solve.atol, solve.units)
         if not self.counting:
             return control
         return FootstepLimit(control, solve.footsteps)

@@ -10,4 +10,4 @@ from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock as A
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
     RosenbrockInterpolation as RosenbrockInterpolation,
 )
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import RosenbrockTableau as RosenbrockTableau
+from jaxbiped.solve.rosenbrock._tableau import RosenbrockTableau as RosenbrockTableau

@@ -20,7 +20,7 @@ _GAP, _GAP_SHARE = 1e-4, 30.0
 """Gap between states that repeat each other, at least; and in units of the tolerance."""
 _FIRST = 3e-3
 """First tolerance as a share of the accuracy wanted, at most that of "draft": of 100,000 labels of
-the seed's slice 37 were wrong and not in doubt at 1e-5, and 11 at 1e-6."""
+the seed's slice 37 were wrong and not in doubt at 1e-5 by Rodas4, and 11 at 1e-6."""
 FINEST_FIRST = {True: 1e-9, False: 1e-11}
 """Finest tolerance at which every start is labelled, compliant or not."""
 
@@ -71,7 +71,7 @@ def effort_of(
     footsteps: int = 30,
     accuracy: str | float = "draft",
     rtol: float | None = None,
-    solver: str | AbstractRosenbrock = "rodas4",
+    solver: str | AbstractRosenbrock = "rodas4p",
     max_solver_steps: int = 65536,
     engine: str = "auto",
 ) -> Effort:

@@ -32,7 +32,7 @@ def labelling(
     footsteps: int = 30,
     accuracy: str | float = "draft",
     rtol: float | None = None,
-    solver: str | AbstractRosenbrock = "rodas4",
+    solver: str | AbstractRosenbrock = "rodas4p",
     max_solver_steps: int = 65536,
     engine: str = "auto",
 ) -> Labelling:

@@ -190,7 +190,7 @@ def test_at_strength_zero_rigid_walks_are_the_passive_ones():
 def test_at_strength_zero_compliant_walks_are_the_passive_ones():
     """In steps of one size to rounding; in chosen ones, over a heel strike, to their tolerance."""
     passive = dataclasses.replace(DRIVEN, actuation=None)
-    options = dict(duration=0.3, dt=5e-5, engine="xla", save="end", max_solver_steps=8192)
+    options = dict(duration=0.3, dt=2e-5, engine="xla", save="end", max_solver_steps=16384)
     ends = [
         jb.simulate(scene, jb.seed_state(), **options).final for scene in (_idle(DRIVEN), passive)
     ]

@@ -50,7 +50,8 @@ def test_random_scenes_and_starts_end_alike(noise, slope, factor):
     state = jax.tree.map(lambda leaf, n: leaf * (1.0 + n), jb.seed_state(), jb.State(*noise))
     ends = [_end(state, engine, scene, accuracy="tight") for engine in ("lanes", "xla")]
     assert ends[0].outcome == ends[1].outcome
-    assert float(ends[0].t[0]) == pytest.approx(float(ends[1].t[0]), abs=1e-4)
+    # A fall is noticed where a step ends, and the engines' steps are not the same.
+    assert float(ends[0].t[0]) == pytest.approx(float(ends[1].t[0]), abs=3e-3)
     if ends[0].outcome == jb.Ending.WALKING:
         for a, b in zip(ends[0].final, ends[1].final, strict=True):
             assert float(a) == pytest.approx(float(b), abs=2e-6)

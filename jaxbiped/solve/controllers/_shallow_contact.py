@@ -36,7 +36,7 @@ _REACH = 2.0
 class ShallowContact(AbstractWrappedControl):
     """Wraps a controller; a step within which a foot dips into the ground is tried again, to there.
 
-    The solve's `args` must be the scene. Nothing else changes the steps.
+    The solve's `args` must be the scene.
 
     Attributes:
         controller: decides every step's size.

@@ -1,4 +1,4 @@
-"""Step control: how steps are chosen, the same for every solve of the project."""
+"""Step control: how diffrax chooses the steps of solves that carry derivatives with the state."""
 
 from collections.abc import Callable
 from typing import Any, cast
@@ -14,10 +14,10 @@ from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, 
 
 _FIRST_STEP = 1e-5
 """First step tried, in units of time; a start that is not a number must not choose it."""
-_SMALLEST_STEP = 1e-12
+SMALLEST_STEP = 1e-12
 """Step size, in units of time, that is taken whatever its error: how a jump of the force is
 crossed."""
-_SAFETY = 0.8
+SAFETY = 0.8
 """Of the step size that the error estimate allows. At diffrax's 0.9 the contact's switches reject
 so many steps that the same error takes more of them."""
 
@@ -40,8 +40,8 @@ def step_control(
         rtol=rtol,
         atol=atol,
         norm=norm,
-        dtmin=_SMALLEST_STEP * time,
-        safety=_SAFETY,
+        dtmin=SMALLEST_STEP * time,
+        safety=SAFETY,
         force_dtmin=True,  # a state that is no longer a number ends the solve in another way
     )
     found = cast(StepControl, control)

@@ -14,9 +14,12 @@ from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.solve._accuracy import rms_norm
 
 if TYPE_CHECKING:  # which takes the adaptive one's abstract attributes for arguments
-    from diffrax import AbstractStepSizeController as AbstractControl
+    from diffrax import AbstractStepSizeController as _Control
 else:
-    from diffrax import AbstractAdaptiveStepSizeController as AbstractControl
+    from diffrax import AbstractAdaptiveStepSizeController as _Control
+
+AbstractControl = _Control
+"""What every controller of this project is for diffrax."""
 
 Adapted: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Any, Any]
 """Whether a step is kept, the next one's ends, whether a jump was passed, the controller's state,

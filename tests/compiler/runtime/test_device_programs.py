@@ -11,13 +11,13 @@ from tests.compiler.fake_driver import install
 
 pytestmark = pytest.mark.slow
 MOST = {
-    "end": (255, 576, 760),
-    "steps": (255, 476, 588),
-    "times": (255, 512, 680),
-    "arrivals": (255, 476, 588),
-    "extremes": (255, 656, 816),
+    "end": (255, 600, 872),
+    "steps": (255, 588, 804),
+    "times": (255, 624, 848),
+    "arrivals": (255, 588, 820),
+    "extremes": (255, 680, 936),
     "tangents": (255, 6524, 11724),
-    "labels": (255, 1968, 2472),
+    "labels": (255, 1952, 2488),
     "rigid": (230, 0, 0),
     "rigid_labels": (255, 140, 108),
 }

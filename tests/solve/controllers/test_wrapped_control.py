@@ -7,10 +7,12 @@ import jax.numpy as jnp
 import pytest
 
 from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve.controllers._crossed_switches import CrossedSwitches
 from jaxbiped.solve.controllers._extremes import Extremes
 from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
 from jaxbiped.solve.controllers._shallow_contact import ShallowContact
 from jaxbiped.solve.controllers._step_control import InUnits
+from jaxbiped.solve.controllers._touchdown_ahead import TouchdownAhead
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
 from jaxbiped.variational._switch_locator import SwitchLocator
 from jaxbiped.variational._tangent_solver import TangentControl
@@ -19,9 +21,11 @@ WRAPPERS = {
     Extremes: (lambda args, y: y,),
     FootstepLimit: (3,),
     InUnits: (1.0,),
+    CrossedSwitches: (10.0,),
     ShallowContact: (),
     SwitchLocator: (None,),
     TangentControl: (1e-5, jnp.ones(1)),
+    TouchdownAhead: (),
 }
 
 
