@@ -11,7 +11,7 @@ pytestmark = pytest.mark.slow
 def test_what_is_timed_is_right(tmp_path):
     numbers, figures = quick_run("lanes_speed", tmp_path, alone=True)
     ways = {row["way"] for row in numbers["singles"]}
-    assert {"lanes", "lanes, rodas4p", "xla"} <= ways
+    assert {"lanes", "lanes, rodas4", "xla"} <= ways
     assert all(row["error"] < 1e-3 for row in numbers["singles"])
     assert numbers["batches"]
     assert all(row["error_median"] < 1e-3 for row in numbers["batches"])

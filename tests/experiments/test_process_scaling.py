@@ -1,0 +1,23 @@
+"""Sweeps by one worker process and by two, at the experiment's quick size."""
+
+import pytest
+
+from tests.drawn import assert_is_drawn
+from tests.experiments.quick import quick_run
+
+pytestmark = pytest.mark.slow
+
+
+def test_two_workers_find_the_labels_of_one(tmp_path):
+    numbers, figures = quick_run("process_scaling", tmp_path, alone=True)
+    assert [row["workers"] for row in numbers["rows"]] == [1, 2]
+    for row in numbers["rows"]:
+        assert row["starts"] == 1024
+        assert row["labels_differ"] == 0
+        assert min(row["starts_per_s"]) > 0.0
+    ratio = numbers["rows"][1]["median"] / numbers["rows"][0]["median"]
+    assert numbers["efficiency"] == pytest.approx(ratio / 2.0)
+    (figure,) = figures.values()
+    assert_is_drawn(
+        figure, unitless={"worker processes of one core each", "labelled starts a second"}
+    )
