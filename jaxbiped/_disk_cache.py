@@ -7,7 +7,9 @@ made again.
 import contextlib
 import hashlib
 import os
+import stat
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -18,7 +20,11 @@ BYTES = 1 << 30
 """What the folder may hold; what was read or written longest ago goes first."""
 KINDS = ("lanes", "programs", "xla")
 """Machine code of lanes, what goes with it, and programs compiled by XLA."""
+ABANDONED = 3600.0
+"""Age [s] from which a temporary file is one that a killed process left."""
 _DIGEST = 32
+_TEMPORARY = "."
+"""What their names begin with; no entry's does."""
 _WRITABLE_BY_OTHERS = 0o022
 
 
@@ -56,7 +62,7 @@ def read_entry(kind: str, name: str) -> bytes | None:
     except OSError:
         return None
     digest, content = whole[:_DIGEST], whole[_DIGEST:]
-    return content if hashlib.sha256(content).digest() == digest else None
+    return content if _digest(kind, name, content) == digest else None
 
 
 def write_entry(kind: str, name: str, content: bytes) -> None:
@@ -69,10 +75,10 @@ def write_entry(kind: str, name: str, content: bytes) -> None:
             folder.mkdir(parents=True, exist_ok=True, mode=0o700)
             if not _is_own(folder):
                 os.chmod(folder, 0o700)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".")
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=_TEMPORARY)
         try:
             with os.fdopen(handle, "wb") as file:
-                file.write(hashlib.sha256(content).digest() + content)
+                file.write(_digest(kind, name, content) + content)
             os.replace(temporary, path)
         except BaseException:
             with contextlib.suppress(OSError):
@@ -87,18 +93,18 @@ def disk_use() -> dict[str, DiskUse]:
     """How much of each kind is kept."""
     sizes: dict[str, list[int]] = {kind: [] for kind in KINDS}
     folder = cache_folder()
-    for stat, path in _files(folder) if folder is not None else ():
-        sizes[path.parent.name].append(stat.st_size)
+    for status, path in _files(folder) if folder is not None else ():
+        sizes[path.parent.name].append(status.st_size)
     return {kind: DiskUse(len(each), sum(each)) for kind, each in sizes.items()}
 
 
 def clear_disk() -> DiskUse:
     """Removes all that is kept, and tells how much that was. Programs that run go on."""
     folder, removed = cache_folder(), [0, 0]
-    for stat, path in list(_files(folder)) if folder is not None else ():
+    for status, path in list(_files(folder)) if folder is not None else ():
         with contextlib.suppress(OSError):
             path.unlink()
-            removed = [removed[0] + 1, removed[1] + stat.st_size]
+            removed = [removed[0] + 1, removed[1] + status.st_size]
     return DiskUse(*removed)
 
 
@@ -108,12 +114,17 @@ def _path(kind: str, name: str) -> Path | None:
     return None if folder is None else folder / kind / name
 
 
+def _digest(kind: str, name: str, content: bytes) -> bytes:
+    """Of an entry with its place: undamaged content under another's name is no entry either."""
+    return hashlib.sha256(f"{kind}/{name}\0".encode() + content).digest()
+
+
 def _is_own(path: Path) -> bool:
     """Whether nobody else can write there. Systems without owners have other guards."""
     if not hasattr(os, "geteuid"):
         return True
-    stat = path.stat()
-    return stat.st_uid == os.geteuid() and not stat.st_mode & _WRITABLE_BY_OTHERS
+    status = path.stat()
+    return status.st_uid == os.geteuid() and not status.st_mode & _WRITABLE_BY_OTHERS
 
 
 def _files(folder: Path) -> Iterator[tuple[os.stat_result, Path]]:
@@ -122,15 +133,25 @@ def _files(folder: Path) -> Iterator[tuple[os.stat_result, Path]]:
         with contextlib.suppress(OSError), os.scandir(folder / kind) as entries:
             for entry in entries:
                 with contextlib.suppress(OSError):
-                    yield entry.stat(), Path(entry.path)
+                    status = entry.stat()
+                    if stat.S_ISREG(status.st_mode):
+                        yield status, Path(entry.path)
 
 
 def _prune(folder: Path) -> None:
-    """Removes what is too much for the disk: who misses it makes it again."""
-    files = list(_files(folder))
-    excess = sum(stat.st_size for stat, _ in files) - BYTES
-    for stat, path in sorted(files, key=lambda file: file[0].st_mtime_ns):
+    """Removes what killed processes left, and what is too much for the disk.
+
+    Who misses an entry makes it again.
+    """
+    kept, oldest = [], time.time() - ABANDONED
+    for status, path in _files(folder):
+        if path.name.startswith(_TEMPORARY) and status.st_mtime < oldest:
+            path.unlink(missing_ok=True)
+        else:
+            kept.append((status, path))
+    excess = sum(status.st_size for status, _ in kept) - BYTES
+    for status, path in sorted(kept, key=lambda file: file[0].st_mtime_ns):
         if excess <= 0:
             return
         path.unlink(missing_ok=True)
-        excess -= stat.st_size
+        excess -= status.st_size

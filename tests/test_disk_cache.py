@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -49,6 +50,16 @@ def test_damage_is_seen(cache, damage):
     assert read_entry("lanes", "a") == CONTENT
 
 
+def test_an_entry_under_the_name_of_another_is_damage(cache):
+    for kind, name in (("lanes", "a"), ("lanes", "b"), ("xla", "a")):
+        write_entry(kind, name, CONTENT + name.encode())
+    shutil.copy(cache / "lanes" / "a", cache / "lanes" / "b")
+    shutil.copy(cache / "lanes" / "a", cache / "xla" / "a")
+    assert read_entry("lanes", "b") is None
+    assert read_entry("xla", "a") is None
+    assert read_entry("lanes", "a") == CONTENT + b"a"
+
+
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="a system without owners")
 @pytest.mark.parametrize("place", ["xla/a", "xla", "."])
 def test_what_others_can_write_is_not_read(cache, place):
@@ -90,6 +101,33 @@ def test_what_was_used_longest_ago_makes_room(cache, monkeypatch):
     write_entry("lanes", "c", CONTENT)
     assert read_entry("xla", "a") == read_entry("lanes", "c") == CONTENT
     assert read_entry("xla", "b") is None
+
+
+def test_a_folder_among_the_entries_is_left_alone(cache, monkeypatch):
+    """It cannot be unlinked, and what comes behind it makes room as ever."""
+    write_entry("xla", "a", CONTENT)
+    (cache / "xla" / "old").mkdir()
+    for k, name in enumerate(("old", "a")):
+        os.utime(cache / "xla" / name, (k, k))
+    assert disk_use()["xla"].entries == 1
+    monkeypatch.setattr(_disk_cache, "BYTES", len(CONTENT) + 32)
+    write_entry("xla", "b", CONTENT)
+    assert read_entry("xla", "a") is None
+    assert read_entry("xla", "b") == CONTENT
+
+
+def test_what_killed_processes_left_is_removed_after_a_while(cache):
+    write_entry("xla", "a", CONTENT)
+    left, fresh = cache / "xla" / ".left", cache / "xla" / ".fresh"
+    for path in (left, fresh):
+        path.write_bytes(CONTENT)
+    before = time.time() - _disk_cache.ABANDONED - 1.0
+    os.utime(left, (before, before))
+    os.utime(cache / "xla" / "a", (before, before))
+    write_entry("lanes", "b", CONTENT)
+    assert not left.exists()
+    assert fresh.exists()  # some process may be writing it
+    assert read_entry("xla", "a") == CONTENT
 
 
 WORK = """
