@@ -4,7 +4,6 @@ With so many processes that all begin at once: `python -m tests.cli.test_killed_
 take some 15 GB of memory and a quarter of an hour on two cores.
 """
 
-import hashlib
 import json
 import os
 import random
@@ -18,7 +17,7 @@ from typing import NamedTuple
 
 import pytest
 
-from jaxbiped._disk_cache import CACHE_VARIABLE
+from jaxbiped._disk_cache import CACHE_VARIABLE, _digest
 
 COMMANDS = (
     ("walk", "--duration", "0.5", "--json", "-"),
@@ -82,7 +81,7 @@ def _spoil(cache, chance):
             content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
         else:
             garbage = chance.randbytes(5_000)
-            content = hashlib.sha256(garbage).digest() + garbage
+            content = _digest(path.parent.name, path.name, garbage) + garbage
         path.write_bytes(content)
         path.chmod(0o666 if how == 3 else 0o600)
     return len(chosen)
