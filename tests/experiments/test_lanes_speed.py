@@ -16,7 +16,8 @@ def test_what_is_timed_is_right(tmp_path):
     assert numbers["batches"]
     assert all(row["error_median"] < 1e-3 for row in numbers["batches"])
     assert "lanes" in {row["way"] for row in numbers["derivatives"]}
-    assert all(0.0 < row["error"] < 1e-4 for row in numbers["derivatives"])
+    ours = [row for row in numbers["derivatives"] if row["way"] != "CasADi CVODES"]
+    assert all(0.0 < row["error"] < 1e-4 for row in ours)
     gaits = {"lanes, with the radius's", "lanes, without the radius's"}
     assert set(numbers["gaits_s"]) == set(numbers["gait_periods_s"]) == gaits
     for period in numbers["gait_periods_s"].values():
