@@ -1,13 +1,13 @@
 """Kernel: a program's signature and machine code, kept by the disk or else traced and compiled."""
 
 import dataclasses
-import functools
 import threading
 
 import jax
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
+from jaxbiped._caches import Once
 from jaxbiped._fingerprint import as_leaves, fingerprint
 from jaxbiped._paused_collection import paused_collection
 from jaxbiped.compiler.codegen._kernel_target import host_target
@@ -51,10 +51,12 @@ class Kernel:
 
     def __init__(self, program: Program | None, inputs: PyTree, digest: str | None) -> None:
         self._program, self.inputs, self.digest = program, inputs, digest
-        self._graph: Graph | None = None
         self._code: dict[int, MachineCode] = {}
         self._ptx: dict[str, str] = {}
         self._making = threading.Lock()
+        # Each with a lock of its own: who waits for one kernel does not wait for the others.
+        self._kept, self._signed = Once[Signature | None](), Once[Signature]()
+        self._outlined, self._traced = Once[Outline](), Once[Graph]()
 
     @staticmethod
     def of_program(program: Program, inputs: PyTree) -> "Kernel":
@@ -81,47 +83,27 @@ class Kernel:
         if signature is None:
             raise KeyError(digest)
         kernel = Kernel(None, signature.inputs, digest)
-        kernel.__dict__["_kept_signature"] = signature
+        kernel._kept(lambda: signature)
         return kernel
 
     def trace_from(self, other: "Kernel") -> None:
         """Knows from here on how to trace itself."""
         self._program = self._program or other._program
 
-    @functools.cached_property
-    def _kept_signature(self) -> Signature | None:
-        """What the disk knew of it when it was first asked."""
-        return None if self.digest is None else read_signature(self.digest)
-
-    @functools.cached_property
+    @property
     def signature(self) -> Signature:
         """What its callers have to know of its operations."""
-        if self._kept_signature is not None:
-            return self._kept_signature
-        program = self._own_program()
-        found = signature_of(self.graph, self.inputs, self.outline, backwards=program.backwards)
-        if self.digest is not None:
-            write_signature(self.digest, found)
-        return found
+        return self._signed(self._sign)
 
-    @functools.cached_property
+    @property
     def outline(self) -> Outline:
         """What leaves the program: known before its operations are."""
-        kept = self._kept_signature
-        if kept is not None:
-            return kept.outline
-        with paused_collection():
-            return outline_of(self._own_program(), self.inputs)
+        return self._outlined(self._sketch)
 
     @property
     def graph(self) -> Graph:
         """The program's operations."""
-        # One after the other: what is traced first can be compiled while the next one is traced.
-        if self._graph is None:
-            with _TRACING, paused_collection():
-                if self._graph is None:
-                    self._graph = graph_of(self._own_program(), self.inputs)
-        return self._graph
+        return self._traced(self._trace)
 
     def text(self, width: int) -> str:
         """The program as LLVM's text."""
@@ -171,6 +153,33 @@ class Kernel:
         with self._making:
             return self._has_ptx(architecture)
 
+    def _kept_signature(self) -> Signature | None:
+        """What the disk knew of it when it was first asked."""
+        digest = self.digest
+        return self._kept(lambda: None if digest is None else read_signature(digest))
+
+    def _sign(self) -> Signature:
+        kept = self._kept_signature()
+        if kept is not None:
+            return kept
+        program = self._own_program()
+        found = signature_of(self.graph, self.inputs, self.outline, backwards=program.backwards)
+        if self.digest is not None:
+            write_signature(self.digest, found)
+        return found
+
+    def _sketch(self) -> Outline:
+        kept = self._kept_signature()
+        if kept is not None:
+            return kept.outline
+        with paused_collection():
+            return outline_of(self._own_program(), self.inputs)
+
+    def _trace(self) -> Graph:
+        # One after the other: what is traced first can be compiled while the next one is traced.
+        with _TRACING, paused_collection():
+            return graph_of(self._own_program(), self.inputs)
+
     def _has_ptx(self, architecture: Architecture) -> bool:
         name = architecture.name
         if name not in self._ptx and self.digest is not None:
@@ -180,9 +189,9 @@ class Kernel:
         return name in self._ptx
 
     def _read_code(self, width: int) -> MachineCode | None:
-        if self.digest is None or self._graph is not None:
+        if self.digest is None or self._traced.done:
             return None
-        kept = self._kept_signature
+        kept = self._kept_signature()
         return None if kept is None else read_code(self.digest, width, host(), maps=kept.maps)
 
     def _make_code(self, width: int) -> MachineCode:
