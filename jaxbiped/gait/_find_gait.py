@@ -262,9 +262,9 @@ def _compile(searching: SearchArguments, describing: Described, origin: Origin) 
     with told, ThreadPoolExecutor() as meanwhile:
         with deferred_checks() as programs:
             # What takes lanes longest begins first.
+            ready = [meanwhile.submit(_search.begin(*searching))]
             finish = summarise_gait.begin(spec, scene, start, no_result, *describing, origin)
-            ready = [meanwhile.submit(finish)]
-            ready.append(meanwhile.submit(_search.begin(*searching)))
+            ready.append(meanwhile.submit(finish))
         for program in programs:
             program.check()
         for each in ready:
