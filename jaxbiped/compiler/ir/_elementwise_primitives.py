@@ -34,6 +34,8 @@ def array_of(values: Sequence[Value], shape: tuple[int, ...]) -> Array:
 
 def elementwise(function: Callable[..., Value], *arrays: Array) -> Array:
     """Applies a function of values to arrays."""
+    if all(array.ndim == 0 for array in arrays):
+        return array_of([function(*(array[()] for array in arrays))], ())
     result = np.frompyfunc(function, len(arrays), 1)(*arrays)
     return result if isinstance(result, np.ndarray) else array_of([result], ())
 

@@ -22,10 +22,14 @@ class Kind(enum.Enum):
     I32 = "i32"
     BOOL = "i1"
 
-    @property
-    def is_float(self) -> bool:
-        """Whether it is a floating-point number."""
-        return self in (Kind.F64, Kind.F32)
+    is_float: bool
+    """Whether it is a floating-point number."""
+
+    def __init__(self, text: str) -> None:
+        self.is_float = text in ("double", "float")
+
+    # Members are compared by identity. That of `Enum`, by the name, takes long in keys.
+    __hash__ = object.__hash__
 
 
 _NUMBER = itertools.count()
@@ -78,16 +82,12 @@ class Block:
     ) -> None:
         self.parent, self.invariant, self.loop, self.rare = parent, invariant, loop, rare
         self.values: list[Value] = []
+        self._lineage: list[Block] = [self, *(() if parent is None else parent._lineage)]
         self._known: dict[tuple[Argument, ...], Value] = {}
 
     def lineage(self) -> "list[Block]":
         """This block, the one around it, and so on."""
-        blocks: list[Block] = []
-        block: Block | None = self
-        while block is not None:
-            blocks.append(block)
-            block = block.parent
-        return blocks
+        return self._lineage
 
     def const(self, number: float, kind: Kind) -> Value:
         """A number."""
@@ -108,8 +108,7 @@ class Block:
         if op in _COMMUTATIVE and args[0].number > args[1].number:
             args = (args[1], args[0])
         key = (op, result, *(a if isinstance(a, int | float | str) else id(a) for a in args))
-        lineage = self.lineage()
-        for block in lineage:
+        for block in self._lineage:
             known = block._known.get(key)
             if known is not None:
                 return known
@@ -153,7 +152,7 @@ class Block:
         return found
 
     def _root(self) -> "Block":
-        return self.lineage()[-1]
+        return self._lineage[-1]
 
 
 _COMMUTATIVE = {"fadd", "fmul", "add", "mul", "and", "or", "xor"}
@@ -180,12 +179,15 @@ _NUMBERS: dict[str, Callable[..., float]] = {
     "xor": operator.xor,
 }
 
+_FOLDED = {*_NUMBERS, "select"}
+
 
 def _fold(block: Block, op: str, args: tuple[Argument, ...], kind: Kind) -> Value | None:
     """What an operation comes to where its arguments are numbers, or do nothing."""
-    constants = [a.constant if isinstance(a, Value) else None for a in args]
-    known = bool(constants) and all(c is not None for c in constants)
-    if known and op in _NUMBERS and kind is not Kind.F32:
+    if op not in _FOLDED:
+        return None
+    constants = [a.constant for a in args]
+    if op in _NUMBERS and kind is not Kind.F32 and None not in constants:
         return block.const(_NUMBERS[op](*constants), kind)
     if op in ("fadd", "fsub", "fmul", "fdiv"):
         found = _fold_float(block, op, args, constants, kind)
@@ -232,12 +234,12 @@ def _fold_float(
 def _strip_signs(block: Block, op: str, args: tuple[Argument, ...]) -> Value | None:
     """Changes of sign moved out of an operation, where a sum or difference absorbs them."""
     a, b = args
-    negated = [value.op == "fneg" for value in args]
+    negated = [a.op == "fneg", b.op == "fneg"]
+    if not any(negated):
+        return None
     x, y = (
         value.args[0] if negative else value for value, negative in zip(args, negated, strict=True)
     )
-    if not any(negated):
-        return None
     if op in ("fmul", "fdiv"):
         found = block.add(op, x, y)
         return found if all(negated) else block.add("fneg", found)

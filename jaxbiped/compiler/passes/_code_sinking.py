@@ -57,16 +57,19 @@ def _sink_into(head: Value, uses: Uses) -> None:
     moved: list[Value] = []
 
     def only_here(value: Value) -> bool:
-        users = [
-            user.block if within is None and user is not None else within
-            for user, within in uses[id(value)]
-        ]
-        return bool(users) and all(b is not None and inside in b.lineage() for b in users)
+        users = uses.get(id(value), ())
+        for user, within in users:
+            block = user.block if within is None and user is not None else within
+            if block is None or inside not in block.lineage():
+                return False
+        return bool(users)
 
     for value in reversed(block.values[: block.values.index(head)]):
         if value.op not in _STAYS and only_here(value):
             value.block = inside
             moved.append(value)
+    if not moved:
+        return
     gone = {id(value) for value in moved}
     block.values[:] = [value for value in block.values if id(value) not in gone]
     inside.values[:0] = reversed(moved)
