@@ -18,7 +18,7 @@ from jaxbiped._caches import Once, register_programs
 from jaxbiped._compiled_store import CompiledCall, Skeleton, read_call, trace_call
 from jaxbiped._disk_cache import cache_folder
 from jaxbiped._fingerprint import fingerprint, settings
-from jaxbiped._paused_collection import paused_collection
+from jaxbiped._long_trace import long_trace
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -89,7 +89,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         key = None if arguments is None else self._key(arguments)
         kept = None if key is None else read_call(key)
         if arguments is None or kept is None:
-            with paused_collection():
+            with long_trace():
                 return eqx.filter_eval_shape(self._jitted, *args, **kwargs)
         self._once(arguments)(lambda: kept)
         return kept.shapes()

@@ -20,7 +20,7 @@ from jaxlib.mlir import ir
 from jaxbiped._disk_cache import read_entry, write_entry
 from jaxbiped._fingerprint import Leaf, leaf_of
 from jaxbiped._host_call import TARGET, HostCall, host_call, lowered_host_calls
-from jaxbiped._paused_collection import paused_collection
+from jaxbiped._long_trace import long_trace
 
 _KIND = "xla"
 _LAPACK = "lapack_"
@@ -95,7 +95,7 @@ def trace_call(
         results.append(result)
         return found
 
-    with paused_collection(), lowered_host_calls() as calls:
+    with long_trace(), lowered_host_calls() as calls:
         lowered = jax.jit(flat).lower(*arrays)
     targets = _foreign_targets(lowered)
 

@@ -44,6 +44,14 @@ def select(condition: Scalar, a: SomeTree, b: SomeTree) -> SomeTree:
     return jtu.tree_map(lambda x, y: jnp.where(condition, x, y), a, b)
 
 
+def choose(condition: Scalar, a: SomeTree, b: SomeTree) -> SomeTree:
+    """`select` by one conditional: for many leaves XLA compiles it in less time.
+
+    Both trees have leaves of the same types.
+    """
+    return jax.lax.cond(condition, lambda: a, lambda: b)
+
+
 def as_float(value: Parameter) -> Scalar:
     """A floating-point array of JAX's default width (64 bits unless changed) or its own.
 

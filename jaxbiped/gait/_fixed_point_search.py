@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, select
+from jaxbiped._types import Scalar
 from jaxbiped.gait._newton import (
     Method,
     Progress,
@@ -188,6 +188,6 @@ def _iterate(run: Run, begin: Progress, method: Method) -> Progress:
     def advance(now: Progress) -> Progress:
         on = goes_on(now)
         latest = run(now.trial, now.stage, ~on)
-        return select(on, newton_iteration(now, latest, method), now)
+        return newton_iteration(now, latest, method)
 
     return jax.lax.while_loop(goes_on, advance, begin)

@@ -278,7 +278,7 @@ def _elasticities(
     scene: PyTree, active: tuple[int, ...], measures: Measures, slopes: Measures
 ) -> Measures:
     leaves = jtu.tree_leaves(scene)
-    zero = jnp.stack([leaves[i] == 0.0 for i in active]) if active else jnp.zeros(0, dtype=bool)
+    zero = (jnp.stack([leaves[i] for i in active]) if active else jnp.zeros(0)) == 0.0
 
     def relative(value: Scalar, slope: Scalar) -> Scalar:
         return jnp.where(zero, 0.0, jnp.where(jnp.abs(value) < _NOTHING, jnp.nan, slope / value))

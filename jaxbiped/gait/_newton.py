@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, select
+from jaxbiped._types import RealScalarLike, Scalar, choose
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.linalg._small_matrices import solve
 
@@ -134,7 +134,7 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
     base = jnp.where(better, now.trial, now.base)
     base = jnp.where(approaching & returned, latest.recurring, base)
     m = len(base)
-    base_residual, slope, base_return = select(
+    base_residual, slope, base_return = choose(
         better,
         (residual, latest.jacobian[:, :m] - jnp.eye(m), latest),
         (now.base_residual, now.slope, now.base_return),
@@ -168,7 +168,7 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
         step=step,
         base_return=base_return,
         damping=damping,
-        coarse=select(coarse_done, base_return, now.coarse),
+        coarse=choose(coarse_done, base_return, now.coarse),
         optimiser=optimiser,
         code=jnp.where(returned, now.code, latest.code),
         evaluations=now.evaluations + 1,

@@ -104,7 +104,8 @@ def seed_directions(args: PyTree, active: tuple[int, ...], m: int) -> tuple[Seed
     """
     leaves = jtu.tree_leaves(args)
     values = [jax.lax.stop_gradient(leaves[i]) for i in active]
-    sizes = jnp.stack([jnp.where(v == 0.0, 1.0, v) for v in values]) if values else jnp.zeros(0)
+    sizes = jnp.stack(values) if values else jnp.zeros(0)
+    sizes = jnp.where(sizes == 0.0, 1.0, sizes)
     seeds = jnp.concatenate([jnp.zeros((len(active), m)), jnp.diag(sizes)], axis=1)
     by_state = STATE_FLOOR * recurring_inverse_units(args, m)
     floors = jnp.concatenate([by_state, jnp.full(len(active), PARAMETER_FLOOR)])

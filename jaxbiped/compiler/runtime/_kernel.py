@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._caches import Once
 from jaxbiped._fingerprint import as_leaves, fingerprint
-from jaxbiped._paused_collection import paused_collection
+from jaxbiped._long_trace import long_trace
 from jaxbiped.compiler.codegen._kernel_target import host_target
 from jaxbiped.compiler.codegen._lane_kernel import ENTRY, kernel_text
 from jaxbiped.compiler.codegen._ptx_kernel import (
@@ -108,7 +108,7 @@ class Kernel:
     def text(self, width: int) -> str:
         """The program as LLVM's text."""
         graph = self.graph
-        with paused_collection():
+        with long_trace():
             return kernel_text(graph, host_target(width, host()))
 
     def instructions(self) -> int:
@@ -135,7 +135,7 @@ class Kernel:
     def device_text(self, threads: int = THREADS, blocks: int = BLOCKS) -> str:
         """The program as LLVM's text for devices; see `device_target`."""
         graph = self.graph
-        with paused_collection():
+        with long_trace():
             return kernel_text(graph, device_target(threads, blocks))
 
     def ptx(self, architecture: Architecture) -> str:
@@ -172,12 +172,12 @@ class Kernel:
         kept = self._kept_signature()
         if kept is not None:
             return kept.outline
-        with paused_collection():
+        with long_trace():
             return outline_of(self._own_program(), self.inputs)
 
     def _trace(self) -> Graph:
         # One after the other: what is traced first can be compiled while the next one is traced.
-        with _TRACING, paused_collection():
+        with _TRACING, long_trace():
             return graph_of(self._own_program(), self.inputs)
 
     def _has_ptx(self, architecture: Architecture) -> bool:

@@ -1,0 +1,73 @@
+"""Long traces: the collector rests, spells are long, and both are left as they were found."""
+
+import gc
+import sys
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from jaxbiped._long_trace import long_trace
+
+SHORT, LONG = 0.005, 0.5
+
+
+@pytest.fixture(autouse=True)
+def _settings_of_the_interpreter() -> Iterator[None]:
+    spell = sys.getswitchinterval()
+    gc.enable()
+    sys.setswitchinterval(SHORT)
+    yield
+    gc.enable()
+    sys.setswitchinterval(spell)
+
+
+def _as_found() -> bool:
+    return gc.isenabled() and sys.getswitchinterval() == pytest.approx(SHORT)
+
+
+def test_collector_rests_and_spells_are_longer_within() -> None:
+    with long_trace():
+        assert not gc.isenabled()
+        assert sys.getswitchinterval() > 2.0 * SHORT
+    assert _as_found()
+
+
+def test_an_error_leaves_both_as_they_were_found() -> None:
+    with pytest.raises(KeyError), long_trace():
+        raise KeyError
+    assert _as_found()
+
+
+def test_the_last_of_several_threads_leaves_both_as_they_were_found() -> None:
+    inside, leave = threading.Event(), threading.Event()
+
+    def trace() -> None:
+        with long_trace():
+            inside.set()
+            leave.wait(10.0)
+
+    thread = threading.Thread(target=trace)
+    thread.start()
+    assert inside.wait(10.0)
+    with long_trace():
+        pass
+    assert not gc.isenabled()
+    assert sys.getswitchinterval() > 2.0 * SHORT
+    leave.set()
+    thread.join()
+    assert _as_found()
+
+
+def test_a_collector_that_the_user_switched_off_stays_off() -> None:
+    gc.disable()
+    with long_trace(), long_trace():
+        assert not gc.isenabled()
+    assert not gc.isenabled()
+
+
+def test_spells_that_the_user_made_longer_stay_so() -> None:
+    sys.setswitchinterval(LONG)
+    with long_trace():
+        assert sys.getswitchinterval() == pytest.approx(LONG)
+    assert sys.getswitchinterval() == pytest.approx(LONG)
