@@ -5,10 +5,11 @@ import itertools
 import math
 import operator
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
+_T = TypeVar("_T")
 Argument: TypeAlias = Any
 """Of an operation: a value; of a constant its number, of a region also blocks and tuples."""
 
@@ -84,6 +85,7 @@ class Block:
         self.values: list[Value] = []
         self._lineage: list[Block] = [self, *(() if parent is None else parent._lineage)]
         self._known: dict[tuple[Argument, ...], Value] = {}
+        self._called: dict[tuple[Any, ...], tuple[Sequence[Value], Any]] = {}
 
     def lineage(self) -> "list[Block]":
         """This block, the one around it, and so on."""
@@ -132,6 +134,18 @@ class Block:
         home = self.home(args)
         home._known[key] = make(home)
         return home._known[key]
+
+    def call(self, key: tuple[Any, ...], values: Sequence[Value], lower: Callable[[], _T]) -> _T:
+        """What `lower` gives for a call of these values, called once.
+
+        `key` holds what is called and the values' ids, which live as long as the block.
+        """
+        for block in self._lineage:
+            if key in block._called:
+                return block._called[key][1]
+        found = lower()
+        self._called[key] = values, found
+        return found
 
     def region(self, op: str, args: tuple[Argument, ...], kinds: list[Kind]) -> list[Value]:
         """An operation of several results, never shared with another."""

@@ -3,7 +3,7 @@
 Arrays disappear here: each entry becomes a value of its own, which a lane can keep in a register.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias, TypeGuard
 
 import numpy as np
@@ -108,7 +108,10 @@ def _apply(block: Block, equation: JaxprEqn, inputs: list[Array]) -> list[Array]
     name, params = equation.primitive.name, equation.params
     inner = inner_jaxpr(equation)
     if inner is not None:
-        return lower_jaxpr(block, *inner, inputs)
+        called, consts = inner
+        if consts:
+            return lower_jaxpr(block, called, consts, inputs)
+        return _once(block, called, inputs, lambda: lower_jaxpr(block, called, (), inputs))
     if name in ELEMENTWISE:
         rule = ELEMENTWISE[name]
         if name == "select_n" and inputs[0].ndim == 0 and inputs[1].ndim > 0:
@@ -137,6 +140,17 @@ def _apply(block: Block, equation: JaxprEqn, inputs: list[Array]) -> list[Array]
     if name == "scan":
         return _scan(block, params, inputs)
     raise NotImplementedError
+
+
+def _once(
+    block: Block, called: Jaxpr, inputs: list[Array], lower: Callable[[], list[Array]]
+) -> list[Array]:
+    """A call's results: what an equal one gave that is known here.
+
+    Operations are shared one by one, too, but conditionals and loops inside of a call are not.
+    """
+    values = [value for array in inputs for value in array.ravel()]
+    return block.call((called, *map(id, values)), values, lower)
 
 
 def _branches(block: Block, branches: Sequence[ClosedJaxpr], inputs: list[Array]) -> list[Array]:
