@@ -5,7 +5,9 @@ smaller one, and a rejected one by none that is larger: where the force has corn
 attempts (Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, section II.4).
 """
 
-from collections.abc import Callable
+import functools
+import operator
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import diffrax
@@ -22,8 +24,8 @@ from jaxbiped.solve.controllers._wrapped_control import AbstractControl, Adapted
 
 _LEAST, _MOST = 0.2, 10.0
 """Sizes of the next step, in units of the last attempt."""
-_TINY = 1e-20
-"""Error below which it makes no difference."""
+_TINY = 1e-30
+"""Mean square of errors below which it makes no difference."""
 _RESOLUTION = 8.9e-16
 """Smallest step, in units of the time that has passed: four roundings of 64 bits. In 32 bits such
 a step stands still and runs out of attempts, as it should."""
@@ -78,28 +80,65 @@ class ErrorControl(AbstractControl):  # type: ignore[type-arg]
             SMALLEST_STEP * jnp.asarray(self.units.time, span.dtype),
             _RESOLUTION * jnp.abs(t1),
         )
-        error = self._error(y0, y1_candidate, y_error)
-        keep = (error < 1.0) | (span <= _ROUNDING * smallest)
+        square = self._mean_square(y0, y1_candidate, y_error)
+        keep = (square < 1.0) | (span <= _ROUNDING * smallest)
         most = jnp.where(keep & ~controller_state, _MOST, 1.0)
-        wanted = SAFETY / _root(jnp.maximum(error, _TINY), error_order)
+        wanted = SAFETY / _root(jnp.maximum(square, _TINY), error_order)
         factor = jnp.clip(wanted, _LEAST, most).astype(span.dtype)
         size = jax.lax.stop_gradient(jnp.maximum(span * factor, smallest))
         start = jnp.where(keep, t1, t0)
         made_jump = jnp.asarray(False)
         return keep, start, start + size, made_jump, ~keep, diffrax.RESULTS.successful
 
-    def _error(self, y0: PyTree, y1: PyTree, error: PyTree) -> Scalar:
-        def scaled(before: Scalar, after: Scalar, off: Scalar, inverse: Numbers) -> Scalar:
-            largest = jnp.maximum(jnp.abs(before), jnp.abs(after))
-            return off / (self.atol / inverse + self.rtol * largest).astype(off.dtype)
+    def _mean_square(self, y0: PyTree, y1: PyTree, error: PyTree) -> Scalar:
+        """Of the errors in units of the tolerance."""
 
-        found = self.norm(jtu.tree_map(scaled, y0, y1, error, self.units.inverse))
+        def scale(before: Scalar, after: Scalar, off: Scalar, inverse: Numbers) -> Scalar:
+            largest = jnp.maximum(jnp.abs(before), jnp.abs(after))
+            return jnp.asarray(self.atol / inverse + self.rtol * largest, off.dtype)
+
+        scales = jtu.tree_map(scale, y0, y1, error, self.units.inverse)
+        errors = jtu.tree_leaves(error)
+        quotients = _quotients(errors, jtu.tree_leaves(scales))
+        total = sum(jnp.sum(quotient * quotient) for quotient in quotients)
+        found = jnp.asarray(total / sum(jnp.size(leaf) for leaf in errors))
         return jnp.where(found < jnp.inf, found, jnp.inf)  # where it is not a number, too
 
 
-def _root(error: Scalar, order: RealScalarLike | None) -> Scalar:
+def _quotients(numerators: Sequence[Scalar], denominators: Sequence[Scalar]) -> list[Scalar]:
+    """Of pairs of numbers; one division, which takes long, serves several of them."""
+    if len({jnp.shape(each) for each in denominators}) > 1:
+        together = 1
+    else:
+        # Products of so many tolerances are still far from the smallest numbers of the type.
+        together = 4 if denominators[0].dtype == jnp.float64 else 2
+    inverses: list[Scalar] = []
+    for first in range(0, len(denominators), together):
+        inverses += _inverses(denominators[first : first + together])
+    return [a * inverse for a, inverse in zip(numerators, inverses, strict=True)]
+
+
+def _inverses(numbers: Sequence[Scalar], over_all: Scalar | None = None) -> list[Scalar]:
+    """One over each of some numbers, from one over the product of all, by which it divides once."""
+    if over_all is None:
+        over_all = 1.0 / _product(numbers)
+    if len(numbers) == 1:
+        return [over_all]
+    middle = len(numbers) // 2
+    left, right = numbers[:middle], numbers[middle:]
+    return [
+        *_inverses(left, over_all * _product(right)),
+        *_inverses(right, over_all * _product(left)),
+    ]
+
+
+def _product(numbers: Sequence[Scalar]) -> Scalar:
+    return functools.reduce(operator.mul, numbers)
+
+
+def _root(square: Scalar, order: RealScalarLike | None) -> Scalar:
     """The root that a method's order makes of its error; square roots cost less than powers."""
     if order == 4:
-        return jnp.sqrt(jnp.sqrt(error))
+        return jnp.sqrt(jnp.sqrt(jnp.sqrt(square)))
     assert order is not None
-    return error ** (1.0 / order)
+    return square ** (0.5 / order)

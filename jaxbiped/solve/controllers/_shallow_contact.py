@@ -5,6 +5,7 @@ in it at an end may have been deeper. No error estimate sees that where no stage
 its force.
 """
 
+import functools
 from typing import Any, cast
 
 import jax
@@ -76,26 +77,21 @@ def _touchdown(
     scene: PyTree, t0: Scalar, span: Scalar, keep: Scalar, y0: PyTree, y1: PyTree
 ) -> tuple[Scalar, Scalar]:
     """Whether a step, which is to be kept or not, is to end at a contact instead, and when [s]."""
-    before = feet(scene, y0)
-    places = [k for k in range(2) if before[k].admitted is not False]
-    within_reach = jnp.zeros_like(span, dtype=bool)
-    for k in places:
-        foot = before[k]
-        near = jnp.abs(foot.penetration) < _REACH * span * foot.penetration_rate
-        within_reach = within_reach | (near if foot.admitted is None else near & foot.admitted)
-
-    def first() -> Scalar:
-        after, part = feet(scene, y1), jnp.ones_like(span)
-        for k in places:
-            part = jnp.minimum(part, _part_above(span, keep, before[k], after[k]))
-        return part
-
-    part = jnp.where(within_reach, fusion_barrier(within_reach, first), 1.0)
+    part = jnp.ones_like(span)
+    for k, before in enumerate(feet(scene, y0)):
+        if before.admitted is False:
+            continue
+        near = jnp.abs(before.penetration) < _REACH * span * before.penetration_rate
+        near = near if before.admitted is None else near & before.admitted
+        above = functools.partial(_part_above, scene, span, keep, k, before, y1)
+        part = jnp.minimum(part, jnp.where(near, fusion_barrier(near, above), 1.0))
     target = t0 + span * part * (1.0 + _OVERSHOOT) + _MARGIN
     return (part < _ALL) & (target < t0 + span), target
 
 
-def _part_above(span: Scalar, keep: Scalar, before: Foot, after: Foot) -> Scalar:
+def _part_above(
+    scene: PyTree, span: Scalar, keep: Scalar, k: int, before: Foot, y1: PyTree
+) -> Scalar:
     """The part of a step after which a foot comes into the ground, barely; 1 if it does not.
 
     Or that after which it is lowest, where it may come into the ground. A step that is tried again
@@ -104,6 +100,7 @@ def _part_above(span: Scalar, keep: Scalar, before: Foot, after: Foot) -> Scalar
     part after which a foot is deepest that begins barely in the ground and ends out of it: a smooth
     force is not felt yet where the step begins. Of a step that is not kept the end tells nothing.
     """
+    after = feet(scene, y1)[k]
     rates = span * before.penetration_rate, span * after.penetration_rate
     depth = StepCubic(before.penetration, after.penetration, *rates)
     off, rises = depth.start <= 0.0, keep & (depth.end_slope < 0.0)
