@@ -21,6 +21,7 @@ class KernelTarget(NamedTuple):
         width: simulations in one vector of a thread.
         inner: entries of a map in one vector, where `width` is one.
         scales: whether it multiplies by powers of two in one instruction.
+        architecture: the CPU's, in LLVM's words; empty for others (see `begin_flushing`).
         convention: LLVM's word for how its kernels are called.
         attributes: of the kernel's function, as LLVM writes them.
         votes: whether the threads of a warp go on together (see `WARP_ANY`).
@@ -32,6 +33,7 @@ class KernelTarget(NamedTuple):
     width: int
     inner: int
     scales: bool
+    architecture: str = ""
     convention: str = ""
     attributes: str = ""
     votes: bool = False
@@ -51,4 +53,4 @@ class KernelTarget(NamedTuple):
 
 def host_target(width: int, host: Host) -> KernelTarget:
     """Vectors of `width` simulations on this machine's CPU."""
-    return KernelTarget(width, host.width, host.scales)
+    return KernelTarget(width, host.width, host.scales, host.triple.partition("-")[0])

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from jaxbiped.compiler.codegen._flushed_subnormals import begin_flushing, end_flushing
 from jaxbiped.compiler.codegen._graph_codegen import GraphWriter, Place
 from jaxbiped.compiler.codegen._kernel_target import WARP_ANY, KernelTarget
 from jaxbiped.compiler.codegen._lane_scheduler import LaneScheduler, Sizes
@@ -41,6 +42,7 @@ class _Kernel:
 
     def text(self) -> str:
         t = self.t
+        found = begin_flushing(t, self.target.architecture)
         self._rooms()
         t.line("br label %refill")
         self._refill()
@@ -48,6 +50,7 @@ class _Kernel:
         self._records()
         t.line(f"br i1 {any_done}, label %refill, label %attempt")
         t.begin("leave")
+        end_flushing(t, self.target.architecture, found)
         t.line("ret void")
         before, behind = self.target.convention, self.target.attributes
         entry = f"define {before}void @{ENTRY}(ptr noalias %fields) {behind}{{"
