@@ -2,6 +2,7 @@
 
 import contextlib
 import contextvars
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
@@ -125,24 +126,38 @@ def _params(
 
 def _numbers(inputs: PyTree) -> Numbers:
     """The leaves one behind the other: every array that crosses costs time."""
-    leaves = jtu.tree_leaves(inputs)
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
-        return jnp.concatenate([jnp.ravel(jnp.asarray(x, dtype=jnp.float64)) for x in leaves])
-    return np.concatenate([np.ravel(np.asarray(leaf, dtype=np.float64)) for leaf in leaves])
+    parts: list[Numbers] = []
+    for traced, leaves in itertools.groupby(jtu.tree_leaves(inputs), _is_traced):
+        if traced:
+            # The primitives themselves: under an eager `vmap` each operation is dispatched.
+            wide = [jax.lax.convert_element_type(leaf, jnp.float64) for leaf in leaves]
+            parts += [jax.lax.reshape(leaf, (leaf.size,)) for leaf in wide]
+        else:
+            parts.append(np.concatenate([np.ravel(np.asarray(x, np.float64)) for x in leaves]))
+    return parts[0] if len(parts) == 1 else jax.lax.concatenate(parts, 0)
+
+
+def _is_traced(leaf: object) -> bool:
+    return isinstance(leaf, jax.core.Tracer)
 
 
 def _bind(given: list[Numbers], params: dict[str, Any]) -> list[Any]:
     """The operation's results for one simulation."""
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in given):
-        return [leaf[0] for leaf in _RUN.bind(*[x[None] for x in given], **params)]
+    if any(map(_is_traced, given)):
+        rows = [jax.lax.expand_dims(x, (0,)) for x in given]
+        return [jax.lax.squeeze(leaf, (0,)) for leaf in _RUN.bind(*rows, **params)]
     found = run_lanes(*[np.asarray(x)[None] for x in given], **params)
     return [jnp.asarray(leaf[0]) for leaf in found]
 
 
 def _outputs(compiled: CompiledProgram, table: Array) -> PyTree:
     shapes, structure = jtu.tree_flatten(compiled.outline.outputs)
-    parts = leaves_of(compiled.outline.outputs, table)
-    leaves = [jnp.asarray(part.astype(s.dtype)) for part, s in zip(parts, shapes, strict=True)]
+    if all(s.ndim == 0 for s in shapes):
+        # The same as what follows, by one operation.
+        parts = list(jnp.unstack(table))
+    else:
+        parts = leaves_of(compiled.outline.outputs, table)
+    leaves = [jax.lax.convert_element_type(p, s.dtype) for p, s in zip(parts, shapes, strict=True)]
     return jtu.tree_unflatten(structure, leaves)
 
 
