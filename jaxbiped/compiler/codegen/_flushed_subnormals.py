@@ -1,6 +1,6 @@
 """Flushed subnormals: numbers too small for leading digits count as zero while a kernel runs.
 
-No walk needs them, and x86 processors take very long over them: a fifth of a batch's time went into
+No walk needs them, and x86 processors take very long over them: a sixth of a batch's time went into
 products that hardly any lane chose. XLA's own programs on a CPU flush them too, so a walk gives the
 same bits in a jitted function as in a thread of our own.
 """

@@ -152,6 +152,11 @@ def _bind(given: list[Numbers], params: dict[str, Any]) -> list[Any]:
 
 def _outputs(compiled: CompiledProgram, table: Array) -> PyTree:
     shapes, structure = jtu.tree_flatten(compiled.outline.outputs)
+    if not _is_traced(table):
+        # By NumPy: JAX would compile a program for each of these.
+        parts = leaves_of(compiled.outline.outputs, np.asarray(table))
+        leaves = [jnp.asarray(p.astype(s.dtype)) for p, s in zip(parts, shapes, strict=True)]
+        return jtu.tree_unflatten(structure, leaves)
     if all(s.ndim == 0 for s in shapes):
         # The same as what follows, by one operation.
         parts = list(jnp.unstack(table))
