@@ -14,6 +14,9 @@ _ARM_BITS = 1 << 24
 """Of the register FPCR, both."""
 
 
+_ARM = ("aarch64", "arm64")
+
+
 def begin_flushing(text: FunctionBuilder, architecture: str) -> str | None:
     """Writes what flushes subnormals from here on; what `end_flushing` needs to know.
 
@@ -27,7 +30,7 @@ def begin_flushing(text: FunctionBuilder, architecture: str) -> str | None:
         text.store(text.assign(f"or i32 {flags}, {_X86_BITS}"), changed, Kind.I32, 1)
         _call_x86(text, "ldmxcsr", changed)
         return kept
-    if architecture in ("aarch64", "arm64"):
+    if architecture in _ARM:
         text.declarations.add("declare i64 @llvm.aarch64.get.fpcr()")
         kept = text.assign("call i64 @llvm.aarch64.get.fpcr()")
         _set_arm(text, text.assign(f"or i64 {kept}, {_ARM_BITS}"))
@@ -43,6 +46,14 @@ def end_flushing(text: FunctionBuilder, architecture: str, kept: str | None) -> 
         _call_x86(text, "ldmxcsr", kept)
     else:
         _set_arm(text, kept)
+
+
+def flush(text: FunctionBuilder, number: str, architecture: str) -> str:
+    """A number as all instructions take it: what the C library looks at are its bits."""
+    if architecture not in ("x86_64", *_ARM):
+        return number
+    text.declarations.add("declare double @llvm.canonicalize.f64(double)")
+    return text.assign(f"call double @llvm.canonicalize.f64(double {number})")
 
 
 def _call_x86(text: FunctionBuilder, name: str, pointer: str) -> None:

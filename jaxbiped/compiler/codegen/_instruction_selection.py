@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from jaxbiped.compiler.codegen._flushed_subnormals import flush
 from jaxbiped.compiler.codegen._kernel_target import KernelTarget
 from jaxbiped.compiler.codegen._llvm_function import BYTES, FunctionBuilder, vector
 from jaxbiped.compiler.ir._graph import Kind
@@ -60,7 +61,7 @@ def select_instruction(
         return text.assign(f"select {of} {operands[0]}, {chosen}")
     if op.startswith("libm "):
         name = target.library + op.removeprefix("libm ")
-        return _per_lane(text, name, operands, width)
+        return _per_lane(text, name, operands, width, target.architecture)
     if op == "ldexp":
         return (_scale if target.scales else _scale_by_halves)(
             text, operands[0], operands[1], width
@@ -123,18 +124,20 @@ def _scale_by_halves(text: FunctionBuilder, x: str, exponent: str, width: int) -
     return x
 
 
-def _per_lane(text: FunctionBuilder, name: str, operands: Sequence[str], width: int) -> str:
+def _per_lane(
+    text: FunctionBuilder, name: str, operands: Sequence[str], width: int, architecture: str
+) -> str:
     """A function of the C library, in the lanes that the last operand names."""
     *args, _ = operands
     of = vector(Kind.F64, width)
     text.declarations.add(f"declare double @{name}({', '.join(['double'] * len(args))})")
     if width == 1:
-        given = ", ".join(f"double {x}" for x in args)
+        given = ", ".join(f"double {flush(text, x, architecture)}" for x in args)
         return text.assign(f"call double @{name}({given})")
     found = args[0]
     for lane in range(width):
         ones = [text.assign(f"extractelement {of} {x}, i64 {lane}") for x in args]
-        given = ", ".join(f"double {x}" for x in ones)
+        given = ", ".join(f"double {flush(text, x, architecture)}" for x in ones)
         one = text.assign(f"call double @{name}({given})")
         found = text.assign(f"insertelement {of} {found}, double {one}, i64 {lane}")
     return found

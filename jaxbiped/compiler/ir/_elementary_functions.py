@@ -96,11 +96,6 @@ class Arithmetic:
         results = self.block.region("if", (rare, inside, (found,), (value,)), [found.kind])
         return results[0]
 
-    def flushed(self, x: Value) -> Value:
-        """Zero, of the same sign, for a subnormal number: what every operation takes it for."""
-        zero = self.from_bits(self.integer("and", self.bits(x), -(1 << 63)))
-        return self.choose(self.compare("olt", self.abs(x), TINIEST_NORMAL), zero, x)
-
     def per_lane(self, name: str, *args: Value) -> Value:
         """The C library's function of all but the last; lane by lane, where the last holds."""
         return self.block.add(f"libm {name}", *args, kind=Kind.F64)
@@ -176,7 +171,7 @@ def logarithm(m: Arithmetic, x: Value) -> Value:
     value = normal_logarithm(m, x)
     normal = m.both(m.compare("oge", x, TINIEST_NORMAL), m.compare("olt", x, math.inf))
     rare = m.block.add("not", normal)
-    return m.where_rare(rare, value, lambda inside: inside.per_lane("log", inside.flushed(x), rare))
+    return m.where_rare(rare, value, lambda inside: inside.per_lane("log", x, rare))
 
 
 HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)

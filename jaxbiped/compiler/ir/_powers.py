@@ -23,11 +23,7 @@ def power(m: Arithmetic, x: Value, y: Value) -> Value:
     normal = m.both(m.compare("oge", x, TINIEST_NORMAL), m.compare("olt", x, math.inf))
     bounded = m.compare("olt", m.abs(product), 1e4)
     rare = m.block.add("not", m.both(normal, bounded))
-
-    def by_library(inside: Arithmetic) -> Value:
-        return inside.per_lane("pow", inside.flushed(x), inside.flushed(y), rare)
-
-    return m.where_rare(rare, value, by_library)
+    return m.where_rare(rare, value, lambda inside: inside.per_lane("pow", x, y, rare))
 
 
 def power_of_root(m: Arithmetic, x: Value, y: Value) -> Value:
