@@ -85,7 +85,8 @@ class Block:
         self.values: list[Value] = []
         self._lineage: list[Block] = [self, *(() if parent is None else parent._lineage)]
         self._known: dict[tuple[Argument, ...], Value] = {}
-        self._called: dict[tuple[Any, ...], tuple[Sequence[Value], Any]] = {}
+        self._called: dict[tuple[Any, ...], Any] = {}
+        self._callers: list[Block] = []
 
     def lineage(self) -> "list[Block]":
         """This block, the one around it, and so on."""
@@ -135,17 +136,23 @@ class Block:
         home._known[key] = make(home)
         return home._known[key]
 
-    def call(self, key: tuple[Any, ...], values: Sequence[Value], lower: Callable[[], _T]) -> _T:
-        """What `lower` gives for a call of these values, called once.
+    def call(self, key: tuple[Any, ...], lower: Callable[[], _T]) -> _T:
+        """What `lower` gives for a call, called once until calls are forgotten.
 
-        `key` holds what is called and the values' ids, which live as long as the block.
+        `key` holds what is called, and the ids of values that live as long.
         """
         for block in self._lineage:
             if key in block._called:
-                return block._called[key][1]
-        found = lower()
-        self._called[key] = values, found
+                return block._called[key]
+        self._root()._callers.append(self)
+        found = self._called[key] = lower()
         return found
+
+    def forget_calls(self) -> None:
+        """In all blocks: what was called would live on with them."""
+        for block in self._root()._callers:
+            block._called.clear()
+        self._root()._callers.clear()
 
     def region(self, op: str, args: tuple[Argument, ...], kinds: list[Kind]) -> list[Value]:
         """An operation of several results, never shared with another."""

@@ -149,8 +149,7 @@ def _once(
 
     Operations are shared one by one, too, but conditionals and loops inside of a call are not.
     """
-    values = [value for array in inputs for value in array.ravel()]
-    return block.call((called, *map(id, values)), values, lower)
+    return block.call((called, *(id(v) for array in inputs for v in array.ravel())), lower)
 
 
 def _branches(block: Block, branches: Sequence[ClosedJaxpr], inputs: list[Array]) -> list[Array]:

@@ -184,7 +184,9 @@ def lower_function(
 ) -> list[Array]:
     """A function's operations added to a block: its results."""
     closed = jax.make_jaxpr(function)(*shapes)
-    return lower_jaxpr(block, closed.jaxpr, closed.consts, arrays)
+    found = lower_jaxpr(block, closed.jaxpr, closed.consts, arrays)
+    block.forget_calls()
+    return found
 
 
 def _match_kinds(block: Block, arrays: list[Array], like: list[Array]) -> list[Array]:
