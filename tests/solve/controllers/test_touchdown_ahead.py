@@ -1,5 +1,7 @@
 """Touchdown ahead: what is tried after a rejected step in which a foot comes down."""
 
+import gc
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -53,6 +55,13 @@ def test_all_others_are_as_the_error_says(height, speed, error):
     assert plain == pytest.approx(ahead, rel=1e-9)
 
 
+def _forget_programs():
+    """All, also those that jitted functions of other tests hold: they would be found again."""
+    jb.clear_caches()
+    jax.clear_caches()
+    gc.collect()
+
+
 @pytest.mark.slow
 def test_touchdowns_cost_fewer_attempts_and_no_exactness(monkeypatch):
     starts = np.array([float(leaf) for leaf in jb.seed_state()])
@@ -73,9 +82,9 @@ def test_touchdowns_cost_fewer_attempts_and_no_exactness(monkeypatch):
     with monkeypatch.context() as patched:
         patched.setattr(_walk_control, "TouchdownAhead", lambda control: control)
         patched.setenv("JAXBIPED_CACHE", "")
-        jb.clear_caches()
+        _forget_programs()
         plain_ends, plain = walked(1e-5)
-    jb.clear_caches()
+    _forget_programs()
     assert attempted < 0.985 * plain
     error, plain_error = (np.median(np.abs(e - exact).max(1)) for e in (ends, plain_ends))
     assert error < 2.0 * plain_error < 2e-4
