@@ -1,5 +1,6 @@
-"""Error control: what it makes of an error, by the formula written out, and what it divides by."""
+"""Error control: which steps are kept, and how large the next one is."""
 
+import diffrax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
@@ -9,16 +10,81 @@ import jaxbiped as jb
 from jaxbiped.compiler.passes._operation_counts import count_operations
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._error_control import ErrorControl
+from jaxbiped.solve.controllers._step_control import SAFETY, SMALLEST_STEP
 
-RTOL, ATOL = 1e-6, 1e-8
+RTOL, SPAN = 1e-6, 1e-3
 STATE = jb.seed_state()
 UNITS = units_of(jb.seed_scene(), STATE)
 ORDER = 4
 
 
-def _adapted(error, dtype=np.float64):
+def _adapted(error, *, rejected=False, span=SPAN, order=4, at=0.5, scene=None):
+    """What becomes of a step all of whose errors are so many tolerances."""
+    scene = jb.seed_scene() if scene is None else scene
+    state = jb.seed_state()
+    units = units_of(scene, state)
+    control = ErrorControl(RTOL, 1e-2 * RTOL, units)
+    errors = jb.State(
+        *(
+            error * (1e-2 * RTOL / inverse + RTOL * abs(leaf))
+            for leaf, inverse in zip(state, units.inverse, strict=True)
+        )
+    )
+    rest = (scene, errors, order, jnp.asarray(rejected))
+    return control.adapt_step_size(jnp.asarray(at), jnp.asarray(at + span), state, state, *rest)
+
+
+@pytest.mark.parametrize("order", [3, 4, 5])
+@pytest.mark.parametrize(("error", "kept"), [(0.99, True), (0.5, True), (1.01, False), (9, False)])
+def test_the_next_size_is_the_one_that_the_error_allows(order, error, kept):
+    keep, start, end, _, rejected, result = _adapted(error, order=order)
+    assert bool(keep) is kept
+    assert bool(rejected) is not kept
+    assert result == diffrax.RESULTS.successful
+    assert float(start) == pytest.approx(0.5 + SPAN if kept else 0.5)
+    assert float(end - start) == pytest.approx(SPAN * SAFETY * error ** (-1.0 / order), rel=1e-9)
+
+
+def test_sizes_change_by_limited_factors():
+    for error, factor in ((1e-12, 10.0), (0.0, 10.0), (1e9, 0.2), (np.inf, 0.2), (np.nan, 0.2)):
+        _, start, end, *_ = _adapted(error)
+        assert float(end - start) == pytest.approx(factor * SPAN, rel=1e-9)
+
+
+def test_no_step_is_larger_than_the_one_before_it_that_followed_a_rejection():
+    _, start, end, *_ = _adapted(1e-6, rejected=True)
+    assert float(end - start) == pytest.approx(SPAN, rel=1e-9)
+    _, start, end, *_ = _adapted(0.9, rejected=True)
+    assert float(end - start) < SPAN
+
+
+@pytest.mark.parametrize("error", [1e3, np.nan])
+def test_the_smallest_step_is_taken_whatever_its_error(error):
+    keep, start, end, *_ = _adapted(error, span=SMALLEST_STEP, at=0.0)
+    assert keep
+    assert float(end - start) == pytest.approx(SMALLEST_STEP)
+    keep, start, end, *_ = _adapted(error, span=0.0, at=1e9)  # no time to be told apart
+    assert keep
+    assert end > start
+
+
+def test_tolerances_are_in_units_of_the_scene():
+    large = jb.seed_scene()
+    large = large.__class__(
+        walker=jb.Walker(m=1.0, J=0.0096 * 1e4, l=40.0, d=10.0, r=8.0),
+        ground=large.ground,
+        normal=large.normal,
+        friction=large.friction,
+    )
+    keep, *_ = _adapted(0.9, scene=large)
+    assert keep
+    keep, *_ = _adapted(1.1, scene=large)
+    assert not keep
+
+
+def _after(error, dtype=np.float64):
     units = jtu.tree_map(lambda unit: jnp.asarray(unit, dtype), UNITS)
-    control = ErrorControl(RTOL, ATOL, units)
+    control = ErrorControl(RTOL, 1e-2 * RTOL, units)
     y0, y1, error = (
         jb.State(*(jnp.asarray(x, dtype) for x in each))
         for each in (STATE, [1.1 * float(x) for x in STATE], error)
@@ -34,7 +100,7 @@ def _size(error):
     """Root mean square of the error in units of the tolerance."""
     inverse = np.array([float(x) for x in UNITS.inverse])
     largest = 1.1 * np.abs([float(x) for x in STATE])
-    return np.sqrt(np.mean((np.asarray(error) / (ATOL / inverse + RTOL * largest)) ** 2))
+    return np.sqrt(np.mean((np.asarray(error) / (1e-2 * RTOL / inverse + RTOL * largest)) ** 2))
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
@@ -42,7 +108,7 @@ def _size(error):
 def test_step_size_is_that_of_the_root_mean_square(wanted, dtype):
     direction = np.random.default_rng(3).standard_normal(8) * np.logspace(-3, 2, 8)
     error = direction * wanted / _size(direction)
-    kept, end = _adapted(error, dtype)
+    kept, end = _after(error, dtype)
     assert kept == (wanted < 1.0)
     size = end - 1e-3 if kept else end
     most = 10.0 if kept else 1.0
@@ -55,12 +121,12 @@ def test_step_size_is_that_of_the_root_mean_square(wanted, dtype):
 def test_what_is_no_number_is_rejected(place, bad):
     error = np.zeros(8)
     error[place] = bad
-    assert _adapted(error) == (False, pytest.approx(0.2e-3))
+    assert _after(error) == (False, pytest.approx(0.2e-3))
 
 
 def test_four_tolerances_share_a_division():
     def step(varying, invariant):
-        control = ErrorControl(RTOL, ATOL, invariant)
+        control = ErrorControl(RTOL, 1e-2 * RTOL, invariant)
         y0, y1, error = varying
         one = jnp.ones(())
         return control.adapt_step_size(0.0 * one, one, y0, y1, None, error, ORDER, one > 2.0)[2]
