@@ -12,15 +12,13 @@ _X86_BITS = 0x8040
 """Of the register MXCSR: subnormal results are zero, and so are subnormal arguments."""
 _ARM_BITS = 1 << 24
 """Of the register FPCR, both."""
-
-
 _ARM = ("aarch64", "arm64")
 
 
 def begin_flushing(text: FunctionBuilder, architecture: str) -> str | None:
     """Writes what flushes subnormals from here on; what `end_flushing` needs to know.
 
-    None where there is nothing to be done, because the processor takes no longer over them.
+    None for other processors, which keep them.
     """
     if architecture == "x86_64":
         kept = text.room(Kind.I32, 1)

@@ -144,7 +144,8 @@ class Block:
         for block in self._lineage:
             if key in block._called:
                 return block._called[key]
-        self._root()._callers.append(self)
+        if not self._called:
+            self._root()._callers.append(self)
         found = self._called[key] = lower()
         return found
 
