@@ -11,13 +11,13 @@ from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 import equinox as eqx
 import jax
-from jax._src.core import trace_state_clean
 
 from jaxbiped import _caches
 from jaxbiped._caches import Once, register_programs
 from jaxbiped._compiled_store import CompiledCall, Skeleton, read_call, trace_call
 from jaxbiped._disk_cache import cache_folder
 from jaxbiped._fingerprint import fingerprint, settings
+from jaxbiped._jax_versions import nothing_is_traced
 from jaxbiped._long_trace import long_trace
 
 _P = ParamSpec("_P")
@@ -139,7 +139,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
 
 def _arguments_of(given: Any) -> _Arguments | None:
     """Arguments of a program that can be kept; None where something traces or watches the call."""
-    if not trace_state_clean() or _is_watched():
+    if not nothing_is_traced() or _is_watched():
         return None
     skeleton, arrays = Skeleton.of(given)
     if any(isinstance(x, jax.core.Tracer) or getattr(x, "committed", False) for x in arrays):

@@ -12,14 +12,12 @@ from typing import Any, NamedTuple
 import equinox as eqx
 import jax
 import jax.tree_util as jtu
-import numpy as np
 from jax.experimental import serialize_executable
-from jaxlib import lapack
-from jaxlib.mlir import ir
 
 from jaxbiped._disk_cache import read_entry, write_entry
 from jaxbiped._fingerprint import Leaf, leaf_of
 from jaxbiped._host_call import TARGET, HostCall, host_call, lowered_host_calls
+from jaxbiped._jax_versions import custom_call_targets, load_lapack
 from jaxbiped._long_trace import long_trace
 
 _KIND = "xla"
@@ -97,7 +95,7 @@ def trace_call(
 
     with long_trace(), lowered_host_calls() as calls:
         lowered = jax.jit(flat).lower(*arrays)
-    targets = _foreign_targets(lowered)
+    targets = custom_call_targets(lowered.compiler_ir("stablehlo"))
 
     def compile_it() -> CompiledCall:
         made = CompiledCall(lowered.compile(), results[-1], calls)
@@ -122,9 +120,7 @@ def read_call(key: str) -> CompiledCall | None:
             return None
         calls = [host_call(function) for function in functions]
         if uses_lapack:
-            # What tracing does otherwise.
-            initialize: Any = lapack.prepare_lapack_call
-            initialize("geev", np.dtype(np.float64))
+            load_lapack()
         taken = jtu.tree_structure((tuple(range(count)), {}))
         result = Skeleton(leaves, jtu.tree_structure(skeleton))
         given = jtu.tree_structure(list(range(len(result.places))))
@@ -148,20 +144,6 @@ def _write(key: str, made: CompiledCall, count: int, uses_lapack: bool) -> None:
         write_entry(
             _KIND, key, pickle.dumps((code, count, uses_lapack, leaves, skeleton, functions))
         )
-
-
-def _foreign_targets(lowered: jax.stages.Lowered) -> set[str]:
-    """Names of the functions outside of XLA that a program calls."""
-    names: set[str] = set()
-
-    def note(operation: Any) -> Any:
-        if operation.name == "stablehlo.custom_call":
-            names.add(operation.attributes["call_target_name"].value)
-        return ir.WalkResult.ADVANCE
-
-    module: Any = lowered.compiler_ir("stablehlo")
-    module.operation.walk(note)
-    return names
 
 
 @contextlib.contextmanager

@@ -184,9 +184,8 @@ def _convert(block: Block, a: Value, *, new_dtype: npt.DTypeLike, **_: object) -
 def _select(block: Block, which: Value, *cases: Value, **_: object) -> Value:
     if len(cases) != 2:
         raise NotImplementedError
-    return block.add(
-        "select", convert(block, which, Kind.BOOL), cases[1], cases[0], kind=cases[0].kind
-    )
+    chosen = convert(block, which, Kind.BOOL)
+    return block.add("select", chosen, cases[1], cases[0], kind=cases[0].kind)
 
 
 def _clamp(block: Block, low: Value, a: Value, high: Value, **_: object) -> Value:
@@ -214,6 +213,25 @@ def _logarithm(block: Block, a: Value, **_: object) -> Value:
     if a.kind is Kind.F64 and found.constant is None:
         found.logarithm_of = a
     return found
+
+
+def _binary_logarithm(block: Block, a: Value, **_: object) -> Value:
+    """A quotient, so that it is exact for powers of two."""
+    return block.add("fdiv", _logarithm(block, a), block.const(math.log(2.0), a.kind))
+
+
+def _polynomial(block: Block, x: Value, *coefficients: Value, **_: object) -> Value:
+    """Of a variable by its coefficients, the constant one first."""
+    total = coefficients[-1]
+    for coefficient in coefficients[-2::-1]:
+        total = ELEMENTWISE["add"](block, ELEMENTWISE["mul"](block, total, x), coefficient)
+    return total
+
+
+def _one_minus_square(block: Block, a: Value, **_: object) -> Value:
+    """1 − a² as (1 − a)(1 + a), which keeps its digits where a is close to 1."""
+    one = block.const(1.0, a.kind)
+    return block.add("fmul", block.add("fsub", one, a), block.add("fadd", one, a))
 
 
 def _exponential(block: Block, a: Value, **_: object) -> Value:
@@ -246,6 +264,9 @@ ELEMENTWISE: dict[str, Rule] = {
     "ceil": _direct("ceil"),
     "exp": _exponential,
     "log": _logarithm,
+    "log2": _binary_logarithm,
+    "one_minus_square": _one_minus_square,
+    "polynomial": _polynomial,
     "sin": _elementary(elementary.sine),
     "cos": _elementary(elementary.cosine),
     "tanh": _elementary(elementary.hyperbolic_tangent),

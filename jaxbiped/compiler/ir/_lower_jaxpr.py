@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal, Var
 
+from jaxbiped._checks import ArgumentError
+from jaxbiped._jax_versions import called_program, scan_counts
 from jaxbiped._types import Numbers
 from jaxbiped.compiler.ir._array_primitives import MOVES, REDUCTIONS, product, reduce
 from jaxbiped.compiler.ir._elementwise_primitives import (
@@ -22,25 +24,14 @@ from jaxbiped.compiler.ir._elementwise_primitives import (
 )
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 
-_INLINED = {
-    "jit": "jaxpr",
-    "pjit": "jaxpr",
-    "closed_call": "call_jaxpr",
-    "core_call": "call_jaxpr",
-    "remat2": "jaxpr",
-    "checkpoint": "jaxpr",
-    "custom_jvp_call": "call_jaxpr",
-    "custom_vjp_call": "call_jaxpr",
-    "custom_vjp_call_jaxpr": "fun_jaxpr",
-}
 _LONGEST_UNROLLED, _LARGEST_UNROLLED = 4, 2000
 """Loops over arrays of up to this length are written out, and up to so many equations in all."""
 
 Atom: TypeAlias = Var | Literal
 
 
-class UnknownPrimitiveError(NotImplementedError):
-    """A JAX operation that the lane engine cannot express."""
+class UnknownPrimitiveError(ArgumentError, NotImplementedError):
+    """A JAX operation that the lane engine cannot express; the message names an engine that can."""
 
 
 def lower_jaxpr(
@@ -95,18 +86,9 @@ def _constant(block: Block, value: npt.ArrayLike) -> Array:
     return array_of([block.const(x, kind) for x in numbers.ravel()], numbers.shape)
 
 
-def inner_jaxpr(equation: JaxprEqn) -> tuple[Jaxpr, Sequence[Numbers]] | None:
-    """The jaxpr and the constants of what an equation only calls; None for any other."""
-    name = _INLINED.get(equation.primitive.name)
-    if name is None:
-        return None
-    inner = equation.params[name]
-    return (inner.jaxpr, inner.consts) if hasattr(inner, "jaxpr") else (inner, [])
-
-
 def _apply(block: Block, equation: JaxprEqn, inputs: list[Array]) -> list[Array]:
     name, params = equation.primitive.name, equation.params
-    inner = inner_jaxpr(equation)
+    inner = called_program(equation)
     if inner is not None:
         called, consts = inner
         if consts:
@@ -202,7 +184,7 @@ def _reshape(values: Sequence[Value], like: list[Array]) -> list[Array]:
 
 def _scan(block: Block, params: dict[str, Any], inputs: list[Array]) -> list[Array]:
     jaxpr, length = params["jaxpr"], params["length"]
-    constants, carried = params["num_consts"], params["num_carry"]
+    constants, carried = scan_counts(params)
     fixed, carry = inputs[:constants], inputs[constants : constants + carried]
     items = inputs[constants + carried :]
     body = jaxpr.jaxpr
@@ -230,7 +212,7 @@ def _scan(block: Block, params: dict[str, Any], inputs: list[Array]) -> list[Arr
 
 def _size(jaxpr: Jaxpr) -> int:
     """How many equations a jaxpr has, with those inside of calls."""
-    inner = [inner_jaxpr(equation) for equation in jaxpr.eqns]
+    inner = [called_program(equation) for equation in jaxpr.eqns]
     return sum(1 if each is None else _size(each[0]) for each in inner)
 
 

@@ -15,8 +15,8 @@ import jax.numpy as jnp
 from jax.extend.core import Jaxpr, Literal, Var
 from jaxtyping import PyTree
 
+from jaxbiped._jax_versions import called_program
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.compiler.ir._lower_jaxpr import inner_jaxpr
 
 Weight: TypeAlias = float | Scalar
 """Of an edge: a traced scalar, or a plain number."""
@@ -158,7 +158,7 @@ def _linear(
 
     for equation in jaxpr.eqns:
         given: list[Any] = [read(atom) for atom in equation.invars]
-        inner = inner_jaxpr(equation)
+        inner = called_program(equation)
         if all(isinstance(g, _Known) for g in given):
             found = equation.primitive.bind(*[g.value for g in given], **equation.params)
             found = found if equation.primitive.multiple_results else [found]

@@ -3,9 +3,11 @@
 Entries that are zero by structure are left out of the elimination.
 """
 
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
-from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal, Var
+from jax.extend.core import ClosedJaxpr, Jaxpr, Literal, Var
+
+from jaxbiped._jax_versions import called_program
 
 
 class Structure(NamedTuple):
@@ -42,29 +44,16 @@ def _propagate(
 
     for equation in jaxpr.eqns:
         arguments = [read(atom) for atom in equation.invars]
-        inner = _inner_program(equation)
-        if inner is None:
+        called = called_program(equation)
+        if called is None:
             union: frozenset[int] = frozenset().union(*(used for used, _ in arguments))
             results = [union] * len(equation.outvars)
             results_copied: list[int | None] = [None] * len(equation.outvars)
         else:
             results, results_copied = _propagate(
-                inner, [used for used, _ in arguments], [source for _, source in arguments]
+                called[0], [used for used, _ in arguments], [source for _, source in arguments]
             )
         for variable, used, source in zip(equation.outvars, results, results_copied, strict=True):
             depends[variable], copied[variable] = used, source
     outputs = [read(atom) for atom in jaxpr.outvars]
     return [used for used, _ in outputs], [source for _, source in outputs]
-
-
-def _inner_program(equation: JaxprEqn) -> Jaxpr | None:
-    """The program that a call runs on exactly its own arguments, where it is one."""
-    inner = equation.params.get("jaxpr", equation.params.get("call_jaxpr"))
-    jaxpr = cast(Jaxpr, getattr(inner, "jaxpr", inner))
-    plain_call = isinstance(jaxpr, Jaxpr) and equation.primitive.name in _CALLS
-    if plain_call and len(jaxpr.invars) == len(equation.invars):
-        return jaxpr
-    return None
-
-
-_CALLS = {"jit", "pjit", "closed_call", "core_call", "custom_jvp_call", "remat2", "checkpoint"}

@@ -1,0 +1,74 @@
+"""What differs between versions of JAX, and all that is used of its private names.
+
+0.10 is the oldest version that is kept. Since 0.11 a scan gives trees of its operands instead of
+two counts. Since 0.12 `ClosedJaxpr` and `Jaxpr` are one class, and `eval_jaxpr` takes the place of
+`call` and `closed_call`.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jax._src.core import trace_state_clean
+from jax.extend.core import Jaxpr, JaxprEqn
+from jaxlib import lapack
+from jaxlib.mlir import ir
+
+from jaxbiped._types import Numbers
+
+_CALLED = {
+    "call": "call_jaxpr",
+    "checkpoint": "jaxpr",
+    "closed_call": "call_jaxpr",
+    "core_call": "call_jaxpr",
+    "custom_jvp_call": "call_jaxpr",
+    "custom_vjp_call": "call_jaxpr",
+    "custom_vjp_call_jaxpr": "fun_jaxpr",
+    "eval_jaxpr": "call_jaxpr",
+    "jit": "jaxpr",
+    "pjit": "jaxpr",
+    "remat2": "jaxpr",
+    "xla_metadata_call": "jaxpr",
+}
+"""Primitives that only call a program, and the parameter that holds it."""
+
+
+def called_program(equation: JaxprEqn) -> tuple[Jaxpr, Sequence[Numbers]] | None:
+    """The program that an equation calls, with its constants; None where it does anything else."""
+    name = _CALLED.get(equation.primitive.name)
+    if name is None:
+        return None
+    called = equation.params[name]
+    return getattr(called, "jaxpr", called), getattr(called, "consts", ())
+
+
+def scan_counts(params: dict[str, Any]) -> tuple[int, int]:
+    """How many operands of a scan are constants, and how many are carried."""
+    if "ft_in" in params:
+        constants, carried, _ = (len(part) for part in params["ft_in"].unpack())
+        return constants, carried
+    return params["num_consts"], params["num_carry"]
+
+
+def nothing_is_traced() -> bool:
+    """Whether the caller is under no transformation of JAX."""
+    return bool(trace_state_clean())
+
+
+def load_lapack() -> None:
+    """Registers XLA's calls of LAPACK, which tracing one of them does otherwise."""
+    prepare: Any = lapack.prepare_lapack_call
+    prepare("geev", np.dtype(np.float64))
+
+
+def custom_call_targets(module: Any) -> set[str]:
+    """Names of the functions outside of XLA that a module of StableHLO calls."""
+    names: set[str] = set()
+
+    def note(operation: Any) -> Any:
+        if operation.name == "stablehlo.custom_call":
+            names.add(operation.attributes["call_target_name"].value)
+        return ir.WalkResult.ADVANCE
+
+    module.operation.walk(note)
+    return names
