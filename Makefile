@@ -1,5 +1,5 @@
-# `make gait` runs the main job, `make walk` simulates the walker, `make test` runs all checks,
-# `make check` those that take minutes, `make docs` builds the documentation site.
+# `make gait` runs the main job, `make walk` simulates the walker, `make test` runs all checks but
+# what is left to `make nightly`, `make check` the quick ones, `make docs` builds the documentation site.
 # Each sets up what it needs in .venv inside this checkout; repeated runs do not set up again.
 PYTHON ?= python3
 VENV := .venv
@@ -13,7 +13,10 @@ PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 EXPERIMENTS := $(filter-out _% quote,$(patsubst experiments/%.py,%,$(wildcard experiments/*.py)))
 ONLY ?= $(EXPERIMENTS)
 
-.PHONY: walk gait check test lint types docs dist notebooks figures clean
+# Which of the nightly tests `make nightly` runs: of N parts the one whose number is I modulo N.
+SHARE := 0/1
+
+.PHONY: walk gait check test nightly lint types docs dist notebooks figures clean
 
 walk: $(VENV)/.installed
 	$(BIN)/jaxbiped walk --out $(OUT)
@@ -24,10 +27,14 @@ gait: $(VENV)/.installed
 
 # Lint, types and the unit tests; docs/testing.md says which tests these are.
 check: lint types
-	$(PYTEST) -m "not slow"
+	$(PYTEST) -m "not slow and not nightly"
 
 test: lint types
-	$(PYTEST)
+	$(PYTEST) -m "not nightly"
+
+# Experiments, notebooks, the site: all of them, or by `make nightly SHARE=3/6` a part.
+nightly: $(VENV)/.installed-dev
+	$(PYTEST) --nightly-share=$(SHARE)
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -12,6 +12,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._disk_cache import CACHE_VARIABLE
+from tests.nightly import Share
 from tests.reference import reference_states
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 
@@ -43,10 +44,24 @@ def _few_programs_are_kept():
         gc.collect()
 
 
+UNFUSED = "--xla_disable_hlo_passes=fusion"
+"""XLA compiles in half the time where each operation stays a kernel of its own."""
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--nightly-share",
+        metavar="I/N",
+        help="of the nightly tests alone, the I-th modulo N of N parts; compiled as for users",
+    )
+
+
 def pytest_configure(config):
     """One cache on disk for all workers: what one compiled others load. In CI it is new."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         return
+    if config.option.nightly_share is None:
+        os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {UNFUSED}".strip()
     if os.environ.get("CI"):
         folder = tempfile.mkdtemp(prefix="jaxbiped-tests-")
         config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
@@ -67,10 +82,13 @@ def pytest_collection_finish():
     gc.freeze()
 
 
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
     """Files with slow tests begin first, so that no worker is left alone with one at the end."""
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
+    if config.option.nightly_share is not None:
+        items[:], rest = Share.parse(config.option.nightly_share).split(items)
+        config.hook.pytest_deselected(items=rest)
 
 
 LONGEST_UNIT = 10.0
@@ -79,7 +97,7 @@ LONGEST_UNIT = 10.0
 
 def pytest_terminal_summary(terminalreporter, config):
     """Names tests that `make check` waits for too long, so that they can be marked."""
-    if config.option.markexpr != "not slow":
+    if "not slow" not in config.option.markexpr:
         return
     seconds: dict[str, float] = {}
     for report in terminalreporter.getreports("passed") + terminalreporter.getreports(""):

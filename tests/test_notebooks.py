@@ -13,7 +13,7 @@ LARGEST = 1_000_000
 """Bytes of a notebook, so that the repository stays light and pages load."""
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook_runs(path, monkeypatch):
     monkeypatch.setenv("JAXBIPED_NOTEBOOK_SIZE", "small")

@@ -122,7 +122,7 @@ def survive(count, cache, chance, *, at_once=AT_ONCE, life=LIFE, commands=COMMAN
     return Survival(answered, killed, most, sum(spoilt))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_commands_that_are_killed_and_fed_garbage_answer_right(tmp_path):
     found = survive(8, tmp_path, random.Random(3))
     assert found.answered > 0

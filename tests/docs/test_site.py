@@ -14,7 +14,7 @@ from sphinx.util.inventory import InventoryFile
 from tests.browser import chromium
 
 ROOT = Path(__file__).parents[2]
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 from tests.drawn import assert_is_drawn
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_the_simplest_walkers_basin_is_thin_and_as_the_equations_say(tmp_path):

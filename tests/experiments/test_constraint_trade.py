@@ -6,7 +6,7 @@ import pytest
 from tests.drawn import assert_is_drawn, labels_of, points_of
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_errors_costs_and_maps(tmp_path):

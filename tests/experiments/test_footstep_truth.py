@@ -26,7 +26,7 @@ def test_radau_is_of_its_order():
     assert abs(last @ nodes**3) > 1e-2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_footstep_is_scipys():
     found = footstep()
     with np.errstate(over="ignore"):
@@ -37,7 +37,7 @@ def test_the_footstep_is_scipys():
     assert [name for name, _ in found.switches].count("depth 1") == 1
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_derivatives_are_differences_of_footsteps():
     found, h = footstep(), 1e-4
     for k in (0, 1, 2, 3):
@@ -50,7 +50,7 @@ def test_derivatives_are_differences_of_footsteps():
     assert slope == pytest.approx(found.gradient[:, 1], rel=1e-4, abs=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_ours_agree_and_say_how_far(tmp_path):
     numbers, figures = quick_run("footstep_truth", tmp_path)
     assert_is_drawn(figures["footstep_truth.png"])

@@ -5,7 +5,7 @@ import pytest
 from tests.drawn import assert_is_drawn, labels_of
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_laws_are_measured_and_judged(tmp_path):

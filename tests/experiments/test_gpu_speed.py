@@ -6,7 +6,7 @@ from tests.compiler.fake_driver import install
 from tests.drawn import assert_is_drawn
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_without_a_device_it_says_so(tmp_path, monkeypatch):

@@ -6,7 +6,7 @@ import pytest
 from tests.drawn import assert_is_drawn, points_of
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_both_precautions_make_derivatives_follow_their_tolerance(tmp_path):

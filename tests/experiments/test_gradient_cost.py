@@ -4,7 +4,7 @@ import pytest
 
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_costs_over_the_number_of_parameters(tmp_path):

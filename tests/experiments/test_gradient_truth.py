@@ -73,7 +73,7 @@ def test_derivatives_are_scipys_differences():
         assert slopes == pytest.approx(truth, rel=1e-4), name
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_only_our_gradients_are_right_and_know_it(tmp_path):
     numbers, figures = quick_run("gradient_truth", tmp_path)
     assert_is_drawn(figures["gradient_truth.png"])

@@ -5,7 +5,7 @@ import pytest
 from tests.drawn import assert_is_drawn
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_few_labels_change_and_those_in_doubt_are_told(tmp_path):

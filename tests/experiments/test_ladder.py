@@ -6,7 +6,7 @@ import pytest
 from tests.drawn import assert_is_drawn, points_of
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_rungs_and_the_way_to_the_rigid_limit(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 from tests.drawn import assert_is_drawn
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_the_worst_member_costs_speed_and_the_front_is_a_trade(tmp_path):

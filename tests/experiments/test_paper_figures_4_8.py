@@ -6,7 +6,7 @@ from PIL import Image
 from tests.drawn import assert_is_drawn, points_of
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 FIGURES = {
     "fig4_strobe",

@@ -5,7 +5,7 @@ import pytest
 from tests.drawn import assert_is_drawn
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_two_workers_find_the_labels_of_one(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 from tests.drawn import assert_is_drawn
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_lanes_give_the_same_bits_and_xla_what_an_ulp_does(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 from tests.drawn import assert_is_drawn, points_of
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_no_gait_that_walks_settle_on_is_missed(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 from tests.drawn import assert_is_drawn, labels_of
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_every_gait_is_found_with_its_elasticities(tmp_path):

@@ -6,7 +6,7 @@ import pytest
 from tests.drawn import assert_is_drawn, points_of
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_agrees_with_an_independent_solve(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 from tests.drawn import assert_is_drawn, labels_of
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_the_default_has_the_smaller_error_in_about_as_many_steps(tmp_path):

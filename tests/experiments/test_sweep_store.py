@@ -4,7 +4,7 @@ import pytest
 
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_a_killed_sweep_is_resumed_to_the_same_labels(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 from tests.drawn import assert_is_drawn, points_of
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 def test_peers_see_the_same_starts_walk(tmp_path):

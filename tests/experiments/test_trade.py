@@ -7,7 +7,7 @@ import pytest
 from tests.drawn import assert_is_drawn
 from tests.experiments.quick import quick_run
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 
 
 @pytest.fixture(scope="module")
