@@ -127,7 +127,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         if cache_folder() is None:
             return None
         skeleton = arguments.skeleton
-        return fingerprint(self._function, skeleton.filled(skeleton.places))
+        return fingerprint(cached_jit, self._function, skeleton.filled(skeleton.places))
 
     def _make_room(self) -> None:
         if self._count() >= _caches.PROGRAMS:

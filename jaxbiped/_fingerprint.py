@@ -1,13 +1,15 @@
 """Fingerprint: what decides the meaning of functions and settings, the same in every process.
 
 By it a program on disk is found again. It holds for what the package and the libraries below it
-define; functions and classes of a notebook could change without a sign, so they have none.
+define; functions and classes of a notebook could change without a sign, so they have none. Of the
+package's own source it counts what the functions and classes in question can reach.
 """
 
 import dataclasses
 import enum
 import functools
 import hashlib
+import inspect
 import os
 import sys
 import types
@@ -20,11 +22,13 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._caches import bounded_cache
+from jaxbiped._clock import IMPORT_BEGAN_AT
+from jaxbiped._source_digest import SourceDigests
 
 _PACKAGE = "jaxbiped"
 _LIBRARIES = (
     "builtins", "collections", "diffrax", "equinox", "functools", "jax", "jaxlib", "jaxtyping",
-    "lineax", "llvmlite", "math", "numpy", "operator", "optax", "optimistix",
+    "lineax", "llvmlite", "math", "numpy", "operator", "optax", "optimistix", "types",
 )  # fmt: skip
 _SETTINGS = (
     "jax_default_matmul_precision",
@@ -34,6 +38,7 @@ _SETTINGS = (
     "jax_numpy_rank_promotion",
     "jax_threefry_partitionable",
 )
+_PLAIN = (bool, int, float, complex, str, bytes, slice)
 _MOST_NESTED = 200
 
 
@@ -58,6 +63,7 @@ def fingerprint(*things: object) -> str | None:
     """The fingerprint of these in this version of all that they use; None where there is none."""
     digest = hashlib.sha256(_versions().encode())
     try:
+        digest.update(_source_of(__name__).encode())
         for part in _parts(things, 0):
             digest.update(part)
             digest.update(b"\0")
@@ -74,7 +80,7 @@ def _parts(thing: Any, depth: int) -> Iterator[bytes]:
     own = getattr(thing, "__fingerprint__", None)
     if own is not None and not isinstance(thing, type):
         yield from _parts(own(), depth + 1)
-    elif thing is None or isinstance(thing, bool | int | float | complex | str | bytes | slice):
+    elif thing is None or thing is ... or isinstance(thing, _PLAIN):
         yield repr(thing).encode()
     elif isinstance(thing, enum.Enum):
         yield thing.name.encode()
@@ -108,6 +114,8 @@ def _members(thing: Any) -> Iterator[object]:
         yield from sorted(thing, key=repr)
     elif isinstance(thing, types.FunctionType):
         yield from _function_members(thing)
+    elif isinstance(thing, types.CodeType):
+        yield from _code_members(thing)
     elif isinstance(thing, types.MethodType):
         yield from (thing.__func__, thing.__self__)
     elif isinstance(thing, types.BuiltinFunctionType | np.ufunc):
@@ -131,8 +139,9 @@ def _members(thing: Any) -> Iterator[object]:
 def _function_members(function: types.FunctionType) -> Iterator[object]:
     """Of a function: where it is defined, and what it was defined with."""
     yield _name(function)
-    yield function.__code__.co_firstlineno
-    yield function.__code__.co_code
+    # A wrapper bears the name of what it wraps.
+    yield _source_of(function.__globals__.get("__name__"))
+    yield function.__code__
     yield function.__defaults__
     yield function.__kwdefaults__
     for cell in function.__closure__ or ():
@@ -140,6 +149,16 @@ def _function_members(function: types.FunctionType) -> Iterator[object]:
             yield cell.cell_contents
         except ValueError as empty:
             raise UnknownMeaningError("a name that is not defined yet") from empty
+
+
+def _code_members(code: types.CodeType) -> Iterator[object]:
+    """Of a function's code, where others of its name lie in its module: no lines and no words."""
+    yield code.co_code
+    yield (code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
+    flag = getattr(inspect, "CO_HAS_DOCSTRING", None)  # since Python 3.14
+    documented = code.co_flags & flag if flag else not code.co_name.startswith("<")
+    first = isinstance(next(iter(code.co_consts), None), str) and documented
+    yield code.co_consts[1 if first else 0 :]
 
 
 def _attributes(thing: object) -> dict[str, object]:
@@ -168,21 +187,26 @@ def _class_name(kind: type) -> str:
 def _name(thing: Any) -> str:
     """The name of a class or function of the package or a library that it uses."""
     module = getattr(thing, "__module__", None) or getattr(type(thing), "__module__", "")
+    name = getattr(thing, "__qualname__", getattr(thing, "__name__", ""))
+    return f"{module}.{name} {_source_of(module)}"
+
+
+def _source_of(module: Any) -> str:
+    """A digest of all code that a module of the package can reach; a library has its version."""
     root = str(module).split(".")[0]
-    if root not in (_PACKAGE, *_LIBRARIES) and root != "types":
-        raise UnknownMeaningError(f"{thing!r} of {module}")
-    return f"{module}.{getattr(thing, '__qualname__', getattr(thing, '__name__', ''))}"
+    if root in _LIBRARIES:
+        return ""
+    if root != _PACKAGE:
+        raise UnknownMeaningError(f"code of {module}")
+    try:
+        return _sources().digest(module)
+    except LookupError as unknown:
+        raise UnknownMeaningError(str(unknown)) from unknown
 
 
 @bounded_cache(1)
-def _source_digest() -> str:
-    """Of all the package's modules."""
-    digest = hashlib.sha256()
-    folder = Path(__file__).parent
-    for path in sorted(folder.rglob("*.py")):
-        digest.update(str(path.relative_to(folder)).encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
+def _sources() -> SourceDigests:
+    return SourceDigests(Path(__file__).parent, loaded=IMPORT_BEGAN_AT)
 
 
 def settings() -> tuple[object, ...]:
@@ -205,7 +229,7 @@ def _libraries() -> str:
     names = ("diffrax", "equinox", "jax", "jaxlib", "lineax", "llvmlite", "numpy", "optax",
              "optimistix")  # fmt: skip
     cpu = f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
-    return "\n".join([sys.version, cpu, _source_digest(), *(f"{n} {version(n)}" for n in names)])
+    return "\n".join([sys.version, cpu, *(f"{n} {version(n)}" for n in names)])
 
 
 def as_leaves(tree: Any) -> Any:

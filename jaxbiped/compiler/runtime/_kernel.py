@@ -62,7 +62,7 @@ class Kernel:
     def of_program(program: Program, inputs: PyTree) -> "Kernel":
         """Of a program; `inputs` are one simulation's, or their shapes."""
         shapes = jtu.tree_map(lambda x: jax.ShapeDtypeStruct(x.shape, x.dtype), inputs)
-        digest = fingerprint(program, as_leaves(shapes))
+        digest = fingerprint(Kernel, program, as_leaves(shapes))
         # The outline and the graph need these: compiled by themselves, they are traced once.
         once = dataclasses.replace(
             program,
