@@ -174,7 +174,13 @@ def _is_wrapper(thing: object) -> bool:
 
 
 def _class_name(kind: type) -> str:
-    """The name of a class; one made in a call has none, for another call may make another."""
+    """The name of a class; one made in a call is known by a function and arguments that make it.
+
+    Where it has no `__made_by__` that tells them, another call may make another of its name.
+    """
+    made_by = vars(kind).get("__made_by__")
+    if made_by is not None:
+        return hashlib.sha256(b"\0".join(_parts(made_by, 0))).hexdigest()
     name = _name(kind)
     found: Any = sys.modules.get(kind.__module__)
     for part in kind.__qualname__.split("."):

@@ -25,6 +25,7 @@ KNOWN = {
         functools.partial(jb.simulate, footsteps=3),
         ending_events(WATCHES),
     ),
+    "made in a call": (as_leaves(augment(augment(jb.seed_state(), ("a",)), ("b",))),),
     "wrapped": (jax.jit(jb.footsteps), jb.MidStance().value),
     "numbers": (1, 1.0, True, "1", b"1", None, np.arange(3), jnp.ones(2), jnp.float64),
 }
@@ -76,12 +77,19 @@ def test_what_could_change_unseen_has_none(thing):
     assert fingerprint(thing) is None
 
 
-def test_classes_made_in_a_call_have_none():
-    """Two of one name may have other fields."""
-    states = [augment(jb.seed_state(), names) for names in (("a",), ("b",))]
-    assert type(states[0]) is not type(states[1])
-    assert [fingerprint(type(each)) for each in states] == [None, None]
-    assert [fingerprint(as_leaves(each)) for each in states] == [None, None]
+def test_classes_made_in_a_call_are_known_by_what_makes_them():
+    """Two of one name may have other fields; one that does not tell has no fingerprint."""
+    states = [augment(jb.seed_state(), names) for names in (("a",), ("b",), ("a", "b"))]
+    states.append(augment(states[0], ("b",)))
+    assert len({type(each) for each in states}) == len(states)
+    for found in (
+        [fingerprint(type(each)) for each in states],
+        [fingerprint(as_leaves(each)) for each in states],
+    ):
+        assert None not in found
+        assert len(set(found)) == len(found)
+    untold = type("_Augmented", (), {"__module__": augment.__module__})
+    assert fingerprint(untold) is fingerprint(untold()) is None
 
 
 def test_what_is_within_itself_has_none():

@@ -15,16 +15,27 @@ from jaxbiped.dynamics._section import AbstractSection
 
 _KINDS: dict[tuple[type, tuple[str, ...]], Any] = {}
 """Of each walker's state the augmented ones: always the same types, or all would compile again."""
-_WALKERS: dict[type, Any] = {}
-"""The walker's own kind of state, by the augmented one."""
 
 
 def _augmented(walker: Any, names: tuple[str, ...]) -> Any:
-    place, *recurring = walker._fields
-    made = namedtuple("_Augmented", (place, *names, *recurring))  # type: ignore[misc]
-    kind = _KINDS.setdefault((walker, names), made)
-    _WALKERS[kind] = walker
-    return kind
+    if (walker, names) not in _KINDS:
+        place, *recurring = walker._fields
+        fields: Any = namedtuple("_Augmented", (place, *names, *recurring))  # type: ignore[misc]
+        # By this other processes know it, see `jaxbiped._fingerprint`.
+        made_by = (_augmented, walker, names)
+        own = {"__slots__": (), "__made_by__": made_by, "__reduce__": _taken_apart}
+        _KINDS.setdefault((walker, names), type("_Augmented", (fields,), own))
+    return _KINDS[walker, names]
+
+
+def _taken_apart(y: Any) -> tuple[Any, ...]:
+    """An augmented state as `pickle` keeps it."""
+    _, _, names = type(y).__made_by__
+    return _put_together, (motion_of(y), {name: getattr(y, name) for name in names})
+
+
+def _put_together(motion: Any, coordinates: dict[str, Any]) -> Any:
+    return _augmented(type(motion), tuple(coordinates))(**coordinates, **motion._asdict())
 
 
 def augment(state: WalkerState, names: tuple[str, ...]) -> PyTree:
@@ -35,7 +46,7 @@ def augment(state: WalkerState, names: tuple[str, ...]) -> PyTree:
 
 def motion_of(y: PyTree) -> Any:
     """The walker's own state."""
-    walker = _WALKERS[type(y)]
+    _, walker, _ = type(y).__made_by__
     return walker(*(getattr(y, name) for name in walker._fields))
 
 
