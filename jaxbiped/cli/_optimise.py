@@ -55,6 +55,7 @@ def run(options: Optimise) -> int:
         fatal_push=options.fatal_push,
         bifurcations_along=along,
         other_engine=options.other_engine,
+        progress=sys.stderr.isatty(),
     )
     goal = options.minimise if options.maximise is None else options.maximise
     sense = "minimise" if options.maximise is None else "maximise"

@@ -1,9 +1,11 @@
 """Certificate of an optimum: what speaks for it besides the optimiser's word."""
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+from tqdm import tqdm
 
 from jaxbiped._checks import check_choice, check_not_negative, check_positive, check_type
 from jaxbiped.basins._fractions import Fraction, wilson_interval
@@ -105,6 +107,7 @@ def certify(
     other_engine: bool = False,
     bifurcations_along: Sequence[str] = ("slope",),
     seed: int = 0,
+    progress: bool = False,
 ) -> Certificate:
     """Tests an optimum by what its search did not use.
 
@@ -122,6 +125,7 @@ def certify(
             bifurcation, from an eighth to eight times the value (from level ground by 0.1 rad to
             both sides); each compiles a program.
         seed: of the starts.
+        progress: whether to show on stderr which part it is at.
 
     Returns:
         The certificate.
@@ -139,11 +143,33 @@ def certify(
         check_choice("bifurcations_along", name, parameter_names(scene))
     sizes, errors = np.abs(np.asarray(gait.multipliers)), np.asarray(gait.multiplier_errors)
     undecided = bool(np.any(np.abs(sizes - 1.0) <= errors))
-    norm = jacobian_functionals(
-        scene, gait.measures.state, ("sensitivity_norm",), engine=gait.engine
-    )
-    knows = labelling(scene, guess=gait.measures.state) if starts or fatal_push else None
-    known = knows if knows is not None and knows.family.rows[0] else None
+    labels = bool(starts or fatal_push)
+    wanted = (True, labels, starts, fatal_push, footsteps, other_engine, *bifurcations_along)
+    knows = basin = push_found = walk = other = None
+    with tqdm(total=sum(map(bool, wanted)), unit="parts", disable=not progress) as bar:
+        with _part(bar, "gait sensitivity norm"):
+            norm = jacobian_functionals(
+                scene, gait.measures.state, ("sensitivity_norm",), engine=gait.engine
+            )
+        if labels:
+            with _part(bar, "gaits that starts may come to"):
+                knows = _labelling(scene, gait)
+        if knows is not None and starts:
+            with _part(bar, f"basin of {starts} starts"):
+                basin = _basin(knows, gait, int(starts), scatter, seed)
+        if knows is not None and fatal_push:
+            with _part(bar, "smallest fatal push"):
+                push_found = _fatal_push(knows)
+        if footsteps:
+            with _part(bar, f"walk of {footsteps} footsteps"):
+                walk = _walk(scene, gait, int(footsteps), push)
+        if other_engine:
+            with _part(bar, "gait by the other engine"):
+                other = _by_other(scene, gait)
+        nearest = []
+        for name in bifurcations_along:
+            with _part(bar, f"nearest bifurcation along {name}"):
+                nearest.append(nearest_bifurcation(scene, gait, name))
     return Certificate(
         optimality=optimum.optimality,
         multipliers=np.asarray(gait.multipliers),
@@ -151,14 +177,26 @@ def certify(
         unit_multiplier_error=float(gait.unit_multiplier_error),
         stable=None if undecided else bool(np.all(sizes < 1.0)),
         sensitivity_norm=(float(norm.values[0]), float(norm.errors[0])),
-        basin=_basin(known, gait, int(starts), scatter, seed) if known and starts else None,
-        fatal_push=_fatal_push(known) if known and fatal_push else None,
-        walk=_walk(scene, gait, int(footsteps), push) if footsteps else None,
-        other_engine=_by_other(scene, gait) if other_engine else None,
-        nearest_bifurcations=tuple(
-            nearest_bifurcation(scene, gait, name) for name in bifurcations_along
-        ),
+        basin=basin,
+        fatal_push=push_found,
+        walk=walk,
+        other_engine=other,
+        nearest_bifurcations=tuple(nearest),
     )
+
+
+@contextlib.contextmanager
+def _part(bar: tqdm, name: str) -> Iterator[None]:
+    """A part of the certificate, which the bar names while it lasts."""
+    bar.set_description_str(f"certificate, {name}")
+    yield
+    bar.update()
+
+
+def _labelling(scene: Scene | RigidScene, gait: Gait) -> Labelling | None:
+    """What labels starts by the gait; None where a search from its state does not find it."""
+    knows = labelling(scene, guess=gait.measures.state)
+    return knows if knows.family.rows[0] else None
 
 
 def _basin(knows: Labelling, gait: Gait, count: int, scatter: float, seed: int) -> Fraction:

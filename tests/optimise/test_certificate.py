@@ -16,8 +16,15 @@ def best():
     )
 
 
-def test_a_stable_gait_is_certified(best):
-    found = jb.optimise.certify(best, starts=256, footsteps=50, bifurcations_along=())
+def test_a_stable_gait_is_certified(best, capsys):
+    found = jb.optimise.certify(
+        best, starts=256, footsteps=50, bifurcations_along=(), progress=True
+    )
+    told = capsys.readouterr().err
+    parts = ("gait sensitivity norm", "gaits that", "basin of 256 starts", "walk of 50 footsteps")
+    places = [told.find(f"certificate, {part}") for part in parts]
+    assert -1 < places[0] < places[1] < places[2] < places[3]
+    assert "4/4" in told
     own = jb.find_gait(RIGID, parameters=(), radius_sensitivities=False)
     assert found.stable is True
     assert np.abs(found.multipliers[0]) == pytest.approx(best.objective, rel=1e-4)
