@@ -16,7 +16,7 @@ ONLY ?= $(EXPERIMENTS)
 # Which of the nightly tests `make nightly` runs: of N parts the one whose number is I modulo N.
 SHARE := 0/1
 
-.PHONY: walk gait check test nightly lint types docs dist notebooks figures clean
+.PHONY: walk gait check test nightly mutants lint types docs dist notebooks figures clean
 
 walk: $(VENV)/.installed
 	$(BIN)/jaxbiped walk --out $(OUT)
@@ -35,6 +35,12 @@ test: lint types
 # Experiments, notebooks, the site: all of them, or by `make nightly SHARE=3/6` a part.
 nightly: $(VENV)/.installed-dev
 	$(PYTEST) --nightly-share=$(SHARE)
+
+# Breaks the package in one place at a time: the quick tests must fail each time (docs/testing.md).
+# All of them, or those whose names begin like `make mutants ONLY="saltation bars-divided"`.
+mutants: ONLY :=
+mutants: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.mutants --jobs 2 $(ONLY)
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
