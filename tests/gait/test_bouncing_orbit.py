@@ -1,0 +1,127 @@
+"""Orbit of a bouncing mass, whose multiplier, measures and derivatives have closed forms."""
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._switches import Switch
+from jaxbiped.gait._fixed_point_search import search
+from jaxbiped.gait._newton import Method
+from jaxbiped.gait._orbit import orbit_of
+from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.solve._accuracy import precision_of
+
+HEIGHT, DRIFT = 0.3, 0.7
+"""Height of the section [m], and speed of the cyclic coordinate [m/s]."""
+
+
+class Numbers(NamedTuple):
+    """Gravity, and stiffness [1/s²], push [m/s²] and level [m] of the ground; then the paddle, which
+    makes `kick` + `keep` v − `curb` v² of the speed v of the mass as it comes up through the section.
+    """
+
+    g: Scalar
+    k: Scalar
+    push: Scalar
+    level: Scalar
+    kick: Scalar
+    keep: Scalar
+    curb: Scalar
+
+
+class Trampoline(jb.gait.AbstractSystem):
+    """A mass (x, y, v), in free flight above the ground; neither spring nor push take energy."""
+
+    cyclic_coordinates = (0,)
+    jumps: bool = eqx.field(static=True)
+
+    def vector_field(self, t, y, args):
+        depth = args.level - y[1]
+        force = jnp.where(depth > 0.0, args.k * depth + args.push, 0.0)
+        return DRIFT + 0.0 * y[2], y[2], force - args.g
+
+    def switches(self, args, y):
+        return (Switch(y[1] - args.level, True, force_jumps=self.jumps),)
+
+    def ending(self, args, y):
+        return jnp.asarray(0)
+
+    def reset_map(self, args, y):
+        x, height, speed = y
+        return x, height, args.kick + args.keep * speed - args.curb * speed * speed
+
+    def load(self, args, y):
+        return None if self.jumps else args.k * jnp.maximum(args.level - y[1], 0.0)
+
+
+SPRING = Numbers(9.8, 900.0, 0.0, 0.02, 1.0, 0.9, 0.1)
+PUSH = SPRING._replace(k=0.0, push=60.0)
+ABOVE = jb.Section(lambda args, y: y[1] - HEIGHT)
+
+
+def times(n, v):
+    """Duration of a cycle that begins upwards at the speed v: in flight, and on spring or push."""
+    w = jnp.sqrt(v * v + 2 * n.g * (HEIGHT - n.level))
+    if n.k == 0.0:
+        return 2 * w / n.g + 2 * w / (n.push - n.g)
+    root = jnp.sqrt(n.k)
+    return 2 * w / n.g + (jnp.pi + 2 * jnp.arctan2(n.g, w * root)) / root
+
+
+def gait(n):
+    """Speed on the section, period, advance, peak and spectral radius of the cycle on springs."""
+    loss = 1 - n.keep  # kick = loss v + curb v²
+    v = (jnp.sqrt(loss**2 + 4 * n.curb * n.kick) - loss) / (2 * n.curb)
+    square = v * v + 2 * n.g * (HEIGHT - n.level)
+    peak = n.g + jnp.sqrt(n.g**2 + n.k * square)
+    period = times(n, v)
+    return jnp.stack([v, period, DRIFT * period, peak, n.keep - 2 * n.curb * v])
+
+
+def test_an_orbit_with_its_multiplier_and_all_derivatives():
+    """Where energy is kept only the paddle decides: what a switch adds to second derivatives cancels."""
+    active = (0, 1, 3, 4, 5, 6)
+    spec = ReturnMapSpec(Trampoline(False), ABOVE, jb.solvers.Rodas4(), 20.0, 1, 32768, "lanes")
+    guess = tuple(map(jnp.asarray, (0.0, HEIGHT, 2.0)))
+
+    @jax.jit
+    def run(args):
+        found = search(spec, args, active, guess, precision_of("tight"), Method(None, 40, 1e-10))
+        return orbit_of(spec, args, active, guess, found, radius=True)
+
+    found = run(jax.tree.map(jnp.asarray, SPRING))
+    last, stability, slopes = found.found.last, found.stability, found.slopes
+    ours = (found.state[2], last.period, last.advance[0], last.peak, stability.spectral_radius)
+    np.testing.assert_allclose(ours, gait(SPRING), rtol=1e-7)
+    assert stability.multipliers.shape == (1,)
+    assert float(stability.unit_error) < 1e-6
+    jacobian = jax.jacfwd(gait)(jax.tree.map(jnp.asarray, SPRING))
+    expected = np.stack([jacobian[i] * SPRING[i] for i in active], axis=1)
+    ours = (slopes.recurring[1], slopes.period, slopes.advance[0], slopes.peak, found.radius_slopes)
+    np.testing.assert_allclose(np.stack(ours), expected, rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("engine", ["lanes"])
+def test_a_force_that_jumps_makes_tangents_jump(engine):
+    names, start = ("g", "push", "level"), (0.0, HEIGHT, 2.0)
+    once = jb.gait.linearise_return_map(
+        PUSH, start, rtol=1e-9, tangent_rtol=1e-8, parameters=names, section=ABOVE,
+        system=Trampoline(True), engine=engine,
+    )  # fmt: skip
+
+    def back(n, v):
+        return jnp.stack([n.kick + n.keep * v - n.curb * v * v, times(n, v)])
+
+    numbers = jax.tree.map(jnp.asarray, PUSH)
+    np.testing.assert_allclose([once.recurring[1], once.period], back(PUSH, 2.0), rtol=1e-8)
+    by_args, by_speed = jax.jacfwd(back, argnums=(0, 1))(numbers, jnp.asarray(2.0))
+    columns = [by_speed, *(getattr(by_args, n) * getattr(PUSH, n) for n in names)]
+    ours = np.stack([once.jacobian[1, 1:], once.period_row[1:]])
+    np.testing.assert_allclose(ours, np.stack(columns, axis=1), rtol=1e-6, atol=1e-7)
+    assert int(once.jumps) == 2
