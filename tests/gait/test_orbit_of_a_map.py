@@ -1,0 +1,270 @@
+"""Newton's method, sensitivities and errors of an orbit, on a map that is written down: no motion."""
+
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped._types import Scalar
+from jaxbiped.gait import _orbit
+from jaxbiped.gait._accurate_gait import judge_gait
+from jaxbiped.gait._fixed_point_search import Found, walks_only
+from jaxbiped.gait._gait import Gait, Measures, _by_parameter, _elasticities, _measure_errors
+from jaxbiped.gait._gait_measures import _by_correction
+from jaxbiped.gait._newton import Method, Stage, initial_progress, newton_iteration
+from jaxbiped.gait._orbit import slopes_of
+from jaxbiped.gait._poincare_map import LinearisedReturn
+from jaxbiped.gait._return_map_spec import walking_spec
+from jaxbiped.gait._soundness import is_sound
+from jaxbiped.variational._solve_to_section import Nodes
+
+P = np.array([0.7, -0.4])
+TURN = np.array([[0.5, -0.6, 0.1], [0.6, 0.4, 0.0], [0.2, 0.1, 0.3]])
+"""With a complex leading pair."""
+SHEAR = np.array([[0.8, 0.3, 0.0], [0.0, 0.2, 0.1], [0.1, 0.0, 0.3]])
+
+
+class Triple(NamedTuple):
+    """A state of one cyclic and three recurring components."""
+
+    hip_x: Scalar
+    first: Scalar
+    second: Scalar
+    third: Scalar
+
+
+def returned(linear, x, p):
+    """Where (x, p) returns to; period, advance and peak."""
+    curve = jnp.stack([0.1 * x[0] * x[1], 0.05 * x[2] ** 2, -0.1 * x[0] ** 2])
+    push = jnp.stack([p[0], p[0] * p[1], p[1]])
+    at = linear @ x + curve * (1.0 + p[1]) + 0.2 * push
+    return at, 1.0 + x @ x + p[0] ** 2, 2.0 + x[1] * p[1], 3.0 + x[0] - p[0]
+
+
+def fixed_point(linear, p):
+    x = np.zeros(3)
+    for _ in range(9):
+        once = linearised(linear, x, p)
+        slope = np.asarray(once.jacobian)[:, :3] - np.eye(3)
+        x = x - np.linalg.solve(slope, np.asarray(once.recurring) - x)
+    return x
+
+
+@jax.jit
+def linearised(linear, x, p):
+    """A return from x, in units of the parameters."""
+    at, *rest = returned(linear, x, p)
+    slopes = jax.jacfwd(returned, argnums=(1, 2))(linear, x, p)
+    rows = [jnp.concatenate([by_x, by_p * p], axis=-1) for by_x, by_p in slopes]
+    period, advance, peak = rest
+    no, zero = jnp.asarray(0), jnp.zeros(())
+    start = jnp.concatenate([jnp.zeros(2), x])[None]
+    return LinearisedReturn(
+        at, rows[0], rows[0], at, period, rows[1], advance[None], rows[2][None], peak, rows[3],
+        no, no, no, no, no, Nodes(start, None, start, zero),
+    )  # fmt: skip
+
+
+def measures(linear, p):
+    x = fixed_point(linear, p)
+    once = linearised(linear, x, p)
+    radius = np.abs(np.linalg.eigvals(np.asarray(once.jacobian)[:, :3])).max()
+    period, length = float(once.period), float(once.advance[0])
+    return np.array([*x, period, length, length / period, once.peak, radius])
+
+
+def differences(linear):
+    """Derivatives of `measures` with respect to the parameters, in their own sizes."""
+    h = 1e-5
+    steps = np.diag(h * P)
+    ends = [(measures(linear, P + d), measures(linear, P - d)) for d in steps]
+    return np.stack([(a - b) / (2.0 * h) for a, b in ends], axis=1)
+
+
+@pytest.mark.parametrize("linear", [TURN, SHEAR], ids=["complex", "real"])
+def test_sensitivities_are_differences_of_fixed_points(linear, monkeypatch):
+    x = jnp.asarray(fixed_point(linear, P))
+
+    def second_variation(spec, args, like, last, leading, weights, family, sizes):
+        """What the adjoint solve gives, of this map."""
+
+        def jacobian(x, p):
+            return jax.jacfwd(returned, argnums=1)(linear, x, p)[0]
+
+        _, along = jax.vmap(lambda dx, dp: jax.jvp(jacobian, (x, P), (dx, dp)), (1, 0))(
+            family, jnp.diag(P)
+        )
+        return jnp.einsum("vi,kij,vj->k", weights, along, leading)
+
+    monkeypatch.setattr(_orbit, "second_variation", second_variation)
+    zero = jb.State(*[0.0] * 8)
+
+    @jax.jit
+    def told(last):
+        slopes, length = slopes_of(last), last.advance[0]
+        radius = _orbit._radius_slopes(None, tuple(P), (0, 1), None, last)
+        measured = Measures(last.period, length, length / last.period, last.peak, None, zero)
+        seven = slopes._replace(recurring=jnp.concatenate([slopes.recurring, jnp.zeros((4, 2))]))
+        found = _by_parameter(SimpleNamespace(), measured, seven, radius)
+        values = Measures(2.0, *[4.0] * 4, jnp.asarray(8.0))
+        relative = _elasticities((1.0, 0.0), (0, 1), values, found._replace(state=found.period))
+        return slopes.recurring, found, relative
+
+    last = linearised(linear, x, P)
+    recurring, found, relative = told(last)
+    ours = [*recurring, found.period, found.step_length, found.speed, found.peak_normal]
+    expected = differences(linear)
+    np.testing.assert_allclose(
+        np.stack([*ours, found.spectral_radius]), expected, rtol=1e-6, atol=1e-8
+    )
+    np.testing.assert_allclose(relative.period, [expected[3, 0] / 2.0, 0.0], rtol=1e-6)
+    np.testing.assert_allclose(relative.speed, [expected[5, 0] / 4.0, 0.0], rtol=1e-6)
+    assert np.isnan(told(last._replace(grazes=jnp.asarray(1)))[1].period).all()
+
+
+def test_errors_of_measures_hold_what_the_looser_solve_and_the_last_correction_change():
+    x = fixed_point(TURN, P)
+    off = 1e-5 * np.array([1.0, -2.0, 0.5])
+    last, coarse = (linearised(TURN, x + d, P) for d in (off, 0.0 * off))
+    coarse = coarse._replace(period=coarse.period + 0.01, peak=coarse.peak - 0.02)
+
+    @jax.jit
+    def errors_of(last, coarse):
+        no = jnp.asarray(0)
+        both = jax.tree.map(lambda a, b: jnp.stack([a, b]), last, coarse)
+        found = Found(no, no, last.recurring, no, both, no, no, jnp.asarray(True))
+        stability = SimpleNamespace(errors=jnp.array([0.25]), spectral_radius=0.5)
+        orbit = SimpleNamespace(
+            found=found, state=Triple(jnp.zeros(()), *last.recurring), stability=stability
+        )
+        length, period = last.advance[0], last.period
+        told = Measures(period, length, length / period, last.peak, 0.5, orbit.state)
+        return _measure_errors(told, orbit)
+
+    errors = errors_of(last, coarse)
+    true = measures(TURN, P)
+    assert float(errors.period) == pytest.approx(0.01 + abs(float(last.period) - true[3]), rel=1e-3)
+    assert float(errors.peak_normal) == pytest.approx(
+        0.02 + abs(float(last.peak) - true[6]), rel=1e-3
+    )
+    assert float(errors.spectral_radius) == 0.25
+
+
+def test_newton_goes_quadratically_to_the_fixed_point_and_stops_there():
+    method = Method(None, 40, 1e-10)
+    iteration = jax.jit(lambda now, latest: newton_iteration(now, latest, method))
+    x = fixed_point(SHEAR, P)
+    now = initial_progress(jnp.asarray(x + 0.3), jnp.asarray(0.0), method, linearised(SHEAR, x, P))
+    assert int(now.stage) == Stage.ROUGH
+    while int(now.stage) < Stage.FOUND:
+        now = iteration(now, linearised(SHEAR, now.trial, P))
+    assert int(now.stage) == Stage.FOUND
+    np.testing.assert_allclose(now.base, x, atol=1e-9)
+    assert float(now.base_residual) <= 1e-10
+    assert int(now.evaluations) <= 9
+    np.testing.assert_allclose(now.coarse.recurring, x, atol=1e-4)
+    lost = linearised(SHEAR, now.trial, P)._replace(code=jnp.asarray(3))
+    begin = initial_progress(jnp.asarray(x), jnp.asarray(0.0), method, lost)
+    assert int(iteration(begin, lost).stage) == Stage.NO_RETURN
+    # A trial that does not return: the step is shortened.
+    away = iteration(begin._replace(stage=jnp.asarray(1)), linearised(SHEAR, begin.trial + 0.2, P))
+    assert float(iteration(away, lost).damping) == 0.5 * float(away.damping)
+
+
+def gait_of(values, multipliers=(0.5, 0.1), found=jb.gait.Search.FOUND):
+    """As much of a gait as its judge looks at; all its errors are 0.01."""
+    state = jb.State(*[0.0] * 8)
+    numbers = Measures(*values, 0.5, state)
+    small = jax.tree.map(lambda _: np.asarray(0.01), numbers)
+    slopes = jax.tree.map(lambda _: np.array([2.0, 20.0]), numbers)
+    return SimpleNamespace(
+        outcome=found, measures=numbers, measure_errors=small, multipliers=np.array(multipliers),
+        multiplier_errors=np.full(2, 0.01), sensitivities=slopes, parameters=("K", "slope"),
+        sensitivity_errors=jax.tree.map(lambda _: np.full(2, 1e-9), numbers),
+    )  # fmt: skip
+
+
+def test_bars_are_what_a_looser_tolerance_and_another_method_change():
+    scene = jb.seed_scene()
+    gait, other = gait_of((1.0, 2.0, 2.0, 50.0)), gait_of((1.1, 2.0, 2.0, 50.0), (0.3, 0.1))
+    bars, relative, unknown = judge_gait(scene, gait, other, True)
+    assert float(bars["measures"].period) == pytest.approx(0.65 * 0.01 + 1.4 * 0.1)
+    assert float(bars["measures"].step_length) == pytest.approx(0.65 * 0.01)
+    assert bars["multipliers"].tolist() == pytest.approx([0.8 * (0.0065 + 1.4 * 0.2), 0.8 * 0.0065])
+    # The largest: the period's, in units of √(l/g).
+    assert relative == pytest.approx(0.1465 / np.sqrt(0.4 / 9.8))
+    assert unknown == ""
+    loose = gait_of((1.0, 2.0, 2.0, 50.0))
+    loose.sensitivity_errors = gait.sensitivity_errors._replace(period=np.array([0.0, 4e7]))
+    _, relative, _ = judge_gait(scene, loose, loose, True)
+    # An elasticity's error to the largest one: that of the slope, 0.02 rad, to that of K.
+    assert relative == pytest.approx(0.65 * 4e7 * 0.02 / (2.0 * 1e6))
+    lost = gait_of((1.0, 2.0, 2.0, 50.0), found=jb.gait.Search.NOT_CONVERGED)
+    assert judge_gait(scene, gait, lost, True)[1] == np.inf
+
+
+@pytest.mark.parametrize(
+    ("ending", "radius", "stable"), [(0, 0.9, True), (0, 1.1, False), (2, 0.9, False)]
+)
+def test_only_what_was_found_is_stable(ending, radius, stable):
+    gait = SimpleNamespace(
+        ending=jnp.asarray(ending), measures=SimpleNamespace(spectral_radius=jnp.asarray(radius))
+    )
+    assert bool(Gait.stable.fget(gait)) is stable
+
+
+def test_an_orbit_uphill_hasty_or_deep_underground_is_no_walk():
+    scene, state = jb.seed_scene(), jb.seed_state()
+    judge = jax.jit(is_sound)
+    sound = lambda *at: bool(judge(scene, *at))
+    assert sound(state, 0.18, 0.44)
+    assert not sound(state, -0.18, 0.44)
+    assert not sound(state, 0.18, 0.1 * np.sqrt(0.4 / 9.8))
+    for leg, other in ((1, 2), (2, 1)):
+        # On a leg that turns back, so deep that it would carry a hundred times the weight.
+        stands = {f"theta_{leg}": 0.0, f"omega_{leg}": -1.0, f"theta_{other}": 1.5}
+        for depth, expected in ((1e-4, True), (1.6e-2, False)):
+            low = state._replace(hip_z=0.4 - depth, **stands)
+            low = jax.tree.map(jnp.asarray, low)
+            assert sound(low, 0.18, 0.44) is expected, (leg, depth)
+    found = Found(*[np.asarray(0)] * 7, sound=np.asarray(False))
+    assert int(walks_only(found).ending) == jb.gait.Search.NO_WALK
+    assert int(walks_only(found._replace(sound=np.asarray(True))).ending) == jb.gait.Search.FOUND
+
+
+@pytest.mark.parametrize("length", [0.1, 1.6])
+def test_an_arrival_may_take_fifty_swings(length):
+    scene = jb.with_parameters(jb.seed_scene(), {"l": length, "d": 0.05, "r": 0.01})
+    spec = walking_spec(scene, jb.MidStance(), jb.solvers.Rodas4(), "xla", steps=1, most=9)
+    assert float(spec.max_time) == pytest.approx(50.0 * np.sqrt(length / 9.8))
+
+
+class Point(NamedTuple):
+    """One of two."""
+
+    hip_x: Scalar
+    first: Scalar
+    second: Scalar
+
+
+def test_a_differentiable_correction_has_the_derivatives_of_the_fixed_point():
+    """On the map x → a x + 3, y → y/2, after the time 2 + x and the way x/2."""
+
+    def measured(a):
+        state = Point(jnp.zeros(()), jnp.asarray(3.0 / (1.0 - 0.6)), jnp.zeros(()))
+        after = Point(0.5 * state.first, a * state.first + 3.0, 0.5 * state.second)
+        jacobian = jnp.array([[0.6, 0.0], [0.0, 0.5], [1.0, 0.0], [0.5, 0.0]])
+        gait = SimpleNamespace(
+            measures=SimpleNamespace(state=state), return_jacobian=jacobian, ending=jnp.asarray(0)
+        )
+        once = SimpleNamespace(time=2.0 + state.first, state=after)
+        found = _by_correction(gait, lambda _: once)
+        return jnp.stack([found.state.first, found.period, found.step_length])
+
+    value, slope = jax.jit(lambda a: jax.jvp(measured, (a,), (jnp.ones(()),)))(0.6)
+    np.testing.assert_allclose(value, [7.5, 9.5, 3.75])
+    np.testing.assert_allclose(slope, np.array([1.0, 1.0, 0.5]) * 7.5 / (1.0 - 0.6))
