@@ -22,8 +22,8 @@ HEIGHT, DRIFT = 0.3, 0.7
 
 
 class Numbers(NamedTuple):
-    """Gravity, and stiffness [1/s²], push [m/s²] and level [m] of the ground; then the paddle, which
-    makes `kick` + `keep` v − `curb` v² of the speed v of the mass as it comes up through the section.
+    """Gravity; the ground's stiffness [1/s²], push [m/s²] and level [m]; and the paddle, which makes
+    `kick` + `keep` v − `curb` v² of the mass's speed v as it comes up through the section.
     """
 
     g: Scalar
@@ -85,7 +85,7 @@ def gait(n):
 
 
 def test_an_orbit_with_its_multiplier_and_all_derivatives():
-    """Where energy is kept only the paddle decides: what a switch adds to second derivatives cancels."""
+    """Energy is kept: what the switch adds to second derivatives must cancel."""
     active = (0, 1, 3, 4, 5, 6)
     spec = ReturnMapSpec(Trampoline(False), ABOVE, jb.solvers.Rodas4(), 20.0, 1, 32768, "lanes")
     guess = tuple(map(jnp.asarray, (0.0, HEIGHT, 2.0)))

@@ -1,4 +1,4 @@
-"""Newton's method, sensitivities and errors of an orbit, on a map that is written down: no motion."""
+"""Orbit of a map that is written down: Newton's method, sensitivities, errors; no motion."""
 
 from types import SimpleNamespace
 from typing import NamedTuple

@@ -1,0 +1,123 @@
+"""Fits of models whose estimates and errors are known in closed form; no gait is searched for."""
+
+import dataclasses
+from types import SimpleNamespace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.identify import _fit_gait, _predicted_gait
+from jaxbiped.identify._predicted_gait import Prediction, predict
+
+SCENE = jb.ladder()["rigid"]
+SEEN = jb.identify.MeasuredGait(
+    {"period": (0.5, 0.01), "step_length": (0.2, 0.02), "speed": (0.35, 0.03)}
+)
+
+
+def linear(matrix, center):
+    """Predicts center + matrix · log(parameters / the scene's own)."""
+    own = jb.parameter_values(SCENE)
+
+    def predicted(scene, measured, values, sizes, guess, **how):
+        names = list(values)
+        logs = np.log([values[name] / float(own[name]) for name in names])
+        zero = np.zeros_like(matrix)
+        return Prediction(center + matrix @ logs, matrix, zero, (), (), True)
+
+    return predicted
+
+
+@pytest.mark.parametrize("vary", [("J",), ("J", "d")])
+def test_a_linear_model_has_the_covariance_of_least_squares(vary, monkeypatch):
+    """(AᵀA)⁻¹ of the weighed slopes, and a 95 % interval of 1.96 standard errors in the logarithm."""
+    matrix = np.array([[0.3, -0.1], [0.1, 0.4], [0.2, 0.3]])[:, : len(vary)]
+    monkeypatch.setattr(_fit_gait, "predict", linear(matrix, SEEN.values + [0.02, -0.01, 0.03]))
+    fit = jb.fit_gait(SCENE, vary, SEEN)
+    weighed = matrix / SEEN.deviations[:, None]
+    covariance = np.linalg.inv(weighed.T @ weighed)
+    logs = -covariance @ weighed.T @ (np.array([0.02, -0.01, 0.03]) / SEEN.deviations)
+    own = jb.parameter_values(SCENE)
+    spread = np.sqrt(np.diag(covariance))
+    for k, name in enumerate(vary):
+        value = float(own[name]) * np.exp(logs[k])
+        assert fit.estimates[name] == pytest.approx(value, rel=1e-7)
+        assert fit.standard_errors[name] == pytest.approx(value * spread[k], rel=1e-7)
+        ends = value * np.exp(np.array([-1.959964, 1.959964]) * spread[k])
+        assert fit.intervals[name] == pytest.approx(tuple(ends), rel=1e-6)
+    np.testing.assert_allclose(fit.correlation, covariance / np.outer(spread, spread), rtol=1e-8)
+    expected = matrix @ logs + [0.02, -0.01, 0.03]
+    np.testing.assert_allclose(fit.residuals, expected / SEEN.deviations, atol=1e-7)
+    assert fit.chi_squared == pytest.approx(float(np.sum((expected / SEEN.deviations) ** 2)))
+    assert fit.freedom == 3 - len(vary)
+    assert fit.ending is jb.identify.FitEnding.CONVERGED
+    assert fit.undetermined == ()
+
+
+def test_two_parameters_that_make_up_for_each_other_are_told(monkeypatch):
+    matrix = np.outer([0.3, 0.1, 0.2], [1.0, -2.0])
+    monkeypatch.setattr(_fit_gait, "predict", linear(matrix, SEEN.values))
+    fit = jb.fit_gait(SCENE, ("J", "d"), SEEN)
+    assert fit.undetermined == ("J", "d")
+    assert np.isnan(fit.standard_errors["J"])
+    assert fit.freedom == 3
+
+
+def test_without_a_gait_nothing_is_fitted(monkeypatch):
+    def lost(*_, **__):
+        return Prediction(SEEN.values, np.ones((3, 1)), np.zeros((3, 1)), (), (), False)
+
+    monkeypatch.setattr(_fit_gait, "predict", lost)
+    fit = jb.fit_gait(SCENE, ("J",), SEEN)
+    assert fit.ending is jb.identify.FitEnding.NO_GAIT
+    assert fit.evaluations == 1
+
+
+def found_gait(scene):
+    """A gait whose period is 3 slope + J, and what else is asked of it."""
+    slope, inertia = (float(jb.parameter_values(scene)[name]) for name in ("slope", "J"))
+    measures = SimpleNamespace(
+        period=3.0 * slope + inertia, step_length=slope**2, state=(jnp.asarray(slope),)
+    )
+    slopes = SimpleNamespace(
+        period=np.array([1.0, 3.0]), step_length=np.array([0.0, 2.0 * slope]),
+        state=(np.array([0.0, 1.0]),),
+    )  # fmt: skip
+    errors = SimpleNamespace(period=np.array([0.1, 0.3]), step_length=np.array([0.0, 0.2]))
+    return SimpleNamespace(
+        measures=measures, sensitivities=slopes, sensitivity_errors=errors,
+        outcome=jb.gait.Search.FOUND, sound=True,
+    )  # fmt: skip
+
+
+def test_a_prediction_is_of_the_conditions_in_units_of_the_parameters(monkeypatch):
+    asked = []
+
+    def find(scene, guess, **how):
+        asked.append((guess, how))
+        return found_gait(scene)
+
+    monkeypatch.setattr(_predicted_gait, "find_gait", find)
+    seen = jb.identify.MeasuredGait(
+        {"step_length": (0.1, 0.01), "period": (0.5, 0.01)}, conditions={"slope": 0.05}, footsteps=2
+    )
+    values, sizes = {"J": 0.02, "d": 0.1}, np.array([0.02, 10.0])
+    found = predict(SCENE, seen, values, sizes, None, accuracy="tight", engine="lanes")
+    np.testing.assert_allclose(found.values, [0.05**2, 3.0 * 0.05 + 0.02])
+    np.testing.assert_allclose(found.slopes, [[0.0, 1.0], [0.02, 30.0]])
+    np.testing.assert_allclose(found.slope_errors, [[0.0, 2.0], [0.002, 3.0]])
+    moved = found.state_at(np.array([0.5, 0.25]))
+    assert float(moved[0]) == pytest.approx(0.05 + 0.25 * 10.0)
+    ((guess, how),) = asked
+    assert guess is None
+    assert (how["footsteps"], how["accuracy"], how["engine"]) == (2, "tight", "lanes")
+    assert how["parameters"] == ("J", "d")
+
+
+def test_weights_are_those_of_every_number():
+    angles = jb.identify.MeasuredAngles([0.0, 0.1], 0.005, theta_2=[0.2, 0.1])
+    gait = dataclasses.replace(SEEN, angles=angles)
+    np.testing.assert_allclose(gait.values, [0.5, 0.2, 0.35, 0.2, 0.1])
+    np.testing.assert_allclose(gait.deviations, [0.01, 0.02, 0.03, 0.005, 0.005])
