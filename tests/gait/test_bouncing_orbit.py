@@ -22,7 +22,7 @@ HEIGHT, DRIFT = 0.3, 0.7
 
 
 class Numbers(NamedTuple):
-    """Gravity; the ground's stiffness [1/s²], push [m/s²] and level [m]; and the paddle, which makes
+    """Gravity; the ground's stiffness [1/s²], push [m/s²] and level [m]; and the paddle's: it makes
     `kick` + `keep` v − `curb` v² of the mass's speed v as it comes up through the section.
     """
 

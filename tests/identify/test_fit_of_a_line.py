@@ -32,13 +32,14 @@ def linear(matrix, center):
 
 @pytest.mark.parametrize("vary", [("J",), ("J", "d")])
 def test_a_linear_model_has_the_covariance_of_least_squares(vary, monkeypatch):
-    """(AᵀA)⁻¹ of the weighed slopes, and a 95 % interval of 1.96 standard errors in the logarithm."""
+    """(AᵀA)⁻¹ of the weighed slopes, and intervals of 1.96 standard errors in the logarithm."""
     matrix = np.array([[0.3, -0.1], [0.1, 0.4], [0.2, 0.3]])[:, : len(vary)]
-    monkeypatch.setattr(_fit_gait, "predict", linear(matrix, SEEN.values + [0.02, -0.01, 0.03]))
+    off = np.array([0.02, -0.01, 0.03])
+    monkeypatch.setattr(_fit_gait, "predict", linear(matrix, SEEN.values + off))
     fit = jb.fit_gait(SCENE, vary, SEEN)
     weighed = matrix / SEEN.deviations[:, None]
     covariance = np.linalg.inv(weighed.T @ weighed)
-    logs = -covariance @ weighed.T @ (np.array([0.02, -0.01, 0.03]) / SEEN.deviations)
+    logs = -covariance @ weighed.T @ (off / SEEN.deviations)
     own = jb.parameter_values(SCENE)
     spread = np.sqrt(np.diag(covariance))
     for k, name in enumerate(vary):
@@ -48,7 +49,7 @@ def test_a_linear_model_has_the_covariance_of_least_squares(vary, monkeypatch):
         ends = value * np.exp(np.array([-1.959964, 1.959964]) * spread[k])
         assert fit.intervals[name] == pytest.approx(tuple(ends), rel=1e-6)
     np.testing.assert_allclose(fit.correlation, covariance / np.outer(spread, spread), rtol=1e-8)
-    expected = matrix @ logs + [0.02, -0.01, 0.03]
+    expected = matrix @ logs + off
     np.testing.assert_allclose(fit.residuals, expected / SEEN.deviations, atol=1e-7)
     assert fit.chi_squared == pytest.approx(float(np.sum((expected / SEEN.deviations) ** 2)))
     assert fit.freedom == 3 - len(vary)

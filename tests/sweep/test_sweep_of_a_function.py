@@ -1,4 +1,4 @@
-"""Sweeps, stores and starts where labels are a plain function of the start: nothing is simulated."""
+"""Sweeps, stores and starts where a label is a plain function of its start."""
 
 import json
 from types import SimpleNamespace
@@ -153,7 +153,7 @@ def test_components_are_scaled_by_leg_length_and_gravity(length):
 
 
 def test_a_gait_draws_nearer_in_its_metric_by_its_contraction():
-    """Whatever the direction in the section: |W A e| ≤ q |W e|, which plain distances do not keep."""
+    """|W A e| ≤ q |W e| for every direction of the section."""
     jacobian = np.zeros((6, 4))
     jacobian[:4] = [[0.3, 0.0, 0.9, 0.1], [0.0, 0.3, 0.0, 0.0], [0.0, 0.2, 0.4, 0.3],
                     [0.5, 0.0, 0.0, 0.6]]  # fmt: skip

@@ -1,0 +1,206 @@
+"""Verdicts on arrivals that are written down, and on feet that roll, slide and arrive."""
+
+from types import SimpleNamespace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.basins._label import Label
+from jaxbiped.sweep._convergence_test import UNDECIDED, after_arrival, empty_history
+from jaxbiped.sweep._goals import NO_GAIT, Goals
+from jaxbiped.sweep._labelling_loop import CompliantLabelling, Progress, Start, _outcome
+from jaxbiped.sweep._sliding import contact_places, slip_distances
+
+RADIUS, GAP = 0.1, 1e-4
+ONWARD = jax.jit(after_arrival, static_argnums=3)
+
+
+def goals(*points, radii=None):
+    """Gaits at these places of states (x, y), told by x alone."""
+    count = len(points)
+    return Goals(
+        jnp.asarray([[p, 0.0] for p in points]),
+        jnp.asarray([[[1.0, 0.0]]] * count),
+        jnp.asarray([RADIUS] * count if radii is None else radii),
+        jnp.asarray([1.0, 10.0]),
+    )
+
+
+def histories(sequence, to, cycles):
+    """What is known after each arrival."""
+    now = empty_history(jnp.zeros(()), 2, cycles)
+    for x, y in sequence:
+        now = ONWARD(now, (jnp.asarray(x), jnp.asarray(y)), to, cycles, GAP)
+        yield now
+
+
+def first_verdict(sequence, to, cycles):
+    """How many arrivals it takes, and what is known then."""
+    for number, now in enumerate(histories(sequence, to, cycles), 1):
+        if int(now.verdict) != UNDECIDED:
+            return number, now
+    return None, now
+
+
+def test_a_walk_that_comes_within_the_radius_and_nearer_walks():
+    """From a distance of one, halved by each footstep: the first below a tenth is the fifth."""
+    number, now = first_verdict([(0.5**k, 1.0) for k in range(9)], goals(0.0), (1,))
+    assert (number, int(now.verdict), int(now.goal)) == (5, int(Label.WALKING), 0)
+    assert float(now.rate) == pytest.approx(0.5)
+    assert float(now.closest) == pytest.approx(0.0625)
+    assert int(now.cycle_footsteps) == 1
+    # Within the radius but going away it is open.
+    assert first_verdict([(0.01 * 1.1**k, 1.0) for k in range(9)], goals(0.0), (1,))[0] is None
+
+
+def test_a_cycle_of_two_is_told_by_every_other_footstep():
+    sequence = [((-1) ** k * (1.0 + 0.6**k), 1.0) for k in range(14)]
+    number, now = first_verdict(sequence, goals(1.0, -1.0), (2, 2))
+    assert (int(now.verdict), int(now.cycle_footsteps)) == (int(Label.WALKING), 2)
+    assert 0.6 ** (number - 1) <= RADIUS < 0.6 ** (number - 2)
+    assert float(now.rate) == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize(("period", "arrivals"), [(1, 4), (2, 5), (3, 6), (4, 7)])
+def test_an_unknown_cycle_is_one_that_repeats_three_times(period, arrivals):
+    sequence = [(5.0 + (k % period), 1.0) for k in range(20)]
+    number, now = first_verdict(sequence, goals(0.0, radii=[NO_GAIT]), (1,))
+    assert (number, int(now.verdict)) == (arrivals, int(Label.UNRESOLVED))
+    assert int(now.cycle_footsteps) == period
+    # A step of more than the gap, in units of the scales, is no repetition.
+    for size, known in ((0.9, True), (1.1, False)):
+        step = 10.0 * np.sqrt(2.0) * GAP * size
+        drifting = [(5.0, step * k) for k in range(20)]
+        number, _ = first_verdict(drifting, goals(0.0, radii=[NO_GAIT]), (1,))
+        assert (number is not None) is known
+
+
+@pytest.mark.parametrize(
+    ("code", "verdict", "label", "goal", "cycle"),
+    [
+        (Label.WALKING, UNDECIDED, Label.UNRESOLVED, -1, 2),
+        (Label.WALKING, Label.WALKING, Label.WALKING, 1, 2),
+        (Label.WALKING, Label.UNRESOLVED, Label.UNRESOLVED, -1, 2),
+        (Label.WALKING, Label.SLID, Label.SLID, -1, 0),
+        (Label.OUT_OF_STEPS, UNDECIDED, Label.OUT_OF_STEPS, -1, 0),
+        (Label.OUT_OF_STEPS, Label.WALKING, Label.WALKING, 1, 2),
+        (Label.STUMBLED, Label.WALKING, Label.STUMBLED, -1, 0),
+        (Label.FELL_BACK, UNDECIDED, Label.FELL_BACK, -1, 0),
+    ],
+)
+def test_a_failure_is_certain_and_what_only_ran_out_is_open(code, verdict, label, goal, cycle):
+    trace = empty_history(np.float64(0.0), 2, (1,))._replace(
+        verdict=np.int64(verdict), goal=np.int64(1), cycle_footsteps=np.int64(2)
+    )
+    rest = dict.fromkeys(("footsteps", "time", "distance", "attempted"), np.float64(3.0))
+    found = _outcome(trace, code=np.int64(code), **rest)
+    told = (int(found.label), int(found.goal), int(found.cycle_footsteps))
+    assert told == (int(label), goal, cycle)
+
+
+SCENE = jb.seed_scene()
+
+
+def standing(angle, rate, depth=1e-4, hip_x=0.0):
+    """A walker that rolls on leg 2, which is at this angle; leg 1 is far off the ground."""
+    walker = SCENE.walker
+    reach = walker.hip_to_foot
+    return jb.State(*map(jnp.asarray, (
+        hip_x - walker.r * angle - reach * np.sin(angle), walker.r - depth + reach * np.cos(angle),
+        1.3, angle, -(walker.r + reach * np.cos(angle)) * rate, -reach * np.sin(angle) * rate,
+        0.5, rate,
+    )))  # fmt: skip
+
+
+def test_a_foot_that_rolls_does_not_slide_and_one_that_slides_does():
+    places = contact_places(SCENE, standing(0.2, -1.0))
+    rolled = standing(0.1, -1.0)
+    landed, slid = slip_distances(SCENE, rolled, places)
+    assert float(slid) == pytest.approx(0.0, abs=1e-12)
+    assert float(landed[1]) == pytest.approx(float(places[1]), abs=1e-15)
+    _, slid = slip_distances(SCENE, standing(0.1, -1.0, hip_x=-0.03), places)
+    assert float(slid) == pytest.approx(0.03)
+    # A foot in the air takes its place along.
+    flying = standing(0.1, -1.0, depth=-1e-3, hip_x=0.07)
+    landed, slid = slip_distances(SCENE, flying, places)
+    assert float(slid) == 0.0
+    assert float(landed[1]) == pytest.approx(float(places[1]) + 0.07)
+
+
+class Straight:
+    """A continuous solution along a straight line."""
+
+    def __init__(self, *, t0, t1, y0, y1, coefficients):
+        self.ends = t0, t1, y0, y1
+
+    def evaluate(self, time):
+        t0, t1, y0, y1 = self.ends
+        return jax.tree.map(lambda a, b: a + (time - t0) / (t1 - t0) * (b - a), y0, y1)
+
+
+@pytest.fixture(scope="module")
+def attempt():
+    """One attempt of a labelling whose solver steps from one given state to another."""
+    loop = CompliantLabelling(jb.solvers.Rodas4(), (1,), fenced=False)
+
+    @jax.jit
+    def one(before, after, t, strike, landed, radius):
+        loop.steps = SimpleNamespace(
+            attempt=lambda solve, now: (now, jnp.asarray(False)),
+            solver=SimpleNamespace(interpolation_cls=Straight),
+        )
+        zero = jnp.zeros(())
+        last = SimpleNamespace(noted=True, t=t - 0.01, state=before, coefficients=None)
+        step = _Step(t, after, (zero, zero, zero), last)
+        trace = empty_history(zero, 7, (1,))
+        far = Goals(jnp.zeros((1, 7)), jnp.zeros((1, 6, 7)), jnp.asarray([NO_GAIT]), jnp.ones(7))
+        solve = SimpleNamespace(scene=SCENE)
+        found, over = loop.attempt(
+            Start(solve, far, 0.0, 2.0), Progress(step, trace, strike, landed)
+        )
+        return found.trace, over
+
+    return one
+
+
+class _Step(SimpleNamespace):
+    def __init__(self, t, state, control, last):
+        super().__init__(t=t, state=state, control=control, last=last)
+
+
+jax.tree_util.register_pytree_node(
+    _Step,
+    lambda s: ((s.t, s.state, s.control), s.last),
+    lambda last, parts: _Step(*parts, last),
+)
+
+
+def test_arrivals_at_mid_stance_are_those_of_either_leg(attempt):
+    before, after = standing(0.01, -1.0), standing(-0.03, -1.0)
+    landed = tuple(contact_places(SCENE, before))
+    for exchanged in (False, True):
+        ends = before, after
+        if exchanged:
+            ends = tuple(jb.dynamics.exchange_legs(each) for each in ends)
+            landed = landed[::-1]
+        trace, over = attempt(*ends, 1.0, 0.5, landed, 0.0)
+        arrived = np.array(trace.recent[0])
+        assert not bool(over)
+        assert arrived[2] == pytest.approx(0.0, abs=1e-9)  # θ₂, of the leg that stands
+        np.testing.assert_allclose([arrived[1], arrived[6]], [1.3, -1.0], rtol=1e-12)
+    uphill, _ = attempt(after, before, 1.0, 0.5, landed, 0.0)
+    assert np.isinf(np.array(uphill.recent[0])).all()
+
+
+def test_a_foot_may_slide_a_leg_and_a_footstep_may_take_its_time(attempt):
+    state = standing(0.2, -1.0)
+    place = contact_places(SCENE, state)
+    for by, verdict in ((0.39, UNDECIDED), (0.41, int(Label.SLID))):
+        trace, over = attempt(state, state, 1.0, 0.5, (place[0], place[1] - by), 0.0)
+        assert int(trace.verdict) == verdict
+        assert bool(over) is (verdict != UNDECIDED)
+    for time, verdict in ((2.49, UNDECIDED), (2.51, int(Label.TIMED_OUT))):
+        assert int(attempt(state, state, time, 0.5, place, 0.0)[0].verdict) == verdict
