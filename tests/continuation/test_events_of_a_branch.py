@@ -1,0 +1,149 @@
+"""Events of branches, their errors, cascades and deflation, from numbers that are written down."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from jaxbiped.continuation import _switch_branch
+from jaxbiped.continuation._bifurcations import (
+    BranchEvent,
+    _with_multiplier_errors,
+    critical_multiplier,
+    multiplier_test,
+)
+from jaxbiped.continuation._deflation import _DeflatedNewton
+from jaxbiped.continuation._switch_branch import DoublingCascade, doubling_cascade
+from jaxbiped.continuation._trace import _closes, is_bound, leaves_range
+from jaxbiped.gait._pseudo_arclength import CurvePoint
+
+
+def at(*multipliers, value=0.0, errors=0.01):
+    values = np.array(multipliers, complex)
+    return SimpleNamespace(
+        multipliers=values, multiplier_errors=np.full(len(values), errors), value=value
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "multipliers"),
+    [
+        (BranchEvent.FOLD, (1.0, 0.3, -0.2)),
+        (BranchEvent.BRANCH_POINT, (1.0, 0.3, -0.2)),
+        (BranchEvent.PERIOD_DOUBLING, (-1.0, 0.3, -0.2)),
+        (BranchEvent.NEIMARK_SACKER, (0.6 + 0.8j, 0.6 - 0.8j, 0.3)),
+    ],
+)
+def test_a_test_function_vanishes_and_changes_sign_at_its_event_alone(kind, multipliers):
+    values = np.array(multipliers, complex)
+    assert multiplier_test(kind, values) == pytest.approx(0.0, abs=1e-12)
+    inside, outside = (values.copy() for _ in range(2))
+    inside[abs(values) > 0.99] *= 0.99
+    outside[abs(values) > 0.99] *= 1.01
+    assert multiplier_test(kind, inside) * multiplier_test(kind, outside) < 0.0
+    for other in set(BranchEvent) - {kind, BranchEvent.LIMIT}:
+        if multipliers[0] != 1.0:
+            assert multiplier_test(other, values) != pytest.approx(0.0, abs=1e-6)
+    told, error, distance = critical_multiplier(kind, at(*values))
+    assert (told, error) == (values[0], 0.01)
+    assert distance == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_error_of_a_value_is_that_of_the_multiplier_over_its_rate():
+    """A multiplier that falls from −0.9 to −1.1 over 0.4 of the parameter: two for each one."""
+    ends = [at(-0.9, 0.2, value=1.0, errors=0.02), at(-1.1, 0.2, value=1.4, errors=0.01)]
+    middle = at(-1.0001, 0.2, value=1.2, errors=0.005)
+    error = lambda shift: _with_multiplier_errors(shift, BranchEvent.PERIOD_DOUBLING, middle, ends)
+    assert error(1e-9) == pytest.approx(2.0 * 0.02 + 2.0 * 1e-4)
+    assert error(0.7) == pytest.approx(0.7 + 2.0 * 1e-4)
+    assert error(float("nan")) == pytest.approx(2.0 * 0.02 + 2.0 * 1e-4)
+
+
+def point(*place, tangent):
+    return CurvePoint(*[None] * len(CurvePoint._fields))._replace(
+        place=np.array(place), tangent=np.array(tangent)
+    )
+
+
+def test_a_branch_leaves_its_range_where_it_leads_out_of_it():
+    for s, inwards in ((0.0, 1.0), (1.0, -1.0)):
+        assert is_bound(point(0.3, s, tangent=[0.0, inwards]))
+        assert not leaves_range(point(0.3, s, tangent=[0.0, inwards]))
+        assert leaves_range(point(0.3, s, tangent=[0.0, -inwards]))
+    assert not leaves_range(point(0.3, 0.5, tangent=[0.0, 1.0]))
+
+
+def test_a_branch_is_closed_where_it_passes_its_beginning_the_same_way():
+    here, there = point(0.0, 0.4, tangent=[0, 1.0]), point(0.0, 0.5, tangent=[0, 1.0])
+    assert _closes(point(0.001, 0.45, tangent=[0, 1.0]), here, there)
+    assert not _closes(point(0.001, 0.45, tangent=[0, -1.0]), here, there)
+    assert not _closes(point(0.02, 0.45, tangent=[0, 1.0]), here, there)
+    assert not _closes(point(0.0, 0.55, tangent=[0, 1.0]), here, there)
+    assert not _closes(point(0.0, 0.35, tangent=[0, 1.0]), here, there)
+
+
+def test_a_geometric_cascade_has_its_ratio_and_its_limit(monkeypatch):
+    """Doublings at 2 − 4⁻ᵏ: intervals shrink by 4 and add up to 2."""
+    values = [2.0 - 0.25**k for k in range(4)]
+
+    def doubling(k):
+        place = np.array([0.1 * k, values[k]])
+        return SimpleNamespace(
+            kind=BranchEvent.PERIOD_DOUBLING, value=values[k], point=SimpleNamespace(place=place)
+        )
+
+    def branch(k):
+        ends = [SimpleNamespace(place=np.array([0.0, v])) for v in (values[k - 1], values[k])]
+        return SimpleNamespace(points=ends, bifurcations=[doubling(k)], footsteps=2**k)
+
+    following = iter([branch(1), branch(2), branch(3)])
+    monkeypatch.setattr(_switch_branch, "_switched", lambda *_, **__: next(following))
+    found = doubling_cascade(branch(0), 4)
+    assert isinstance(found, DoublingCascade)
+    assert found.values == pytest.approx(values)
+    assert found.ratios == pytest.approx([4.0, 4.0])
+    assert found.accumulation == pytest.approx(2.0)
+    assert [each.footsteps for each in found.branches] == [1, 2, 4, 8]
+
+
+def test_deflated_newton_finds_the_roots_one_after_the_other():
+    """Of x² = 1 and y = 0: both roots from one start, and then no more."""
+
+    def change(p):
+        value = np.array([p[0] ** 2 - 1.0, p[1]])
+        by_point = np.array([[2.0 * p[0], 0.0], [0.0, 1.0]])
+        return SimpleNamespace(value=value, by_point=by_point, code=0)
+
+    class Search(_DeflatedNewton):
+        def __init__(self):
+            self._sizes, self._crossings = np.ones(2), []
+            curve = SimpleNamespace(converged=1e-9)
+            self._setup = SimpleNamespace(curve=curve, footsteps=1)
+
+        def _walk(self, point, footsteps):
+            return np.asarray(point), 0
+
+        def _change(self, point):
+            return change(point)
+
+    search, found = Search(), []
+    while (root := search.from_start(np.array([0.7, 0.1]))) is not None:
+        found.append(root)
+        search._crossings.append(root)
+    np.testing.assert_allclose(found, [[1.0, 0.0], [-1.0, 0.0]], atol=1e-8)
+
+
+def test_a_deflated_step_is_that_of_the_residual_over_the_squared_distance():
+    """Newton's step of (1/|x − a|² + 1) f(x), by its derivative in full."""
+    a, x = np.array([0.4, -0.1]), np.array([0.5, 0.1])
+    f = lambda z: np.array([z[0] ** 2 - 0.3 * z[1], z[1] + 0.2 * z[0]])
+    slope = np.array([[2.0 * x[0], -0.3], [0.2, 1.0]])
+    search = _DeflatedNewton.__new__(_DeflatedNewton)
+    search._crossings = [a]
+    found = search._deflated(x, np.linalg.solve(slope, -f(x)))
+    away = x - a
+    square = away @ away
+    factor = 1.0 / square + 1.0
+    whole = factor * slope + np.outer(f(x), -2.0 * away / square**2)
+    expected = np.linalg.solve(whole, -factor * f(x))
+    np.testing.assert_allclose(found, expected * min(1.0, 0.1 / np.linalg.norm(expected)))

@@ -1,0 +1,374 @@
+"""Designs whose measures are formulas: optima, multipliers, costs and norms in closed form."""
+
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._push_off import push_off_work
+from jaxbiped.optimise import _certificate
+from jaxbiped.optimise._cycle_functionals import _totals, with_errors
+from jaxbiped.optimise._cycle_integrals import integrals_of
+from jaxbiped.optimise._design_problem import DesignProblem
+from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, _by_nominal, _together, ensemble_of
+from jaxbiped.optimise._evaluations import Evaluations
+from jaxbiped.optimise._jacobian_weights import leading_multipliers, weighed
+from jaxbiped.optimise._objectives import Evaluation, _cost_of_transport, _root_of_squares, _Row
+from jaxbiped.optimise._optimality import optimality_of
+from jaxbiped.optimise._requirements import requirements_of
+from jaxbiped.optimise._trust_region import run_trust_region
+from jaxbiped.optimise._variables import variables_of
+
+SCENE = jb.ladder()["rigid"]
+NAMES = jb.parameter_names(SCENE)
+
+
+def formulas(d, slope):
+    """Measures of a design; d and slope about 0.1 m and 0.02 rad."""
+    x, y = jnp.log(d / 0.1), jnp.log(slope / 0.02)
+    return {
+        "speed": 1.0 - (x - 0.2) ** 2 - 2.0 * (y - 0.1) ** 2,
+        "step_length": 0.2 + 0.1 * x + 0.05 * y,
+        "period": 0.5 + 0.1 * y,
+        "spectral_radius": 0.5 + x + 0.1 * y * y,
+        "modulus_2": 0.5 - x + 0.1 * y * y,
+        "modulus_3": 0.1 + 0.0 * x,
+    }
+
+
+_VALUES, _SLOPES = jax.jit(formulas), jax.jit(jax.jacfwd(formulas, argnums=(0, 1)))
+
+
+class Formulas(DesignProblem):
+    """A design problem that asks the formulas instead of a walker; error bars are a thousandth."""
+
+    def _follow(self, u):
+        values = self.variables.named(u)
+        if values["d"] > 0.19:
+            return None
+        at = values["d"], values.get("slope", 0.02)
+        known = {name: float(value) for name, value in _VALUES(*at).items()}
+        slopes = {name: np.zeros(len(NAMES)) for name in known}
+        for name, (by_d, by_slope) in _SLOPES(*at).items():
+            slopes[name][NAMES.index("d")] = by_d
+            slopes[name][NAMES.index("slope")] = by_slope
+        errors = {name: 1e-3 * abs(value) for name, value in known.items()}
+        small = {name: 1e-3 * np.abs(value) for name, value in slopes.items()}
+        nothing = np.zeros(4), np.zeros((4, len(NAMES)))
+        found = Evaluation(known, errors, slopes, small, *nothing)
+        self.evaluations.add(u, found)
+        return found
+
+
+def problem(vary, told, sense, subject_to=None):
+    scene = jb.with_parameters(SCENE, {"slope": 0.02})
+    made = Formulas(
+        scene, variables_of(scene, vary), told, sense, requirements_of(scene, subject_to),
+        GaitSettings(), Evaluations(None, {}),
+    )  # fmt: skip
+    made.at(np.full(len(vary), 0.4))
+    return made
+
+
+def optimum(made, iterations=60):
+    ended = run_trust_region(made, made.latest.u, iterations, lambda u: None)
+    designs = [each for each in made.asked if made.excess(each.known) <= 1e-6]
+    best = min(designs, key=lambda each: made.objective(each.known)[0])
+    return ended, best, made.variables.named(best.u)
+
+
+BOTH = {"d": (0.04, 0.2), "slope": (0.005, 0.08)}
+
+
+def test_an_upper_bound_holds_an_optimum_with_the_multiplier_of_lagrange():
+    """Maximise the speed where the step is at most 0.21 m: μ = 0.015/0.005625."""
+    made = problem(BOTH, {"speed": 1.0}, -1.0, "step_length<0.21")
+    ended, best, found = optimum(made)
+    assert ended.converged
+    mu = 0.015 / 0.005625
+    x, y = 0.2 - 0.05 * mu, 0.1 - 0.0125 * mu
+    assert np.log([found["d"] / 0.1, found["slope"] / 0.02]) == pytest.approx([x, y], abs=1e-4)
+    told = optimality_of(made, best)
+    (held,) = told.requirements
+    assert held.active
+    assert held.multiplier == pytest.approx(mu, rel=1e-3)
+    assert (held.bound, held.value) == (0.21, pytest.approx(0.21, abs=1e-6))
+    assert held.multiplier_error > 0.0
+    assert told.residual < 1e-3
+    # Moved along, the optimum's speed changes by what the multiplier says.
+    more = optimum(problem(BOTH, {"speed": 1.0}, -1.0, "step_length<0.211"))[1]
+    gained = more.known.values["speed"] - best.known.values["speed"]
+    assert gained / 0.001 == pytest.approx(mu, rel=0.15)
+
+
+@pytest.mark.parametrize(("high", "side"), [(0.1, 1.0), (0.18, None)])
+def test_a_variable_at_its_bound_is_held_by_it(high, side):
+    made = problem({"d": (0.04, high)}, {"speed": 1.0}, -1.0)
+    _, best, found = optimum(made)
+    told = optimality_of(made, best)
+    if side is None:
+        assert np.log(found["d"] / 0.1) == pytest.approx(0.2, abs=1e-4)
+        assert told.bounds == ()
+        return
+    (held,) = told.bounds
+    assert (held.name, held.value) == ("d", pytest.approx(0.1))
+    assert held.multiplier == pytest.approx(2.0 * 0.2 / 0.1, rel=1e-3)  # dv/dd
+
+
+def test_moduli_that_meet_make_a_corner_in_which_the_radius_is_least():
+    made = problem(BOTH, {"spectral_radius": 1.0}, 1.0)
+    optimum(made)
+    largest = min(max(each.known.values[name] for name in ("spectral_radius", "modulus_2"))
+                  for each in made.asked)  # fmt: skip
+    assert largest == pytest.approx(0.5, abs=1e-4)
+
+
+def test_requirements_that_are_missed_are_told_in_units_of_their_bounds():
+    made = problem(BOTH, {"speed": 1.0}, -1.0, {"step_length": (None, 0.1), "period": (0.6, 0.9)})
+    known = made.latest.known
+    over = (known.values["step_length"] - 0.1) / 0.1
+    under = (0.6 - known.values["period"]) / 0.6
+    assert made.excess(known) == pytest.approx(max(over, under))
+    assert over > 0.0 < under
+    assert made.allowance(known) == pytest.approx(0.01 * known.values["step_length"])
+    value, slopes, error = made.objective(known)
+    assert (value, error) == (-known.values["speed"], known.errors["speed"])
+    np.testing.assert_array_equal(slopes, -known.slopes["speed"])
+
+
+def test_gradients_are_differences_of_the_designs():
+    made = problem(BOTH | {"hip_mass": (0.0, 1.0)}, {"speed": 1.0}, 1.0)
+    u = np.array([0.3, 0.6, 0.5])
+    slopes = made.gradient(u, made.at(u).slopes["speed"])
+    h = 1e-6
+    for k in range(3):
+        ends = [made.at(u + s * h * np.eye(3)[k]).values["speed"] for s in (1.0, -1.0)]
+        assert slopes[k] == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-5, abs=1e-8)
+    values = made.variables.values(u)
+    np.testing.assert_allclose(made.variables.positions(values), u)
+
+
+def row(value, error=0.0, **slopes):
+    own = np.array([slopes.get(name, 0.0) for name in NAMES])
+    return _Row(value, error, own, 0.1 * np.abs(own))
+
+
+@pytest.mark.parametrize("driven", [False, True])
+def test_the_cost_of_transport_moves_with_all_that_it_is_made_of(driven):
+    """Works over (2 m + M) g L, by differences."""
+    base = dict(m=1.0, hip_mass=0.7, g=9.8, slope=0.02, d=0.1)
+    scene = jb.with_parameters(SCENE, base)
+    if driven:
+        push = jb.actuation.PushOff(0.1)
+        scene = jb.RigidScene(scene.walker, scene.ground, push)
+    names = jb.parameter_names(scene)
+    work = lambda p: 0.05 + 0.3 * p["d"] + 0.2 * p["m"]
+    length = lambda p: 0.2 + 0.4 * p["d"] + 3.0 * p["slope"] * (1.0 if not driven else 0.0)
+
+    def cost(p):
+        own = work(p) / ((2.0 * p["m"] + p["hip_mass"]) * p["g"] * length(p))
+        return own + (np.sin(p["slope"]) if driven else 0.0)
+
+    def as_row(function, error):
+        h = 1e-6
+        slopes = np.zeros(len(names))
+        for name in base:
+            up, down = (function(base | {name: base[name] + s * h}) for s in (1, -1))
+            slopes[names.index(name)] = (up - down) / (2 * h)
+        return _Row(function(base), error, slopes, 0.0 * slopes)
+
+    works = "motor_work" if driven else "impact_loss"
+    found = _cost_of_transport(
+        scene, {works: as_row(work, 1e-3), "step_length": as_row(length, 2e-3)}
+    )
+    expected = as_row(cost, 0.0)
+    assert found.value == pytest.approx(expected.value)
+    np.testing.assert_allclose(found.slopes, expected.slopes, rtol=1e-6, atol=1e-9)
+    share = 1e-3 / work(base) + 2e-3 / length(base)
+    own = cost(base) - (np.sin(0.02) if driven else 0.0)
+    assert found.error == pytest.approx(own * share)
+
+
+def test_a_root_of_squares_has_the_slopes_of_one():
+    found = _root_of_squares([row(3.0, 0.3, d=1.0, m=2.0), row(4.0, 0.1, d=-1.0)])
+    assert (found.value, found.error) == (5.0, pytest.approx(0.6 * 0.3 + 0.8 * 0.1))
+    assert found.slopes[NAMES.index("d")] == pytest.approx(0.6 - 0.8)
+    assert found.slopes[NAMES.index("m")] == pytest.approx(1.2)
+
+
+def member(speed, radius, d):
+    slopes = {"speed": row(0.0, d=d).slopes, "spectral_radius": row(0.0, d=-d).slopes}
+    values = {"speed": speed, "spectral_radius": radius}
+    nothing = np.zeros(4), np.zeros((4, len(NAMES)))
+    return Evaluation(values, dict(values), slopes, dict(slopes), *nothing)
+
+
+@pytest.mark.parametrize(
+    ("criterion", "speed", "radius"), [("mean", 2.0, 0.5), ("worst", 1.0, 0.7)]
+)
+def test_members_are_taken_together(criterion, speed, radius):
+    each = [member(1.0, 0.3, 1.0), member(3.0, 0.7, 3.0)]
+    larger = {"speed": False, "spectral_radius": True}
+    found = _together(Ensemble(("d",), np.ones((2, 1)), criterion, larger), each[0], each)
+    assert found.values == {"speed": speed, "spectral_radius": pytest.approx(radius)}
+    by_d = {name: slopes[NAMES.index("d")] for name, slopes in found.slopes.items()}
+    expected = (2.0, -2.0) if criterion == "mean" else (1.0, -3.0)
+    assert (by_d["speed"], by_d["spectral_radius"]) == expected
+
+
+def test_members_are_multiples_of_the_nominal_design():
+    ensemble = ensemble_of(SCENE, {"d": 0.1, "m": 0.3}, 64, "mean", {}, 0)
+    assert ensemble.factors.min(axis=0) == pytest.approx([0.9, 0.7], abs=0.02)
+    assert ensemble.factors.max(axis=0) == pytest.approx([1.1, 1.3], abs=0.02)
+    places = [NAMES.index("d"), NAMES.index("m")]
+    found = _by_nominal(member(1.0, 0.3, 2.0), np.array([0.9, 1.2]), places)
+    assert found.slopes["speed"][NAMES.index("d")] == pytest.approx(1.8)
+
+
+def test_functionals_carry_the_change_by_the_looser_solve():
+    values, slopes = np.array([[1.0, 2.0], [1.1, 2.0]]), np.array([[[3.0]], [[2.5]]])
+    found = with_errors(values, slopes, np.zeros(2, int))
+    np.testing.assert_allclose(found.errors, [0.1, 0.0], atol=1e-12)
+    np.testing.assert_allclose(found.slope_errors, [[0.5]])
+    assert np.isnan(with_errors(values, slopes, np.array([0, 3])).values).all()
+
+
+class Return(NamedTuple):
+    """What of a linearised return totals are made of."""
+
+    recurring: Scalar
+    jacobian: Scalar
+    advance: Scalar
+    advance_rows: Scalar
+    period_row: Scalar
+    peak: Scalar
+    peak_row: Scalar
+    grazes: Scalar
+
+
+def test_totals_are_those_of_the_fixed_point():
+    """Of x → x/2 + 1, with the integrals 3 x and 5, seen from x = 2 − 0.1."""
+    x = 1.9
+    once = Return(
+        recurring=jnp.array([0.5 * x + 1.0]),
+        jacobian=jnp.array([[0.5, 0.25]]),
+        advance=jnp.array([9.0, 3.0 * x, 5.0]),
+        advance_rows=jnp.array([[0.0, 0.0], [3.0, 1.0], [0.0, 0.0]]),
+        period_row=jnp.zeros(2),
+        peak=jnp.asarray(0.1 * x),
+        peak_row=jnp.array([0.1, 0.2]),
+        grazes=jnp.asarray(0),
+    )
+    values, slopes = jax.jit(_totals)(once, jnp.array([x]))
+    np.testing.assert_allclose(values, [6.0, 5.0, -0.2])
+    np.testing.assert_allclose(slopes[:, 0], [1.0 + 3.0 * 0.5, 0.0, -(0.2 + 0.1 * 0.5)])
+
+
+def test_functionals_of_a_jacobian_and_their_weights():
+    """Moduli, the norm of summed responses, and all derivatives by differences."""
+    random = np.random.default_rng(3)
+    rows = 0.35 * random.standard_normal((6, 4))
+    own, length = rows[2:], np.array([0.4, 0.9])
+    leading = leading_multipliers(jnp.asarray(own))
+    sizes = np.sort(np.unique(np.abs(np.linalg.eigvals(own)).round(10)))[::-1]
+    np.testing.assert_allclose(np.abs(leading)[: len(sizes)], sizes[:3], rtol=1e-8)
+    names = ("spectral_radius", "modulus_2", "sensitivity_norm", "clearance_sensitivity")
+
+    @jax.jit
+    def told(rows, length):
+        return [tuple(weighed(n, None, rows, length, leading)) for n in names]
+
+    def values(rows, length):
+        return np.array([float(each[0]) for each in told(rows, length)])
+
+    powers = [np.linalg.matrix_power(own, n)[:, 0] for n in range(400)]
+    push = np.sqrt(sum(np.sum((rows[:2] / length[:, None] @ p) ** 2) for p in powers))
+    foot = np.sqrt(sum((rows[1] @ p) ** 2 for p in powers))
+    np.testing.assert_allclose(values(rows, length), [*sizes[:2], push, foot], rtol=1e-9)
+    h = 1e-6
+    for number, each in enumerate(told(rows, length)):
+        along = random.standard_normal(rows.shape)
+        ends = [values(rows + s * h * along, length)[number] for s in (1.0, -1.0)]
+        slope = float(np.sum(np.asarray(each[1]) * along))
+        assert slope == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-6), names[number]
+        ends = [values(rows, length + s * h * np.array([1.0, 0.5]))[number] for s in (1.0, -1.0)]
+        slope = float(np.asarray(each[3]) @ [1.0, 0.5])
+        assert slope == pytest.approx((ends[0] - ends[1]) / (2 * h), rel=1e-6, abs=1e-9)
+
+
+def test_integrals_of_a_cycle_gain_what_their_powers_say():
+    scene = jb.seed_scene()
+    system = integrals_of(scene)
+    state = jb.seed_state()._replace(hip_z=jnp.asarray(0.3948), hip_vx=jnp.asarray(-0.4))
+
+    @jax.jit
+    def fields(y):
+        rates = system.vector_field(0.0, system.begin(y), scene)
+        return rates, jb.dynamics.powers(scene, y), jb.dynamics.feet(scene, y)
+
+    rates, power, both = fields(state)
+    touching = float(both.foot_2.penetration) > 0.0 and bool(both.foot_2.admitted)
+    assert touching
+    assert float(both.foot_2.slip_speed) < 0.0
+    assert float(rates.slip_distance) == pytest.approx(-float(both.foot_2.slip_speed))
+    assert float(rates.friction_loss) == pytest.approx(float(power.friction))
+    assert float(rates.friction_loss) > 0.0
+    assert float(rates.impact_loss) == pytest.approx(float(power.indentation))
+
+
+def test_an_impact_loses_the_energy_that_is_missing_after_it_and_the_push_off():
+    walker = jb.Walker(m=1.0, J=0.01, l=0.4, d=0.1, r=0.08, hip_mass=0.5)
+    push, spring = jb.actuation.PushOff(0.2), jb.actuation.HipSpring(1.0)
+    scene = jb.RigidScene(walker, jb.Ground(0.02), (push, spring))
+    system = integrals_of(scene)
+    state = jb.dynamics.RigidState(*map(jnp.asarray, (0.0, 0.3, -0.3, -1.0, -1.8)))
+
+    @jax.jit
+    def run(state):
+        after = system.reset_map(scene, system.begin(state))
+        struck = jb.dynamics.impact(scene, state).state
+        return after, [kinetic(scene, each) for each in (state, struck)]
+
+    after, (before, rest) = run(state)
+    given = float(push_off_work(scene, state))
+    assert given > 0.0
+    assert float(after.impact_loss) == pytest.approx(float(before) + given - float(rest))
+    assert float(after.motor_work) == pytest.approx(given)
+
+
+def kinetic(scene, state):
+    """From the velocities of the three masses."""
+    walker, whole = scene.walker, jb.dynamics.whole_state(scene, state)
+    total = 0.5 * walker.hip_mass * (whole.hip_vx**2 + whole.hip_vz**2)
+    for angle, rate in ((whole.theta_1, whole.omega_1), (whole.theta_2, whole.omega_2)):
+        vx = whole.hip_vx + walker.d * jnp.cos(angle) * rate
+        vz = whole.hip_vz + walker.d * jnp.sin(angle) * rate
+        total = total + 0.5 * walker.m * (vx**2 + vz**2) + 0.5 * walker.J * rate**2
+    return total
+
+
+@pytest.mark.parametrize(("last", "count", "returned"), [
+    (0.50004, 20, True), (0.5002, 20, False), (0.50004, 10, False),
+])  # fmt: skip
+def test_a_pushed_walk_returns_to_the_gait_or_does_not(last, count, returned, monkeypatch):
+    asked = {}
+
+    def walk(scene, state, **options):
+        asked.update(options, state=state)
+        times = np.full(20, np.inf)
+        times[:count] = np.append(0.5 * np.arange(count - 1), 0.5 * (count - 2) + last)
+        return SimpleNamespace(arrivals=SimpleNamespace(t=times))
+
+    monkeypatch.setattr(_certificate, "rigid_walk", walk)
+    state = jb.dynamics.RigidState(1.0, 0.2, 0.3, -1.0, -2.0)
+    gait = SimpleNamespace(measures=SimpleNamespace(state=state, period=0.5))
+    found = _certificate._walk(SCENE, gait, 20, 0.01)
+    assert found.returned is returned
+    assert found.period_difference == pytest.approx(last / 0.5 - 1.0)
+    assert (found.footsteps, found.asked) == (count, 20)
+    np.testing.assert_allclose(asked["state"], [1.0, 0.2, 0.3, -1.01, -2.02])
