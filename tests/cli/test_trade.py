@@ -14,7 +14,7 @@ def _run(*arguments):
     return stopped.value.code
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_errors_and_costs_of_the_named_accuracies(capsys, tmp_path):
     made = tmp_path / "made"
     with saved_figures() as figures:

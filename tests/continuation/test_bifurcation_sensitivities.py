@@ -62,4 +62,4 @@ def test_what_is_not_allowed_is_one_sentence():
     # A gait far from any bifurcation is none.
     elsewhere = doubling._replace(point=branch.points[0])
     with pytest.raises(jb.ArgumentError, match="not the gait's largest"):
-        bifurcation_sensitivities(branch, elsewhere, ("r",))
+        bifurcation_sensitivities(branch, elsewhere, ("r", "J", "d"))

@@ -188,13 +188,8 @@ def test_at_strength_zero_rigid_walks_are_the_passive_ones():
 
 @pytest.mark.slow
 def test_at_strength_zero_compliant_walks_are_the_passive_ones():
-    """In steps of one size to rounding; in chosen ones, over a heel strike, to their tolerance."""
+    """Over a heel strike, to the tolerance of steps that the solver chooses."""
     passive = dataclasses.replace(DRIVEN, actuation=None)
-    options = dict(duration=0.3, dt=2e-5, engine="xla", save="end", max_solver_steps=16384)
-    ends = [
-        jb.simulate(scene, jb.seed_state(), **options).final for scene in (_idle(DRIVEN), passive)
-    ]
-    np.testing.assert_allclose(np.array(ends[0]), np.array(ends[1]), rtol=1e-9, atol=1e-11)
     options = dict(duration=0.42, accuracy="tight", engine="lanes", save="end")
     ends = [
         jb.simulate(scene, jb.seed_state(), **options).final for scene in (_idle(DRIVEN), passive)
@@ -220,10 +215,6 @@ def test_both_engines_walk_alike():
         for engine in ("xla", "lanes")
     )
     np.testing.assert_allclose(np.array(one.final), np.array(other.final), rtol=1e-6, atol=1e-8)
-    redundant = jb.RedundantScene(DRIVEN)
-    held = jb.simulate(redundant, jb.seed_state(), engine="xla", **options)
-    final = jb.dynamics.minimal_state(redundant, held.final)
-    np.testing.assert_allclose(np.array(final), np.array(other.final), rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("scene", [DRIVEN, RIGID], ids=["compliant", "rigid"])

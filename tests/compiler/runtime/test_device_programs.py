@@ -9,7 +9,8 @@ from tests.compiler.assembler import assembled
 from tests.compiler.device_programs import CASES
 from tests.compiler.fake_driver import install
 
-pytestmark = pytest.mark.slow
+LANDING = ("end", "steps", "labels", "rigid")
+"""One of each engine's programs that a change waits for; the others are run at night."""
 MOST = {
     "end": (255, 600, 872),
     "steps": (255, 588, 804),
@@ -27,7 +28,13 @@ _SLACK = 1.25
 """For other devices, and other versions of LLVM and of the assembler."""
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name in LANDING else pytest.mark.nightly)
+        for name in CASES
+    ],
+)
 def test_lanes_bits_and_registers(monkeypatch, name):
     fake = install(monkeypatch, lanes=4, multiprocessors=1)
     found, expected = CASES[name]("cuda"), CASES[name]("lanes")
