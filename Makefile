@@ -16,7 +16,7 @@ ONLY ?= $(EXPERIMENTS)
 # Which of the nightly tests `make nightly` runs: of N parts the one whose number is I modulo N.
 SHARE := 0/1
 
-.PHONY: walk gait check test nightly mutants lint types docs dist notebooks figures clean
+.PHONY: walk gait check test nightly mutants unit landing lint types docs dist notebooks figures clean
 
 walk: $(VENV)/.installed
 	$(BIN)/jaxbiped walk --out $(OUT)
@@ -25,11 +25,18 @@ walk: $(VENV)/.installed
 gait: $(VENV)/.installed
 	$(BIN)/jaxbiped gait --out out/gait
 
-# Lint, types and the unit tests; docs/testing.md says which tests these are.
-check: lint types
+# Lint, types and the unit tests; docs/testing.md says which tests these are. What takes a core alone
+# for half a minute, types, goes beside the tests.
+check: lint
+	$(MAKE) --no-print-directory --jobs 2 types unit
+
+test: lint
+	$(MAKE) --no-print-directory --jobs 2 types landing
+
+unit: $(VENV)/.installed-dev
 	$(PYTEST) -m "not slow and not nightly"
 
-test: lint types
+landing: $(VENV)/.installed-dev
 	$(PYTEST) -m "not nightly"
 
 # Experiments, notebooks, the site: all of them, or by `make nightly SHARE=3/6` a part.
