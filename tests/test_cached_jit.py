@@ -1,4 +1,4 @@
-"""Compiled once for all processes: what is kept, found again, and left to each process."""
+"""Compiled once for all processes, against the function: what is kept and found again."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What the process keeps: within its bounds, gone when told so, and without a trace in results."""
+"""What the process keeps, against its bounds; it leaves no trace in results."""
 
 import concurrent.futures
 import contextlib

@@ -1,4 +1,4 @@
-"""The renames that the changelog lists: the new names are there, the old ones are gone."""
+"""The renames of the changelog, against the package: new names there, old ones gone."""
 
 import inspect
 import re

@@ -1,4 +1,4 @@
-"""Bad arguments: one clear sentence that names the argument, its value and what is allowed."""
+"""Bad arguments, against one clear sentence: the argument, its value and what is allowed."""
 
 import errno
 import os

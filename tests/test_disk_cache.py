@@ -1,4 +1,4 @@
-"""The cache on disk: whole or not at all, within its bound, and never what others wrote."""
+"""The cache on disk, against damage and kills: whole or not at all, within its bound."""
 
 import os
 import random

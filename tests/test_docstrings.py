@@ -1,4 +1,4 @@
-"""Docstrings of the public names: complete, and their examples true."""
+"""Docstrings of the public names, against signatures and what their examples print."""
 
 import ast
 import dataclasses

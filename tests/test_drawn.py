@@ -1,4 +1,4 @@
-"""What the tests' own look at figures refuses."""
+"""The tests' own look at figures, against figures with one thing wrong."""
 
 import numpy as np
 import pytest

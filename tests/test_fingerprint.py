@@ -1,4 +1,4 @@
-"""Fingerprints: the same in every process, others for whatever could mean something else."""
+"""Fingerprints, against whatever could mean something else; the same in every process."""
 
 import dataclasses
 import functools

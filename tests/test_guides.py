@@ -1,4 +1,4 @@
-"""The guides: their blocks of Python run as printed, and what they name and link to exists."""
+"""The guides, against what their blocks of Python print and what they link to."""
 
 import ast
 import json

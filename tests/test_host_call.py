@@ -1,4 +1,4 @@
-"""Host calls: functions of NumPy arrays that compiled programs call by a key."""
+"""Host calls, against the functions of NumPy arrays that they call."""
 
 import functools
 import gc

@@ -1,4 +1,4 @@
-"""What importing jaxbiped costs, and what comes of it: nothing waits for what it does without."""
+"""What importing jaxbiped costs, against what it does without: no JAX, no backend."""
 
 import ast
 import json

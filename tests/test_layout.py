@@ -1,4 +1,4 @@
-"""The house rules that a program can check."""
+"""The code, against the house rules that a program can check."""
 
 import ast
 
@@ -50,6 +50,15 @@ def test_public_names_have_docstrings():
         thing = getattr(jb, name)
         if callable(thing):
             assert thing.__doc__, name
+
+
+def test_every_test_file_says_against_what_it_holds_things():
+    without = []
+    for path in sorted((PACKAGE.parent / "tests").rglob("test_*.py")):
+        said = ast.get_docstring(ast.parse(path.read_text())) or ""
+        if " against " not in said.partition("\n")[0]:
+            without.append(path.name)
+    assert without == []
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))

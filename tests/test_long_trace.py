@@ -1,4 +1,4 @@
-"""Long traces: the collector rests, spells are long, and both are left as they were found."""
+"""Long traces, against the collector's state before and after."""
 
 import gc
 import sys

@@ -1,4 +1,4 @@
-"""Every notebook runs at a small size, and is kept with the outputs of a run at full size."""
+"""Every notebook, against a run at a small size and outputs of one at full size."""
 
 import re
 from pathlib import Path

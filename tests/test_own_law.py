@@ -1,4 +1,4 @@
-"""A law of the user's own shows what its parameters are everywhere, without any table."""
+"""A law of the user's own, against what the package's laws show without any table."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""The package as it is published: one version, one list of requirements, its wheel."""
+"""The package as it is published, against one version and one list of requirements."""
 
 import hashlib
 import json

@@ -1,4 +1,4 @@
-"""Parameters carry words, unit and range; checks, docstrings and the laws' own powers agree."""
+"""Parameters with words, unit and range, against checks, docstrings and the laws' powers."""
 
 import inspect
 import re

@@ -1,4 +1,4 @@
-"""Progress lines on stderr."""
+"""Progress lines on stderr, against what takes long and what is no command."""
 
 import subprocess
 import sys

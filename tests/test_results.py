@@ -1,4 +1,4 @@
-"""What the pages quote of the experiments is what the files of their results say."""
+"""What the pages quote of the experiments, against the files of their results."""
 
 import importlib.util
 import json

@@ -1,4 +1,4 @@
-"""Summaries: what a result prints."""
+"""Summaries, against the walks, batches and sizes that they tell of."""
 
 import jax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""Several threads at once get the bits of single calls, whatever another one clears."""
+"""Several threads at once, against the bits of single calls, whatever another one clears."""
 
 import concurrent.futures
 import threading

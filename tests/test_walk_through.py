@@ -1,4 +1,4 @@
-"""The walk-through of CONTRIBUTING, followed to the letter in a copy of the project."""
+"""The walk-through of CONTRIBUTING, against a copy of the project that follows it."""
 
 import os
 import re

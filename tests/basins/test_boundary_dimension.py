@@ -1,4 +1,4 @@
-"""Box-counting dimensions of boundaries whose dimension is known."""
+"""Box-counting dimensions, against boundaries whose dimension is known."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Errors of labels, by capture and recapture of what both witnesses saw."""
+"""Errors of labels by capture and recapture, against made-up labels whose errors are known."""
 
 import warnings
 

@@ -1,4 +1,4 @@
-"""The uncertainty exponent of boundaries whose dimension is known."""
+"""The uncertainty exponent, against boundaries whose dimension is known."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The flags that drive a walker."""
+"""The flags that drive a walker, against the functions of the package on the same scene."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""`jaxbiped basin` as a user meets it."""
+"""`jaxbiped basin` as a user meets it, against its own stores, counts and refusals."""
 
 import errno
 import json

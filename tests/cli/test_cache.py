@@ -1,4 +1,4 @@
-"""The command cache: what is kept on disk, and gone where that is wanted."""
+"""The command cache, against the folder: what is kept on disk, and gone where that is wanted."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What options choose from without JAX is what the registries hold."""
+"""What options choose from without JAX, against what the registries hold."""
 
 import inspect
 import subprocess

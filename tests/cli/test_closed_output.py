@@ -1,4 +1,4 @@
-"""Closed output: a reader that has gone, as `head` has, ends a command without a traceback."""
+"""Closed output, against what `head` does: a reader that has gone ends a command quietly."""
 
 import subprocess
 import sys

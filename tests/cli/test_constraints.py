@@ -1,4 +1,4 @@
-"""`jaxbiped constraints`, and the flags that choose a formulation."""
+"""`jaxbiped constraints` and the flags of formulations, against the methods' own properties."""
 
 import json
 

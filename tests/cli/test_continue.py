@@ -1,4 +1,4 @@
-"""`jaxbiped continue` as a user meets it."""
+"""`jaxbiped continue` as a user meets it, against the branch's own numbers."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Where a command starts that was not told otherwise."""
+"""Where a command starts that was not told otherwise, against the seed's own start."""
 
 import dataclasses
 

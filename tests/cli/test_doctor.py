@@ -1,4 +1,4 @@
-"""The command doctor: it tells what is installed, and what is wrong with it."""
+"""The command doctor, against installations with one thing wrong."""
 
 import json
 

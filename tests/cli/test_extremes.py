@@ -1,4 +1,4 @@
-"""`jaxbiped extremes`."""
+"""`jaxbiped extremes`, against the catalogue's counts."""
 
 import json
 

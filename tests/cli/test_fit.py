@@ -1,4 +1,4 @@
-"""`jaxbiped fit`."""
+"""`jaxbiped fit`, against the parameters that its measurements were made with."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""`jaxbiped gait` as a user meets it."""
+"""`jaxbiped gait` as a user meets it, against the seed's published gait."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""Commands killed at random while they share one cache on disk, garbage written into it meanwhile.
+"""Commands killed at random while one cache is spoilt, against the same commands left alone.
 
 With so many processes that all begin at once: `python -m tests.cli.test_killed_commands 200`. They
 take some 15 GB of memory and a quarter of an hour on two cores.

@@ -1,4 +1,4 @@
-"""`jaxbiped models`, and the flags that choose a model."""
+"""`jaxbiped models` and the flags of models, against the registries and their scenes."""
 
 import inspect
 import json

@@ -1,4 +1,4 @@
-"""`jaxbiped optimise`: its JSON, its tables and its refusals."""
+"""`jaxbiped optimise`, against its tables and JSON; each refusal is one sentence."""
 
 import json
 

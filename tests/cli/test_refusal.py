@@ -1,4 +1,4 @@
-"""What the command line refuses is one sentence on stderr, with exit code 2."""
+"""What the command line refuses, against one sentence on stderr and exit code 2."""
 
 import pytest
 

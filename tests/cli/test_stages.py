@@ -1,4 +1,4 @@
-"""What takes long in a command has a word for it."""
+"""What takes long in a command, against the word that names it."""
 
 import contextlib
 import importlib

@@ -1,4 +1,4 @@
-"""`jaxbiped trade`."""
+"""`jaxbiped trade`, against errors that fall with the tolerance."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""`jaxbiped walk` as a user meets it."""
+"""`jaxbiped walk` as a user meets it, against the published walk."""
 
 import json
 import re

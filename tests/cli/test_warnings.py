@@ -1,4 +1,4 @@
-"""What `jaxbiped walk` warns of."""
+"""What `jaxbiped walk` warns of, against walks that have it."""
 
 import json
 import math

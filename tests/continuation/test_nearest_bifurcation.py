@@ -1,4 +1,4 @@
-"""The nearest bifurcation of a gait."""
+"""The nearest bifurcation of a gait, against that of the whole branch."""
 
 import pytest
 

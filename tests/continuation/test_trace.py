@@ -1,4 +1,4 @@
-"""Branches of maps whose bifurcations are known in closed form."""
+"""Branches of maps, against bifurcations that are known in closed form."""
 
 import numpy as np
 import pytest

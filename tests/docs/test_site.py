@@ -1,4 +1,4 @@
-"""The documentation site builds without a warning and has every public name and page."""
+"""The documentation site, against every public name and page, and in a browser."""
 
 import functools
 import subprocess

@@ -1,4 +1,4 @@
-"""Starts put on their constraints, and projections as derivatives see them."""
+"""Starts put on their constraints, against the constraints and difference quotients."""
 
 import jax
 import jax.numpy as jnp

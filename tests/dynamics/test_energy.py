@@ -1,4 +1,4 @@
-"""Energies and powers: each power is the rate of change that it claims to be."""
+"""Energies and powers, against the rate of change that each power claims to be."""
 
 import jax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""Coverage of error bars, at the experiment's quick size."""
+"""Coverage of error bars, at its quick size, against far finer solves."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The seed's basin, at the experiment's quick size."""
+"""The seed's basin, at its quick size, against Wilson's intervals and two kinds of normals."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The simplest walker's basin, at the experiment's quick size."""
+"""The simplest walker's basin, at its quick size, against equations of its own."""
 
 import pytest
 

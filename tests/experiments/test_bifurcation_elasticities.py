@@ -1,4 +1,4 @@
-"""Elasticities of a critical slope, at the experiment's quick size."""
+"""Elasticities of a critical slope, at the quick size, against differences."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Costs and errors of constraint methods, at the experiment's quick size."""
+"""Costs and errors of constraint methods, at the quick size, against the minimal one."""
 
 import numpy as np
 import pytest

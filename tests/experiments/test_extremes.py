@@ -1,4 +1,4 @@
-"""Extremes, at the experiment's quick size."""
+"""Extremes, at the quick size, against the check's own precise solves."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Comparison of contact laws, at the experiment's quick size."""
+"""Comparison of contact laws, at its quick size, against walks that settle."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Speed of devices, at the experiment's quick size: without one, and on an emulated one."""
+"""Speed of devices, at its quick size, against lanes' bits on an emulated one."""
 
 import pytest
 

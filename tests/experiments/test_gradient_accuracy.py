@@ -1,4 +1,4 @@
-"""Accuracy of derivatives, at the experiment's quick size."""
+"""Accuracy of derivatives, at its quick size, against a reference far finer."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What gradients cost, at the experiment's quick size."""
+"""What gradients cost, at its quick size, against the solves that differences would take."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""`experiments/identify.py` at its quick size."""
+"""Estimates of parameters, at the quick size, against the truth their data were made of."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Branches along K, c and ξ, at the experiment's quick size."""
+"""Branches along K, c and ξ, at the quick size, against each other and their curves."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Accuracy of labels, at the experiment's quick size."""
+"""Accuracy of labels, at the quick size, against labels of tighter solves."""
 
 import pytest
 

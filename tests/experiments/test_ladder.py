@@ -1,4 +1,4 @@
-"""The ladder of fidelity, at the experiment's quick size."""
+"""The ladder of fidelity, at its quick size, against the rigid limit."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Speed of both engines, at the experiment's quick size."""
+"""Speed of both engines, at its quick size, against results that must be right."""
 
 import pytest
 

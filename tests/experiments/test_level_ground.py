@@ -1,4 +1,4 @@
-"""Walking on level ground, at the experiment's quick size."""
+"""Walking on level ground, at its quick size, against its costs and checks."""
 
 import numpy as np
 import pytest

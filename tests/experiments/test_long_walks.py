@@ -1,4 +1,4 @@
-"""Long walks, at the experiment's quick size."""
+"""Long walks, at the quick size, against the gait that they stay on."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Robust designs and the front of speed and radius, at the experiment's quick size."""
+"""Robust designs and the front, at the quick size, against the design for one scene."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The fastest gait and the calmest one, at the experiment's quick size."""
+"""The fastest gait and the calmest one, at the quick size, against the seed's."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The paper's figures 11 to 17, at the experiment's quick size."""
+"""The paper's figures 11 to 17, at the quick size, against what the paper says."""
 
 import pytest
 

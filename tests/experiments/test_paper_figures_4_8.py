@@ -1,4 +1,4 @@
-"""The paper's figures 4 to 8, at the experiment's quick size."""
+"""The paper's figures 4 to 8, at the quick size, against published numbers."""
 
 import pytest
 from PIL import Image

@@ -1,4 +1,4 @@
-"""Period doublings, at the experiment's quick size."""
+"""Period doublings, at the quick size, against published gaits and Feigenbaum's cascade."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Sweeps by one worker process and by two, at the experiment's quick size."""
+"""Sweeps by two worker processes, at the quick size, against the labels of one."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The map of the spectral radius, at the experiment's quick size."""
+"""The map of the spectral radius, at its quick size, against the seed's own."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Reproducibility by widths of vectors, batches, threads and engines, at its quick size."""
+"""Reproducibility, at its quick size, against bits and a start one ulp away."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Robustness of the search for gaits, at the experiment's quick size."""
+"""Robustness of the search, at its quick size, against walks that settle."""
 
 import numpy as np
 import pytest

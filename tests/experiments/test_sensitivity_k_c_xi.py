@@ -1,4 +1,4 @@
-"""Sensitivity to K, c and xi, at the experiment's quick size."""
+"""Sensitivity to K, c and xi, at its quick size, against the seed's elasticities."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The seed's branch along the slope, at the experiment's quick size."""
+"""The seed's branch along the slope, at its quick size, against bisection."""
 
 import pytest
 

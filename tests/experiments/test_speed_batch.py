@@ -1,4 +1,4 @@
-"""Speed of batches, at the experiment's quick size."""
+"""Speed of batches, at its quick size, against every lane's arrival."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Speed of single simulations, at the experiment's quick size."""
+"""Speed of single simulations, at its quick size, against an independent solve."""
 
 import numpy as np
 import pytest

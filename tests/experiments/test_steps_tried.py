@@ -1,4 +1,4 @@
-"""Methods at equal error, at the experiment's quick size."""
+"""Methods, at the quick size, against each other's steps at equal error."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A killed sweep continued, at the experiment's quick size."""
+"""A killed sweep continued, at its quick size, against the labels of one in memory."""
 
 import pytest
 

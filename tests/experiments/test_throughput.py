@@ -1,4 +1,4 @@
-"""Labelled starts a second, at the experiment's quick size."""
+"""Labelled starts a second, at the quick size, against fates by SciPy and by peers."""
 
 import pytest
 

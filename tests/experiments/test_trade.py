@@ -1,4 +1,4 @@
-"""Work and precision, at the experiment's quick size."""
+"""Work and precision, at the quick size, against independent references."""
 
 import json
 

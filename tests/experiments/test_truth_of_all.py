@@ -1,4 +1,4 @@
-"""The one command over both truths: its table, its versions and the files it leaves."""
+"""The one command over both truths, against the rows that it was given."""
 
 import importlib.util
 import json

@@ -1,4 +1,4 @@
-"""Precise solve of the check: closed forms, SciPy's solves, and what rounding takes from these."""
+"""Precise solve of the check, against closed forms and SciPy's solves, and rounding."""
 
 import dataclasses
 

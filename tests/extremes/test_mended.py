@@ -1,4 +1,4 @@
-"""What the extremes broke: errors without a sign, and a traceback."""
+"""What the extremes broke, against what was expected: errors with a sign, no traceback."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Study of cases: its store, its counts and the catalogue."""
+"""Study of cases, against the catalogue: its store and its counts."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Verdicts on extreme cases: each kind is given where it is due."""
+"""Verdicts on extreme cases, against cases where each kind is due."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Gaits to a wanted accuracy."""
+"""Gaits to a wanted accuracy, against finer solves by another method."""
 
 import numpy as np
 import pytest

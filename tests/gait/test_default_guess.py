@@ -1,4 +1,4 @@
-"""The start without a guess fits the walker's size."""
+"""The start without a guess, against walkers of any size."""
 
 import numpy as np
 import pytest

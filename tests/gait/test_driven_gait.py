@@ -1,4 +1,4 @@
-"""Gaits of driven walkers: sensitivities to their actuators, and level ground."""
+"""Gaits of driven walkers, against difference quotients and the balance of energy."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Explanation of a search: what is said of a gait that grazes a switch."""
+"""Explanation of a search, against a gait that grazes a switch."""
 
 import warnings
 

@@ -1,4 +1,4 @@
-"""Gaits found from many starts at once, and told apart."""
+"""Gaits found from many starts at once, against a stable and an unstable one."""
 
 import jax
 import jax.numpy as jnp

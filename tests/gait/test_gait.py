@@ -1,4 +1,4 @@
-"""The seed's gait: its measures, its stability and what a search costs."""
+"""The seed's gait, against published measures and differences; what a search costs."""
 
 import equinox as eqx
 import jax

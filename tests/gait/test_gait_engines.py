@@ -1,4 +1,4 @@
-"""The same gait from both engines."""
+"""The same gait from both engines, against each other."""
 
 import functools
 

@@ -1,4 +1,4 @@
-"""Gait measures: all gradient modes agree."""
+"""Gait measures: all gradient modes, against each other."""
 
 import jax
 import jax.numpy as jnp

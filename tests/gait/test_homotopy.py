@@ -1,4 +1,4 @@
-"""The line of parameters from the seed's scene to another."""
+"""The line of parameters from the seed's scene to another, against its two ends."""
 
 import jax
 import jax.numpy as jnp

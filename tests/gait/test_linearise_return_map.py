@@ -1,4 +1,4 @@
-"""Linearised return map: a damped oscillator's, whose derivatives are known in closed form."""
+"""Linearised return map, against a damped oscillator's closed form."""
 
 import math
 from typing import Any, NamedTuple

@@ -1,4 +1,4 @@
-"""The periodic gait found in redundant coordinates is the minimal one."""
+"""The periodic gait in redundant coordinates, against the minimal one."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Analytic truths: an oscillator, a bouncing ball with drag, van der Pol's orbit."""
+"""Return maps, against an oscillator, a bouncing ball with drag and van der Pol's orbit."""
 
 import functools
 import math

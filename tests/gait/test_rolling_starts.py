@@ -1,4 +1,4 @@
-"""Scattered starts whose stance foot rolls."""
+"""Scattered starts, against rolling without slip of the stance foot."""
 
 import numpy as np
 import pytest

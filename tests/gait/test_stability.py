@@ -1,4 +1,4 @@
-"""Multipliers and bifurcations of monodromy matrices that are known beforehand."""
+"""Multipliers and bifurcations, against monodromy matrices that are known beforehand."""
 
 import jax.numpy as jnp
 import numpy as np

@@ -1,4 +1,4 @@
-"""The search without a guess: what it finds, by which stage, and what it says of failure."""
+"""The search without a guess, against walks that settle and gaits that are known."""
 
 import equinox as eqx
 import jax

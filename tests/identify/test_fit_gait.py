@@ -1,4 +1,4 @@
-"""Parameters found again in gaits that were made from them."""
+"""Parameters found again, against those that the gaits were made from."""
 
 import jax.numpy as jnp
 import numpy as np

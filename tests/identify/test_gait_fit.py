@@ -1,4 +1,4 @@
-"""What residuals tell of parameters."""
+"""What residuals tell of parameters, against linear least squares."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Measured gaits, made and read."""
+"""Measured gaits, against the file that they are read from."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The unrolled inverse: equal to a dense solve, whatever entries are left out."""
+"""The unrolled inverse, against a dense solve, whatever entries are left out."""
 
 import jax
 import jax.numpy as jnp

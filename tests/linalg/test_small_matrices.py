@@ -1,4 +1,4 @@
-"""Small dense matrices, one after the other."""
+"""Small dense matrices, against NumPy's linear algebra."""
 
 import jax
 import jax.numpy as jnp

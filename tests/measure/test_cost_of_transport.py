@@ -1,4 +1,4 @@
-"""Works of actuators in the ledgers, and the cost of transport."""
+"""Works of actuators and the cost of transport, against ledgers that close."""
 
 import dataclasses
 

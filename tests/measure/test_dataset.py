@@ -1,4 +1,4 @@
-"""A trajectory as a labelled dataset."""
+"""A trajectory as a labelled dataset, against the trajectory."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""The energy ledger closes, and tells an honest solve from a sloppy one."""
+"""The energy ledger, against conservation: it closes, and tells a sloppy solve."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a scene does not use is not there: operations of compiled vector fields, by scene."""
+"""Operations of compiled vector fields, against scenes with less in them."""
 
 import dataclasses
 import re

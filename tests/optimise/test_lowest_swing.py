@@ -1,4 +1,4 @@
-"""The response of foot clearance, against walks that are pushed, and on ground that has a step."""
+"""The response of foot clearance, against walks that are pushed or meet a step."""
 
 import jax.numpy as jnp
 import numpy as np

@@ -1,4 +1,4 @@
-"""Robust design: measures over an ensemble and their gradients; the front of two measures."""
+"""Robust design, against measures of its members one by one; the front of two measures."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What holds for every figure."""
+"""What holds for every figure, against units, labels and the axes' limits."""
 
 import dataclasses
 import subprocess

@@ -1,4 +1,4 @@
-"""Animations: frames, players and slow motion."""
+"""Animations, against frames, players and slow motion that were asked for."""
 
 import numpy as np
 import pytest

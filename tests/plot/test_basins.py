@@ -1,4 +1,4 @@
-"""Figures of basins, from labels made by hand."""
+"""Figures of basins, against labels made by hand."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Figures of branches, from branches made by hand: nothing is compiled."""
+"""Figures of branches, against branches made by hand: nothing is compiled."""
 
 import numpy as np
 import pytest

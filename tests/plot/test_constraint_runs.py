@@ -1,4 +1,4 @@
-"""The picture of constraint methods, from runs made by hand."""
+"""The picture of constraint methods, against runs made by hand."""
 
 import pytest
 from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""The figure of contact forces over a walk, and of one heel strike."""
+"""The figure of contact forces, against the forces of the walk and one heel strike."""
 
 import equinox as eqx
 import numpy as np

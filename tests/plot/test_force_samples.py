@@ -1,4 +1,4 @@
-"""Force samples for figures: peaks as a far finer sampling has them."""
+"""Force samples for figures, against the peaks of a far finer sampling."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Figures of a periodic gait, from one made by hand: nothing is compiled."""
+"""Figures of a periodic gait, against one made by hand: nothing is compiled."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""The figure of leg angles over time."""
+"""The figure of leg angles over time, against the walk's angles."""
 
 import numpy as np
 

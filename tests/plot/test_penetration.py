@@ -1,4 +1,4 @@
-"""The figure of the feet's penetration over time."""
+"""The figure of the feet's penetration over time, against the walk's."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Phase portraits of a leg."""
+"""Phase portraits of a leg, against the walk's angles and rates."""
 
 import numpy as np
 import pytest

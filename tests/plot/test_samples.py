@@ -1,4 +1,4 @@
-"""Samples of a walk for figures."""
+"""Samples of a walk for figures, against the walk between its steps."""
 
 import jax.numpy as jnp
 import numpy as np

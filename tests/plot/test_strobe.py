@@ -1,4 +1,4 @@
-"""The strobe figure of a walk: poses, feet and slope."""
+"""The strobe figure of a walk, against its poses, feet and slope."""
 
 import math
 

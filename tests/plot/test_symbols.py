@@ -1,4 +1,4 @@
-"""Words, symbols and units of what figures draw."""
+"""Words, symbols and units of what figures draw, against every coordinate and parameter."""
 
 import dataclasses
 import re

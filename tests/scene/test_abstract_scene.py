@@ -1,4 +1,4 @@
-"""What any kind of scene answers, and a kind of one's own."""
+"""What any kind of scene answers, against a kind of one's own."""
 
 from typing import ClassVar
 

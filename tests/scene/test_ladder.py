@@ -1,4 +1,4 @@
-"""The ladder of models, and parameters set by name."""
+"""The ladder of models, and parameters set by name, against the scenes' leaves."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Scenes as pytrees: parameters are leaves, and what is not modelled is not there."""
+"""Scenes as pytrees, against their leaves: what is not modelled is not there."""
 
 import equinox as eqx
 import jax

@@ -1,4 +1,4 @@
-"""Walks to a wanted accuracy."""
+"""Walks to a wanted accuracy, against equations written again."""
 
 import jax
 import numpy as np

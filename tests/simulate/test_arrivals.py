@@ -1,4 +1,4 @@
-"""Saving arrivals at sections, by lanes, and extremes, by both engines."""
+"""Arrivals at sections and extremes, against the walk between its steps, by both engines."""
 
 import jax
 import jax.numpy as jnp

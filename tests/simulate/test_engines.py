@@ -1,4 +1,4 @@
-"""The two engines give the same motions, and each is refused what it cannot do."""
+"""The two engines, against each other; each is refused what it cannot do."""
 
 import diffrax
 import equinox as eqx

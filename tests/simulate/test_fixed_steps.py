@@ -1,4 +1,4 @@
-"""Fixed steps: contacts between two of them are told, against equations written anew."""
+"""Fixed steps, against equations written anew: contacts between two are told."""
 
 import dataclasses
 

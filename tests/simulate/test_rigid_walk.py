@@ -1,4 +1,4 @@
-"""Walks of the rigid walker by both engines."""
+"""Walks of the rigid walker, against known gaits, by both engines against each other."""
 
 import jax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""The precision of a start is that of its solve."""
+"""The precision of a start, against that of its solve."""
 
 import jax.numpy as jnp
 import numpy as np

@@ -1,4 +1,4 @@
-"""Starts below the ground are refused before anything is compiled."""
+"""Starts below the ground, against a sentence before anything is compiled."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Linkages in gravity: every method, redundant joints, derivatives."""
+"""Linkages in gravity, against pendulums and SciPy: every method, redundant joints."""
 
 import diffrax
 import jax

@@ -1,4 +1,4 @@
-"""Named accuracies resolve how friction builds up, wherever that is."""
+"""Named accuracies, against friction that builds up anywhere."""
 
 import jax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""States between the steps of a solve: diffrax's own, of any solver."""
+"""States between the steps of a solve, against diffrax's own."""
 
 import diffrax
 import jax

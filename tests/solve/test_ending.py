@@ -1,4 +1,4 @@
-"""Every ending by its name, on walks that end so."""
+"""Every ending by its name, against walks that end so."""
 
 import jax.numpy as jnp
 import pytest

@@ -1,4 +1,4 @@
-"""Engines by name: what is refused, and in which words."""
+"""Engines by name, against what is refused, and in which words."""
 
 import diffrax
 import pytest

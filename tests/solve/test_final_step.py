@@ -1,4 +1,4 @@
-"""Where a solve's last step ends, as diffrax has it."""
+"""Where a solve's last step ends, against the numbers next to its end."""
 
 import equinox.internal as eqxi
 import jax

@@ -1,4 +1,4 @@
-"""Reading a trajectory between its steps and beyond its ends."""
+"""A trajectory, against both its ends and times beyond them."""
 
 import jax
 import numpy as np

@@ -1,4 +1,4 @@
-"""A walker of any size is solved as exactly as the seed's, in the same steps."""
+"""A walker of any size, against the seed's: as exact, in the same steps."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Chunks cover every start once, and none is larger than was asked for."""
+"""Chunks, against the starts: each once, and none larger than was asked for."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Sweeps of gaits: a branch is followed without holes, in memory and in a store."""
+"""Sweeps of gaits, against single searches: without holes, in memory and in a store."""
 
 import numpy as np
 import pytest

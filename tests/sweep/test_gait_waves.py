@@ -1,4 +1,4 @@
-"""Sweeps in waves: gaits are those of single searches, whatever was killed or failed on the way."""
+"""Sweeps in waves, against gaits of single searches, whatever was killed on the way."""
 
 import shutil
 

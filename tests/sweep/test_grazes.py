@@ -1,4 +1,4 @@
-"""Grazes of walks that are labelled: counted where a foot touches or misses by a hair, else not."""
+"""Grazes of walks that are labelled, against starts known to touch or miss by a hair."""
 
 import dataclasses
 

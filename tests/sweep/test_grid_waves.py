@@ -1,4 +1,4 @@
-"""Waves of a grid: each point once, none before what it begins from; guesses of smooth states."""
+"""Waves of a grid, against a partition of its points, and guesses against cubics."""
 
 import numpy as np
 import pytest

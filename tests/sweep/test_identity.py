@@ -1,4 +1,4 @@
-"""What tells two models apart, and what a user's own code is known by."""
+"""What tells two models apart, against models that differ in one thing."""
 
 import functools
 import json

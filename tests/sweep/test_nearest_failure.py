@@ -1,4 +1,4 @@
-"""The smallest fatal push off a gait, and labels as a function of coordinates."""
+"""The smallest fatal push off a gait, against labels as a function of coordinates."""
 
 import numpy as np
 import pytest

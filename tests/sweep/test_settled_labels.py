@@ -1,4 +1,4 @@
-"""Doubt about labels, on a made-up boundary and on starts whose labels are known to be hard."""
+"""Doubt about labels, against a made-up boundary and labels that the draft has wrong."""
 
 import jax
 import numpy as np

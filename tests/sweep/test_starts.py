@@ -1,4 +1,4 @@
-"""Starts lie where they are said to, each whatever chunk it is made in."""
+"""Starts, against where they are said to lie, whatever chunk each is made in."""
 
 import itertools
 

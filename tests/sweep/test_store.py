@@ -1,4 +1,4 @@
-"""Stores in memory and on a disk: a sweep can tell no difference."""
+"""Stores in memory and on a disk, against each other."""
 
 import numpy as np
 import pytest

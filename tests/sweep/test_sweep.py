@@ -1,4 +1,4 @@
-"""Sweeps do not depend on how they are cut, and gaits met on the way are those of all starts."""
+"""Sweeps, against the same ones cut otherwise; gaits met on the way."""
 
 import importlib
 import json

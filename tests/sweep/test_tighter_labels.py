@@ -1,4 +1,4 @@
-"""Sweeps by a number: cut anyhow, killed anywhere and tightened, they give the same labels."""
+"""Sweeps by a number, against the same labels cut anyhow, killed and tightened."""
 
 import importlib
 import json

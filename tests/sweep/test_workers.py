@@ -1,4 +1,4 @@
-"""Threads, processes and clusters give what one process gives, and lose nothing when they die."""
+"""Threads, processes and clusters, against one process; nothing is lost when they die."""
 
 import concurrent.futures
 import os

@@ -1,4 +1,4 @@
-"""Results on disk: opened by anybody, continued after anything, and never mixed."""
+"""Results on disk, against those in memory: opened by anybody, continued, never mixed."""
 
 import errno
 import importlib

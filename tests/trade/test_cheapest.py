@@ -1,4 +1,4 @@
-"""Cost at an equal error."""
+"""Cost at an equal error, against a power law."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Trade of a gait."""
+"""Trade of a gait, against errors that shrink with the tolerance."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Rows of a trade study."""
+"""Rows of a trade study, against solves that are close, far off, failed or never ran."""
 
 import json
 

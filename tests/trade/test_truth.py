@@ -1,4 +1,4 @@
-"""Truth and its floor."""
+"""Errors against a truth: in units of their axis, infinite or none where they must be."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Trade of a walk."""
+"""Trade of a walk, against equations written a second time."""
 
 import dataclasses
 

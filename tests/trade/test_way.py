@@ -1,4 +1,4 @@
-"""Ways of solving."""
+"""Ways of solving, against their names and settings."""
 
 from jaxbiped.trade import Way
 

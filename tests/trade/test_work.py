@@ -1,4 +1,4 @@
-"""Work of a solve."""
+"""Work of a solve, against a clock made by hand."""
 
 from jaxbiped.trade import work_of
 

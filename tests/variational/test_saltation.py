@@ -1,4 +1,4 @@
-"""A gait whose contact force jumps at touchdown: its derivatives jump there."""
+"""A gait whose contact force jumps at touchdown, against differences of gaits."""
 
 import dataclasses
 

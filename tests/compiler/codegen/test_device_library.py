@@ -1,4 +1,4 @@
-"""Functions of the C library that devices have of their own, run on the CPU."""
+"""Functions that devices have of their own, run on the CPU, against exact values."""
 
 import ctypes
 import ctypes.util

@@ -1,4 +1,4 @@
-"""Flushed subnormals: zero within a kernel, and around it all is as it was."""
+"""Flushed subnormals, against bits: zero within a kernel, around it all is as it was."""
 
 import jax
 import jax.numpy as jnp

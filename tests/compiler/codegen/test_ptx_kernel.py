@@ -1,4 +1,4 @@
-"""PTX of a small program: what the driver is told, and how numbers are rounded."""
+"""PTX of a small program, against what the driver is told and how numbers are rounded."""
 
 import re
 

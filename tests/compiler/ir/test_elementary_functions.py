@@ -1,4 +1,4 @@
-"""Errors in units in the last place, over the whole range of 64-bit numbers.
+"""Elementary functions over the range of 64-bit numbers, against exact arithmetic in ulps.
 
 Subnormal arguments and results are zero.
 """

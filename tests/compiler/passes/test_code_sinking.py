@@ -1,4 +1,4 @@
-"""What only one branch of a conditional needs is computed in that branch."""
+"""Code sinking, against what one branch, or more than that branch, needs."""
 
 import jax
 import jax.numpy as jnp

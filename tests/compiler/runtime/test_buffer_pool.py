@@ -1,4 +1,4 @@
-"""Memory that is used again: only what nobody refers to any more."""
+"""Memory that is used again, against references: only what nobody refers to any more."""
 
 import concurrent.futures
 import gc

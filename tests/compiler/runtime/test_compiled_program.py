@@ -1,4 +1,4 @@
-"""Batches of any kind: the same bits in any order, and nothing takes the interpreter down."""
+"""Batches of any kind, against the bits of single runs; nothing takes the interpreter down."""
 
 import concurrent.futures
 import multiprocessing

@@ -1,4 +1,4 @@
-"""Batches on an emulated CUDA device: the queue, endings, refill, failures, several devices."""
+"""Batches on an emulated CUDA device, against lanes: queue, endings, refill, failures."""
 
 import ctypes
 import threading

@@ -1,4 +1,4 @@
-"""Programs of walks and labels on devices: the lanes' bits, registers and spills."""
+"""Programs of walks and labels on devices, against the lanes' bits; registers and spills."""
 
 import jax.tree_util as jtu
 import numpy as np

@@ -1,4 +1,4 @@
-"""Engines as twins: the same programs, the same numbers, and what each says that it cannot do."""
+"""Engines as twins, against each other: the same numbers, and what each cannot do."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Host CPU: vectors narrower than it has, and the same bits by all of them."""
+"""Host CPU, against the same bits by vectors narrower than it has."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""Programs that read a stream, a row at each attempt."""
+"""Programs that read a stream, a row at each attempt, against the rows."""
 
 import jax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""The cache of compiled code: safe to delete, rebuilt where it is damaged."""
+"""The cache of compiled code, against damage: safe to delete, rebuilt where it is spoilt."""
 
 import weakref
 

@@ -1,4 +1,4 @@
-"""Programs as operations of JAX: when they are traced, and who is told that they cannot be."""
+"""Programs as operations of JAX, against plain runs; who is told what they cannot."""
 
 import jax
 import jax.numpy as jnp

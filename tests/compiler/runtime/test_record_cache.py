@@ -1,4 +1,4 @@
-"""Records that stay on the host: asked for later, or read by another program as its stream."""
+"""Records that stay on the host, against those of runs that keep nothing."""
 
 import jax
 import jax.numpy as jnp

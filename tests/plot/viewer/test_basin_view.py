@@ -1,4 +1,4 @@
-"""The basin in a browser: a start that is picked shows its own walk."""
+"""The basin in a browser, against the walk of the start that is picked."""
 
 import base64
 import dataclasses

@@ -1,4 +1,4 @@
-"""The viewer in a real browser: what it shows is what was simulated."""
+"""The viewer in a real browser, against what was simulated."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Knots: few, and interpolation between them is as exact as asked."""
+"""Knots, against the motion between them: few, and as exact as asked."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The page: one file, whole, and its text safe."""
+"""The page, against what it was given: one file, whole, and its text safe."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The playground: a page that simulates what lanes simulate, and shows it."""
+"""The playground, against what lanes simulate."""
 
 import re
 

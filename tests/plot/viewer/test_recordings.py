@@ -1,4 +1,4 @@
-"""Recordings: between their knots walks of every kind are where they were simulated."""
+"""Recordings, against the walks of every kind between their knots."""
 
 import base64
 

@@ -1,4 +1,4 @@
-"""The widget: what notebooks run is what pages run, and its time is shared."""
+"""The widget, against the page: notebooks run the same, and its time is shared."""
 
 import base64
 import json

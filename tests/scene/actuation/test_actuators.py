@@ -1,4 +1,4 @@
-"""Actuators: parameters, torques and set points by themselves."""
+"""Actuators by themselves, against torques and set points by hand."""
 
 import dataclasses
 

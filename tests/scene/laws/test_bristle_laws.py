@@ -1,4 +1,4 @@
-"""Friction with a memory: its laws, the state that it brings, and what it does to the walker."""
+"""Friction with a memory, against closed forms, differences and the seed's gait."""
 
 import diffrax
 import equinox as eqx

@@ -1,4 +1,4 @@
-"""The laws by name: what resembles the seed's law in each, and that both engines take them."""
+"""The laws by name, against the seed's law that each resembles, by both engines."""
 
 import equinox as eqx
 import jax

@@ -1,4 +1,4 @@
-"""Laws of friction: their stated properties and derivatives."""
+"""Laws of friction, against their stated properties and derivatives."""
 
 import equinox as eqx
 import jax

@@ -1,4 +1,4 @@
-"""Laws of the normal force: their stated properties, derivatives and constructors."""
+"""Laws of the normal force, against stated properties, derivatives and constructors."""
 
 import equinox as eqx
 import jax

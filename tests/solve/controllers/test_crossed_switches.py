@@ -1,4 +1,4 @@
-"""Crossed switches: which steps they are, and what they have to be exact to."""
+"""Crossed switches, against steps that cross them; what these have to be exact to."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Error control: which steps are kept, and how large the next one is."""
+"""Error control, against its formula: which steps are kept, how large the next is."""
 
 import diffrax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""Touchdown ahead: what is tried after a rejected step in which a foot comes down."""
+"""Touchdown ahead, against steps in which a foot comes down and is rejected."""
 
 import gc
 

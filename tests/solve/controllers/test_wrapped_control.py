@@ -1,4 +1,4 @@
-"""Wrapped step-size controllers: what diffrax looks for is the innermost one's."""
+"""Wrapped step-size controllers, against what diffrax looks for in the innermost."""
 
 import inspect
 

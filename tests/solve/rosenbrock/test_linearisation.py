@@ -1,4 +1,4 @@
-"""Linearising a vector field: sizes, structure, and the same answers as dense algebra."""
+"""Linearising a vector field, against dense algebra: sizes, structure, answers."""
 
 from typing import Any, NamedTuple
 

@@ -1,4 +1,4 @@
-"""The four tableaus: order conditions, stability, and the orders that a computation shows."""
+"""The four tableaus, against order conditions, stability and measured orders."""
 
 import diffrax
 import equinox as eqx

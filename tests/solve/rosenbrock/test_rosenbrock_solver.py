@@ -1,4 +1,4 @@
-"""Rosenbrock solvers inside diffrax: gradients, savings, events, dtypes, batches."""
+"""Rosenbrock solvers in diffrax, against closed forms: gradients, events, batches."""
 
 from typing import Any, NamedTuple
 

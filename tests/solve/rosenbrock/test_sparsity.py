@@ -1,4 +1,4 @@
-"""Structure read off a program: never misses a dependence, and finds the plain copies."""
+"""Structure read off a program, against its Jacobian: no dependence is missed."""
 
 import jax
 import jax.numpy as jnp
