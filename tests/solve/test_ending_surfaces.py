@@ -21,7 +21,7 @@ def happens(state):
 
 @jax.jit
 def _happens(state):
-    """Every ending at a state: on ground that always holds, and under the paper's clearance rule."""
+    """Every ending at a state: on ground that always holds, and under the paper's rule."""
     told = {}
     for rule, scene in (("always", ALWAYS), ("paper", SEED)):
         events = ending_events(WATCHES).items()

@@ -1,0 +1,97 @@
+"""Error bars of walks from hand-made witnesses, what lanes are asked, and doors of simulations."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped._ending import Ending
+from jaxbiped.simulate._accurate_walk import Witness, judge_walk
+from jaxbiped.simulate._by_lanes import lane_request
+from jaxbiped.simulate._simulation import Simulation
+from jaxbiped.solve._trajectory import Trajectory
+
+SCENE, STATE = jb.seed_scene(), jb.seed_state()
+TIME = np.sqrt(0.4 / 9.8)
+
+
+def walk(ending=Ending.WALKING, end=1.0, **changes):
+    leaves = {name: np.array([float(leaf)]) for name, leaf in STATE._asdict().items()}
+    moved = {name: leaves[name] + change for name, change in changes.items()}
+    whole = np.asarray(0)
+    return Trajectory(np.array([end]), jb.State(**leaves | moved), np.asarray(int(ending)), whole,
+                      whole)  # fmt: skip
+
+
+def test_a_bar_is_the_larger_weighed_change_and_a_share_of_the_largest():
+    witnesses = (Witness(walk(hip_x=4e-3), 1.0), Witness(walk(hip_x=-3e-3, theta_1=1e-4), 2.0))
+    bars, relative, reason = judge_walk(SCENE, walk(), witnesses)
+    assert reason == ""
+    assert float(bars["state"].hip_x[0]) == pytest.approx(6e-3)
+    # The others are a twentieth of the largest, 6e-3/0.4, in their own units.
+    assert float(bars["state"].theta_1[0]) == pytest.approx(0.05 * 0.015)
+    assert float(bars["state"].omega_2[0]) == pytest.approx(0.05 * 0.015 / TIME)
+    assert float(bars["state"].hip_vz[0]) == pytest.approx(0.05 * 0.015 * 0.4 / TIME)
+    assert relative == pytest.approx(0.015)
+    _, relative, _ = judge_walk(SCENE, walk(), (Witness(walk(end=1.0 + 0.02 * TIME), 1.0),) * 2)
+    assert relative == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("place", [0, 1])
+def test_a_witness_that_ends_otherwise_leaves_the_error_open(place):
+    witnesses = [Witness(walk(), 1.0), Witness(walk(), 2.0)]
+    witnesses[place] = Witness(walk(Ending.STUMBLED), 1.0)
+    bars, relative, _ = judge_walk(SCENE, walk(), tuple(witnesses))
+    assert relative == np.inf
+    assert np.isinf(bars["state"].hip_x).all()
+    lost = walk(Ending.OUT_OF_STEPS)
+    assert (
+        judge_walk(SCENE, lost, (Witness(lost, 1.0),) * 2)[2] == "the solve ended as out of steps"
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (dict(duration=-1.0), "duration = -1 is not allowed"),
+        (dict(duration=np.nan), "duration = nan is not allowed"),
+        (dict(duration=None), "say how long to simulate"),
+        (dict(footsteps=0), "footsteps = 0 is not allowed"),
+        (dict(rtol=0.0), "rtol = 0 is not allowed"),
+        (dict(atol=-1e-9), "atol = -1e-09 is not allowed"),
+        (dict(max_solver_steps=0), "max_solver_steps = 0 is not allowed"),
+        (dict(max_arrivals=0), "max_arrivals = 0 is not allowed"),
+        (dict(watch=("falls",)), "watch = 'falls' is not known"),
+        (dict(save="last"), "save = 'last' is not known"),
+        (dict(accuracy="best"), "accuracy = 'best' is not known"),
+        (dict(save=jnp.array([0.2, 0.1])), "save"),
+        (dict(save=jnp.array([0.5, 1.5])), "save"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused_before_anything_is_compiled(change, said):
+    with pytest.raises(jb.ArgumentError) as refused:
+        Simulation.prepare(SCENE, STATE, **dict(duration=1.0) | change)
+    assert said in str(refused.value)
+
+
+def test_lanes_are_asked_for_what_the_user_said():
+    run = Simulation.prepare(SCENE, STATE, footsteps=3, rtol=1e-5, max_solver_steps=77, save="end")
+    asked = lane_request(run).inputs
+    told = jax.tree.map(float, (asked.footsteps, asked.rtol, asked.atol, asked.max_attempts))
+    assert told == (3.0, pytest.approx(1e-5), pytest.approx(1e-7), 77.0)
+    # A hundred seconds for each footstep.
+    assert float(asked.patience) == float(asked.duration) == 300.0
+    assert 300.0 * (1.0 - 1e-12) < float(asked.almost) < 300.0
+    assert [float(leaf) for leaf in asked.state] == [float(leaf) for leaf in STATE]
+
+
+def test_a_linkage_takes_as_many_coordinates_as_it_has():
+    linkage = jb.constraints.Linkage(
+        (jb.constraints.Body(1.0, 0.1),), (jb.constraints.Joint((0.0, 0.5), (0.0, 0.0), 0, None),)
+    )
+    scene = jb.LinkageScene(linkage, jb.constraints.Standard())
+    for count in (2, 4):
+        wrong = jb.dynamics.LinkageState((0.0,) * count, (0.0,) * 3)
+        with pytest.raises(jb.ArgumentError, match=f"state.q has {count} entries: this linkage"):
+            jb.swing(scene, wrong, times=[1.0])
