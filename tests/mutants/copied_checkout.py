@@ -76,6 +76,7 @@ def _run_pytest(folder: str, output: Path, arguments: list[str]) -> None:
     os.chdir(folder)
     sys.path[:] = [folder, *(path for path in sys.path if path not in ("", str(ROOT)))]
     os.environ["PYTHONPATH"] = folder
+    sys.dont_write_bytecode = False  # a server is started with the flags of its parent
     os.environ.pop("CI", None)  # it would make a new cache of programs each time
     with output.open("w") as file:
         for stream in (1, 2):
