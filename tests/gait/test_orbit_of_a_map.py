@@ -167,12 +167,41 @@ def test_newton_goes_quadratically_to_the_fixed_point_and_stops_there():
     assert float(now.base_residual) <= 1e-10
     assert int(now.evaluations) <= 9
     np.testing.assert_allclose(now.coarse.recurring, x, atol=1e-4)
+    for off, stage in ((1e-11, Stage.FOUND), (1e-9, Stage.FINE)):
+        latest = linearised(SHEAR, x + off, P)
+        near = initial_progress(jnp.asarray(x + off), jnp.asarray(0.0), method, latest)
+        assert int(iteration(near._replace(stage=jnp.asarray(3)), latest).stage) == stage
     lost = linearised(SHEAR, now.trial, P)._replace(code=jnp.asarray(3))
     begin = initial_progress(jnp.asarray(x), jnp.asarray(0.0), method, lost)
     assert int(iteration(begin, lost).stage) == Stage.NO_RETURN
     # A trial that does not return: the step is shortened.
     away = iteration(begin._replace(stage=jnp.asarray(1)), linearised(SHEAR, begin.trial + 0.2, P))
     assert float(iteration(away, lost).damping) == 0.5 * float(away.damping)
+
+
+def test_steps_are_damped_as_the_natural_level_function_says():
+    """NLEQ-ERR on x → x − atan x from 3, whose full step lands farther off than it began."""
+    nothing = linearised(TURN, np.zeros(3), P)._replace(code=np.asarray(0))
+
+    def at(x):
+        x = float(x[0])
+        slope = np.array([[1.0 - 1.0 / (1.0 + x * x)]])
+        return nothing._replace(recurring=np.array([x - np.arctan(x)]), jacobian=slope)
+
+    iteration = jax.jit(lambda now, latest: newton_iteration(now, latest, Method(None, 40, 1e-9)))
+    first = initial_progress(jnp.array([3.0]), jnp.asarray(0.0), Method(None, 40, 1e-9), at([3.0]))
+    one = iteration(first, at(first.trial))
+    step = 10.0 * np.arctan(3.0)
+    assert float(one.trial[0]) == pytest.approx(3.0 - step)
+    two = iteration(one, at(one.trial))
+    share = 0.5 * step / (10.0 * np.arctan(step - 3.0))
+    assert float(two.damping) == pytest.approx(share)
+    assert float(two.trial[0]) == pytest.approx(3.0 - share * step)
+    three = iteration(two, at(two.trial))
+    assert float(three.damping) == 1.0
+    while int(three.stage) < Stage.FOUND:
+        three = iteration(three, at(three.trial))
+    assert float(three.base[0]) == pytest.approx(0.0, abs=1e-9)
 
 
 def gait_of(values, multipliers=(0.5, 0.1), found=jb.gait.Search.FOUND):

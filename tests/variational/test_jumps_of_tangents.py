@@ -1,0 +1,206 @@
+"""Jumps of tangents at a switch, against a motion of two constant forces that is known exactly."""
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import jaxbiped as jb
+from jaxbiped.dynamics._switches import Switch
+from jaxbiped.variational._flow import Flow
+from jaxbiped.variational._grazing import turns_of
+from jaxbiped.variational._hybrid_system import RedundantWalking, Rolling, Walking
+from jaxbiped.variational._radau_collocation import RADAU, KnownStep
+from jaxbiped.variational._saltation import saltation_at
+from jaxbiped.variational._section_tangents import after_reset, on_section, tangent_on_section
+from jaxbiped.variational._switch_locator import Watch
+from jaxbiped.variational._tangent_solver import TangentSolver, VariationalField
+from jaxbiped.variational._tangents import Seeded, Tangents
+
+BEFORE, AFTER = -9.8, 14.0
+"""Accelerations above the level and below [m/s²]."""
+
+
+def field(t, y, args):
+    (level,) = args
+    return y[1], jnp.where(y[0] > level, BEFORE, AFTER)
+
+
+def switches(args, y):
+    """The level; and a speed at which another force would come on."""
+    return (
+        Switch(y[0] - args[0], True, force_jumps=True),
+        Switch(y[1] + 2.0, True, force_jumps=True),
+        Switch(y[0] + y[1], True),
+    )
+
+
+WATCH = Watch(field=field, switches=switches)
+
+
+def seeded(columns):
+    return Seeded((jnp.asarray(0.5),), jnp.asarray([[0.0, 0.0, 1.0]][:columns]), jnp.zeros(3), (0,))
+
+
+def exact(y, v, level, time):
+    """Height and speed so long after a start above the level."""
+    speed = -jnp.sqrt(v * v + 2.0 * BEFORE * (level - y))
+    fall = (speed - v) / BEFORE
+    rest = time - fall
+    return jnp.stack([level + speed * rest + 0.5 * AFTER * rest**2, speed + AFTER * rest])
+
+
+def test_saltation_is_the_change_of_the_field_over_the_rate_of_crossing():
+    at = (jnp.asarray(0.5 - 1e-12), jnp.asarray(-3.0))
+    told = jax.jit(lambda y, happens: saltation_at(WATCH, y, seeded(3), happens))
+    found = told(at, True)
+    np.testing.assert_allclose(found.change, [0.0, (AFTER - BEFORE) / -3.0], atol=1e-9)
+    np.testing.assert_array_equal(told(at, False).change, [0.0, 0.0])
+    np.testing.assert_array_equal(found.by_state, [1.0, 0.0])
+    np.testing.assert_array_equal(found.by_parameter, [-1.0])
+    np.testing.assert_array_equal(found.which, [True, False])
+
+
+def test_of_two_switches_it_is_the_one_that_was_passed_last():
+    def watch(args, y):
+        return (*switches(args, y)[:2], Switch(y[1] + 3.0 - 1e-6, True, force_jumps=True))
+
+    other = Watch(field=field, switches=watch)
+    # The level was passed a millionth of a second ago, the speed of −3 a ten-millionth of that.
+    at = (jnp.asarray(0.5 - 3e-6), jnp.asarray(-3.0 + 1e-6 + 1e-12))
+    found = jax.jit(lambda y: saltation_at(other, y, seeded(3), jnp.asarray(True)))(at)
+    np.testing.assert_array_equal(found.which, [False, False, True])
+    np.testing.assert_array_equal(found.by_state, [0.0, 1.0])
+
+
+def test_a_step_behind_a_jump_carries_the_columns_of_the_exact_motion():
+    """State and columns, with respect to the start and to the level itself."""
+    start, level = jnp.array([1.0, -0.5]), 0.5
+    fall = float((-jnp.sqrt(0.25 - 2.0 * BEFORE * 0.5) + 0.5) / BEFORE)
+    speed = -0.5 + BEFORE * fall
+    before = np.array([[1.0, fall, 0.0], [0.0, 1.0, 0.0]])
+    y0 = Tangents((jnp.asarray(level - 1e-13), jnp.asarray(speed)), jnp.asarray(before))
+    solver = TangentSolver(WATCH, jb.solvers.Rodas4())
+    term = diffrax.ODETerm(VariationalField(field))
+    step = jax.jit(lambda y: solver.step(term, 0.0, 0.01, y, seeded(3), None, jnp.asarray(True))[0])
+    ours = step(y0)
+    slopes = jax.jacfwd(exact, argnums=(0, 1, 2))(start[0], start[1], level, fall + 0.01)
+    np.testing.assert_allclose(ours.columns, np.stack(slopes, axis=1), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(ours.state, exact(*start, level, fall + 0.01), rtol=1e-9)
+
+
+class Flight(jb.gait.AbstractSystem):
+    """y'' = −a; what arrives is turned: (y, v) → (y v, sin v + a)."""
+
+    def vector_field(self, t, y, args):
+        return y[1], -args[0]
+
+    def switches(self, args, y):
+        return (Switch(y[0] - args[0], True),)
+
+    def ending(self, args, y):
+        return jnp.asarray(0)
+
+    def reset_map(self, args, y):
+        return y[0] * y[1], jnp.sin(y[1]) + args[0]
+
+    def load(self, args, y):
+        return None
+
+
+def section(args, y):
+    return y[0] * y[0] - 0.1 * args[0] + 0.2 * y[1], jnp.asarray(True)
+
+
+def arrived(z, time):
+    """Where the flight from z = (y, v, a) is on the section, from about the time of its arrival."""
+    y, v, a = z
+    at = lambda t: jnp.stack([y + v * t - 0.5 * a * t * t, v - a * t, a])
+    value = lambda t: section((a,), at(t)[:2])[0]
+    for _ in range(2):  # so that second derivatives are those of the arrival
+        time = time - value(time) / jax.grad(value)(time)
+    return at(time)
+
+
+def test_second_tangents_on_a_section_are_derivatives_of_the_arrival():
+    height = lambda t: 1.0 + 2.0 * t - 1.5 * t * t
+    when = brentq(lambda t: height(t) ** 2 - 0.3 + 0.2 * (2.0 - 3.0 * t), 1.2, 1.6, xtol=1e-15)
+    z0, v, q = jnp.array([1.0, 2.0, 3.0]), jnp.array([0.3, -0.2, 0.0]), jnp.array([0.1, 0.4, 0.7])
+    shape = jax.tree.structure((0.0, 0.0))
+    flow = Flow(Flight(), section, Flight().vector_field, seeded(3), shape)
+
+    @jax.jit
+    def both(z0):
+        reached = arrived(z0, jnp.asarray(when))
+        time = (z0[1] - reached[1]) / z0[2]
+        fixed = lambda z: jnp.stack(
+            [z[0] + z[1] * time - 0.5 * z[2] * time**2, z[1] - z[2] * time, z[2]]
+        )
+        first, along = jax.jvp(fixed, (z0,), (v,))[1], jax.jvp(fixed, (z0,), (q,))[1]
+        second = jax.jvp(lambda z: jax.jvp(fixed, (z,), (v,))[1], (z0,), (q,))[1][:2]
+        jacobian = jnp.array([[0.0, 1.0, 0.0], [0.0, 0.0, -1.0]])
+        ours = on_section(flow, jacobian, reached, first, along, second)
+        exact_first = lambda z, d: jax.jvp(lambda z: arrived(z, jnp.asarray(when)), (z,), (d,))[1]
+        mixed = jax.jvp(lambda z: exact_first(z, v), (z0,), (q,))[1]
+        turned = lambda z: flow.reset(arrived(z, jnp.asarray(when)))
+        push = jax.jvp(lambda z: jax.jvp(turned, (z,), (v,))[1], (z0,), (q,))
+        return {
+            "v": (ours[0], exact_first(z0, v)),
+            "q": (ours[1], exact_first(z0, q)),
+            "second": (ours[2], mixed[:2]),
+            "alone": (tangent_on_section(flow, reached, first), exact_first(z0, v)),
+            "reset": (after_reset(flow, reached, *ours)[1], push[1]),
+        }
+
+    for name, (ours, expected) in both(z0).items():
+        np.testing.assert_allclose(ours, expected, rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("lowest", "touches", "graze"), [(1e-3, True, False), (1e-9, True, True), (0.5, False, False)]
+)
+def test_a_switch_that_turns_within_a_step_is_told_by_how_near_it_comes(lowest, touches, graze):
+    """A ball pulled up: its height falls to its lowest halfway through the step and rises again."""
+    rates = lambda y: (y[1], jnp.asarray(2.0))
+    height = lambda y: (Switch(y[0], jnp.asarray(True)),)
+    ends = [(jnp.asarray(1.0 + lowest), jnp.asarray(v)) for v in (-2.0, 2.0)]
+    errors = (jnp.asarray(1e-7), jnp.asarray(1e-7))
+    found = turns_of(rates, height, jnp.asarray(2.0), *ends, errors)
+    assert bool(found.touches[0]) is touches
+    assert bool(found.graze) is graze
+    assert float(found.places[0]) == pytest.approx(0.5)
+
+
+def test_radau_is_exact_for_polynomials_and_its_clock_runs_in_the_root_of_time():
+    nodes = RADAU.sum(axis=1)
+    assert nodes[-1] == pytest.approx(1.0)
+    for power in range(3):
+        np.testing.assert_allclose(RADAU @ nodes**power, nodes ** (power + 1) / (power + 1))
+    for power in range(5):  # order five at the end
+        assert RADAU[-1] @ nodes**power == pytest.approx(1.0 / (power + 1))
+    blank = KnownStep(None, None, jnp.asarray(2.0), jnp.asarray(0.5), jnp.asarray(1.75), None, None)
+    part, share = blank.clock()
+    root = np.sqrt(0.25) + nodes * (np.sqrt(0.75) - np.sqrt(0.25))
+    np.testing.assert_allclose(part, (root**2 - 0.25) / 0.5)
+    np.testing.assert_allclose(share, 2.0 * root * (np.sqrt(0.75) - np.sqrt(0.25)))
+    # The integral of 1/√t, singular at the switch, from its values at the nodes.
+    fresh = blank._replace(start=jnp.asarray(1.75))
+    part, share = fresh.clock()
+    integral = RADAU[-1] @ (np.asarray(share) / np.sqrt(0.5 * np.asarray(part)))
+    assert integral == pytest.approx(2.0 * np.sqrt(0.5))
+
+
+def test_systems_of_walkers_exchange_legs_and_carry_the_larger_load():
+    scene, state = jb.seed_scene(), jb.seed_state()
+    swapped = jb.dynamics.exchange_legs(state)
+    for leg in (Walking(), RedundantWalking()):
+        assert [float(x) for x in leg.reset_map(scene, state)] == [float(x) for x in swapped]
+    low = state._replace(hip_z=jnp.asarray(0.3945))
+    load = jax.jit(lambda y: (Walking().load(scene, y), jb.dynamics.foot_forces(scene, y)))
+    for each in (low, jb.dynamics.exchange_legs(low)):
+        largest, forces = load(each)
+        both = float(forces.foot_1.normal), float(forces.foot_2.normal)
+        assert float(largest) == max(both) > min(both) == 0.0
+    assert Walking.cyclic_coordinates == Rolling.cyclic_coordinates == (0,)
