@@ -24,7 +24,7 @@ _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
 
-class _Arguments(NamedTuple):
+class Arguments(NamedTuple):
     """Arguments of a call that nothing traces.
 
     Attributes:
@@ -55,7 +55,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
 
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Runs the function, compiled."""
-        arguments = _arguments_of((args, kwargs))
+        arguments = arguments_of((args, kwargs))
         program = None
         if arguments is not None:
             program = self._once(arguments)(functools.partial(self._make, arguments))
@@ -69,8 +69,8 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
 
     def begin(self, *args: _P.args, **kwargs: _P.kwargs) -> Callable[[], object]:
         """Traces the function, where no process did; what then compiles it, in any thread."""
-        arguments = _arguments_of((args, kwargs))
-        key = None if arguments is None else self._key(arguments)
+        arguments = arguments_of((args, kwargs))
+        key = None if arguments is None else self.key_of(arguments)
         if arguments is None or key is None:
             return self._jitted.lower(*args, **kwargs).compile
         once = self._once(arguments)
@@ -85,8 +85,8 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
 
     def result_shape(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
         """Its result with shapes instead of arrays."""
-        arguments = _arguments_of((args, kwargs))
-        key = None if arguments is None else self._key(arguments)
+        arguments = arguments_of((args, kwargs))
+        key = None if arguments is None else self.key_of(arguments)
         kept = None if key is None else read_call(key)
         if arguments is None or kept is None:
             with long_trace():
@@ -100,7 +100,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         with self._lock:
             self._programs.clear()
 
-    def _once(self, arguments: _Arguments) -> Once[CompiledCall | None]:
+    def _once(self, arguments: Arguments) -> Once[CompiledCall | None]:
         with self._lock:
             known = self._programs.get(arguments.kind)
         if known is None:
@@ -109,20 +109,25 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
                 known = self._programs.setdefault(arguments.kind, Once())
         return known
 
-    def _make(self, arguments: _Arguments) -> CompiledCall | None:
+    def _make(self, arguments: Arguments) -> CompiledCall | None:
         """The program for such arguments; None where it is left to `equinox`."""
-        key = self._key(arguments)
+        key = self.key_of(arguments)
         return None if key is None else read_call(key) or self._trace(arguments, key)()
 
-    def _trace(self, arguments: _Arguments, key: str) -> Callable[[], CompiledCall]:
+    def _trace(self, arguments: Arguments, key: str) -> Callable[[], CompiledCall]:
+        return trace_call(self.flat(arguments), arguments.arrays, key)
+
+    def flat(self, arguments: Arguments) -> Callable[[Sequence[Any]], Any]:
+        """The function of the arrays among such arguments."""
+
         def function(arrays: Sequence[Any]) -> Any:
             args, kwargs = arguments.skeleton.filled(arrays)
             return self._function(*args, **kwargs)
 
         functools.update_wrapper(function, self._function, assigned=("__name__", "__qualname__"))
-        return trace_call(function, arguments.arrays, key)
+        return function
 
-    def _key(self, arguments: _Arguments) -> str | None:
+    def key_of(self, arguments: Arguments) -> str | None:
         """By what its program is found on disk; None where it is not to be kept."""
         if cache_folder() is None:
             return None
@@ -137,7 +142,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         return int(self._jitted._cached._cache_size()) + len(self._programs)
 
 
-def _arguments_of(given: Any) -> _Arguments | None:
+def arguments_of(given: Any) -> Arguments | None:
     """Arguments of a program that can be kept; None where something traces or watches the call."""
     if not nothing_is_traced() or _is_watched():
         return None
@@ -150,7 +155,7 @@ def _arguments_of(given: Any) -> _Arguments | None:
         hash(kind)
     except TypeError:
         return None
-    return _Arguments(arrays, skeleton, kind)
+    return Arguments(arrays, skeleton, kind)
 
 
 def _is_watched() -> bool:

@@ -18,8 +18,9 @@ CACHE_VARIABLE = "JAXBIPED_CACHE"
 """Environment variable: the folder of the cache; empty for none."""
 BYTES = 1 << 30
 """What the folder may hold; what was read or written longest ago goes first."""
-KINDS = ("lanes", "programs", "sources", "xla")
-"""Machine code of lanes, what goes with it, and programs compiled by XLA."""
+KINDS = ("lanes", "programs", "sources", "xla", "host")
+"""Machine code of lanes, what goes with it, digests of the package's source, programs compiled by
+XLA, and those of the host."""
 ABANDONED = 3600.0
 """Age [s] from which a temporary file is one that a killed process left."""
 _DIGEST = 32

@@ -16,7 +16,7 @@ from jaxlib.mlir import ir
 
 from jaxbiped._types import Numbers
 
-_CALLED = {
+CALLS = {
     "call": "call_jaxpr",
     "checkpoint": "jaxpr",
     "closed_call": "call_jaxpr",
@@ -35,7 +35,7 @@ _CALLED = {
 
 def called_program(equation: JaxprEqn) -> tuple[Jaxpr, Sequence[Numbers]] | None:
     """The program that an equation calls, with its constants; None where it does anything else."""
-    name = _CALLED.get(equation.primitive.name)
+    name = CALLS.get(equation.primitive.name)
     if name is None:
         return None
     called = equation.params[name]

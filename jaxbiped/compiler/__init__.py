@@ -7,6 +7,7 @@ engines that run a `Program`, `LANES`, `CUDA` and their twin `XLA`, each by `can
 
 from jaxbiped.compiler.codegen._ptx_kernel import ARCHITECTURES as ARCHITECTURES
 from jaxbiped.compiler.codegen._ptx_kernel import ptx_text as ptx_text
+from jaxbiped.compiler.host_code._host_jit import host_jit as host_jit
 from jaxbiped.compiler.passes._operation_counts import count_operations as count_operations
 from jaxbiped.compiler.runtime._device_processor import DeviceProcessor as DeviceProcessor
 from jaxbiped.compiler.runtime._engine import AbstractEngine as AbstractEngine

@@ -12,12 +12,11 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped._checks import check_choice, check_count, check_type, check_unbatched
 from jaxbiped._progress import stage
 from jaxbiped._types import as_float
-from jaxbiped.compiler import deferred_checks
+from jaxbiped.compiler import deferred_checks, host_jit
 from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._consistent_state import consistent_state
 from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
@@ -32,7 +31,7 @@ from jaxbiped.gait._fixed_point_search import Found, Search, SearchArguments, se
 from jaxbiped.gait._gait import Described, Gait, summarise_gait
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._origin import FoundBy, Origin, single_stage_origin
-from jaxbiped.gait._return_map_spec import ReturnMapSpec, walking_spec
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes, walking_spec
 from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
@@ -257,12 +256,12 @@ def _compilation_of(kind: tuple[object, ...]) -> Once[None]:
 def _compile(searching: SearchArguments, describing: Described, origin: Origin) -> None:
     """Compiles both programs, and what lanes run for them, at the same time."""
     spec, scene, _, start, *_ = searching
-    no_result = _empty_arrays(_search.result_shape(*searching))
     told = stage("compiling the search (first time for this kind of scene)")
     with told, ThreadPoolExecutor() as meanwhile:
         with deferred_checks() as programs:
             # What takes lanes longest begins first.
             ready = [meanwhile.submit(_search.begin(*searching))]
+            no_result = _empty_arrays(_search.result_shape(*searching))
             finish = summarise_gait.begin(spec, scene, start, no_result, *describing, origin)
             ready.append(meanwhile.submit(finish))
         for program in programs:
@@ -279,7 +278,7 @@ def _kind_of(tree: PyTree) -> tuple[object, ...]:
     return jtu.tree_structure(arrays), shapes, tuple(leaves), structure
 
 
-@cached_jit
+@host_jit(runs_by_lanes, within=True)
 def _search(*searching: PyTree) -> Found:
     # Without weak types, which would make the next program another one than was compiled.
     return jtu.tree_map(

@@ -145,7 +145,9 @@ def search(
 def walks_only(found: Found) -> Found:
     """The same, told as no walk where the orbit is none."""
     no_walk = (found.ending == int(Search.FOUND)) & ~found.sound
-    return found._replace(ending=jnp.where(no_walk, int(Search.NO_WALK), found.ending))
+    # A sum, which NumPy takes as well: what is found has code 0.
+    added = no_walk.astype(found.ending.dtype) * int(Search.NO_WALK)
+    return found._replace(ending=found.ending + added)
 
 
 def _with_soundness(spec: ReturnMapSpec, args: PyTree, guess: PyTree, end: Progress) -> Scalar:

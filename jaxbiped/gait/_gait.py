@@ -9,17 +9,17 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._ending import Ending
 from jaxbiped._quantity import Quantity
 from jaxbiped._summary import summary
 from jaxbiped._types import Scalar
+from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._fixed_point_search import Found, Search
 from jaxbiped.gait._orbit import Orbit, Slopes, orbit_of
 from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
 from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.scene._abstract_scene import AbstractScene
@@ -166,7 +166,7 @@ Described: TypeAlias = tuple[tuple[str, ...], tuple[int, ...], bool]
 """Names and positions of the parameters, and whether the radius is differentiated."""
 
 
-@cached_jit
+@host_jit(runs_by_lanes)
 def summarise_gait(
     spec: ReturnMapSpec,
     scene: AbstractScene,

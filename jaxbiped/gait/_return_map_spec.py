@@ -65,6 +65,11 @@ class ReturnMapSpec(eqx.Module):
         )
 
 
+def runs_by_lanes(spec: ReturnMapSpec, *_: object, **__: object) -> bool:
+    """Whether a function of a return map leaves the work to programs of lanes."""
+    return spec.engine == "lanes"
+
+
 def walking_spec(
     scene: AbstractScene,
     section: AbstractSection,

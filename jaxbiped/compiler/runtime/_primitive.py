@@ -17,6 +17,8 @@ from jaxtyping import Array, PyTree
 
 from jaxbiped._host_call import host_call, lower_host_call
 from jaxbiped._types import Numbers
+from jaxbiped.compiler.host_code._host_program import register_rule
+from jaxbiped.compiler.host_code._host_writer import HostWriter, Operation, Value
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._lane_call import LaneCall, Part, Schedule, run_lanes
 from jaxbiped.compiler.runtime._program import leaves_of
@@ -210,15 +212,7 @@ def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
     waits for a thread of the same pool that this call holds: for ever, on few cores.
     """
     count = context.avals_in[0].shape[0]
-    if params["wants"] is not Part.COLUMNS:
-        # While XLA compiles the rest, this compiles as well.
-        compiled, waiting = params["compiled"], _UNTRACED.get()
-        compiled.make_ready(count)
-        if waiting is None:
-            compiled.check()
-        else:
-            waiting.append(compiled)
-    run = LaneCall(count, params)
+    run = _begun_call(count, params)
     if tuple(context.module_context.platforms) == ("cpu",):
         return lower_host_call(context, host_call(run), operands)
     results, _, _ = mlir.emit_python_callback(
@@ -232,6 +226,27 @@ def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
         returns_token=False,
     )
     return results
+
+
+def _begun_call(count: int, params: dict[str, Any]) -> LaneCall:
+    """The call of a program, which is compiled while the rest is."""
+    if params["wants"] is not Part.COLUMNS:
+        compiled, waiting = params["compiled"], _UNTRACED.get()
+        compiled.make_ready(count)
+        if waiting is None:
+            compiled.check()
+        else:
+            waiting.append(compiled)
+    return LaneCall(count, params)
+
+
+def _write_on_host(writer: HostWriter, op: Operation) -> Sequence[Value]:
+    """The call in a host program."""
+    given = [writer.full(each) for each in op.inputs]
+    name = writer.thing(_begun_call(given[0].shape[0], dict(op.params)), object())
+    names = ", ".join(f"{{{i}}}" for i in range(len(given)))
+    only = "[0]" if len(op.results()) == 1 else ""
+    return writer.emit_all(f"{name}({names}){only}", given, op.results(), computed=False)
 
 
 def _refuse_derivative(primals: object, tangents: object, **params: object) -> NoReturn:
@@ -262,3 +277,4 @@ _RUN.def_abstract_eval(_abstract_evaluation)
 ad.primitive_jvps[_RUN] = _refuse_derivative
 batching.primitive_batchers[_RUN] = _batching
 mlir.register_lowering(_RUN, _lowering)
+register_rule(_RUN.name, _write_on_host)

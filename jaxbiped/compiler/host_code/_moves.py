@@ -1,0 +1,162 @@
+"""Host moves: how a host program writes operations that only move entries about."""
+
+import dataclasses
+import itertools
+from typing import Any
+
+import numpy as np
+
+from jaxbiped.compiler.host_code._host_writer import (
+    HostWriter,
+    Operation,
+    Rule,
+    UnwrittenError,
+    Value,
+)
+from jaxbiped.compiler.host_code._views import (
+    part_of,
+    reshaped,
+    single_number,
+    transposed,
+)
+
+
+def _broadcast(w: HostWriter, op: Operation) -> list[Value]:
+    if len(op.inputs) > 1:
+        raise UnwrittenError("a shape known only in the run")
+    shape, _ = op.result()
+    axes = op.params["broadcast_dimensions"]
+    value = op.inputs[0]
+    if value.held == ():
+        return [single_number(value, shape)]
+    value = w.full(value)
+    held = [1] * len(shape)
+    for axis, n in zip(axes, value.shape, strict=True):
+        held[axis] = n
+    wide = reshaped(w, value, tuple(held))
+    return [dataclasses.replace(wide, shape=shape, part=None)]
+
+
+def _reshape(w: HostWriter, op: Operation) -> list[Value]:
+    if op.params.get("dimensions") is not None or len(op.inputs) > 1:
+        raise UnwrittenError("a reshape in another order")
+    return [reshaped(w, op.inputs[0], op.result()[0])]
+
+
+def _slice(w: HostWriter, op: Operation) -> list[Value]:
+    p, value = op.params, op.inputs[0]
+    steps = p["strides"] or [1] * len(value.shape)
+    bounds = zip(p["start_indices"], p["limit_indices"], steps, value.shape, strict=True)
+    parts = [
+        slice(None) if (a, b, step) == (0, n, 1) else slice(int(a), int(b), int(step))
+        for a, b, step, n in bounds
+    ]
+    if all(part == slice(None) for part in parts):
+        return [value]
+    return [part_of(w, value, parts, op.result()[0])]
+
+
+def _squeeze(w: HostWriter, op: Operation) -> list[Value]:
+    gone = op.params["dimensions"]
+    places = [0 if i in gone else slice(None) for i in range(len(op.inputs[0].shape))]
+    return [part_of(w, op.inputs[0], places, op.result()[0])]
+
+
+def _transpose(w: HostWriter, op: Operation) -> list[Value]:
+    return [transposed(w, op.inputs[0], op.params["permutation"])]
+
+
+def _reverse(w: HostWriter, op: Operation) -> list[Value]:
+    gone = op.params["dimensions"]
+    parts = [
+        slice(None, None, -1) if i in gone else slice(None) for i in range(len(op.inputs[0].shape))
+    ]
+    return [part_of(w, op.inputs[0], parts, op.inputs[0].shape)]
+
+
+def _unstack(w: HostWriter, op: Operation) -> list[Any]:
+    axis, n = op.params["axis"], len(op.inputs[0].shape)
+    shape, _ = op.result()
+    return [
+        part_of(w, op.inputs[0], [k if i == axis else slice(None) for i in range(n)], shape)
+        if wanted
+        else None
+        for k, wanted in enumerate(op.needs)
+    ]
+
+
+def _split(w: HostWriter, op: Operation) -> list[Any]:
+    axis, sizes = op.params["axis"], op.params["sizes"]
+    ends = list(itertools.accumulate(sizes))
+    found: list[Any] = []
+    for k, (size, end) in enumerate(zip(sizes, ends, strict=True)):
+        parts = [slice(None)] * len(op.inputs[0].shape)
+        parts[axis] = slice(int(end - size), int(end))
+        shape, _ = op.result(k)
+        found.append(part_of(w, op.inputs[0], parts, shape) if op.needs[k] else None)
+    return found
+
+
+def _stack(w: HostWriter, op: Operation) -> list[Value]:
+    shape, dtype = op.result()
+    names = ", ".join(f"{{{i}}}" for i in range(len(op.inputs)))
+    axis = op.params["axis"]
+    form = f"stacked(({names},), {axis})" if axis else f"array(({names},))"
+    return [w.emit(form, [w.full(each) for each in op.inputs], shape, dtype)]
+
+
+def _concatenate(w: HostWriter, op: Operation) -> list[Value]:
+    shape, dtype = op.result()
+    axis = op.params["dimension"]
+    given = [each for each in op.inputs if each.shape[axis]]
+    pieces: list[Value] = []
+    # Single numbers one behind the other are one array, those known before a loop another one.
+    for key, group in itertools.groupby(given, lambda v: _single(v) and (id(v.block), True)):
+        run = list(group)
+        if not key:
+            pieces += [w.full(each) for each in run]
+            continue
+        names = ", ".join(f"{{{i}}}" for i in range(len(run)))
+        pieces.append(w.emit(f"array(({names},))", run, (len(run),), dtype))
+    if len(pieces) == 1:
+        return pieces
+    names = ", ".join(f"{{{i}}}" for i in range(len(pieces)))
+    return [w.emit(f"concatenate(({names}), {axis})", pieces, shape, dtype)]
+
+
+def _single(value: Value) -> bool:
+    return value.shape == (1,) and value.held == ()
+
+
+def _iota(w: HostWriter, op: Operation) -> list[Value]:
+    p = op.params
+    places = [1] * len(p["shape"])
+    places[p["dimension"]] = -1
+    numbers = np.arange(p["shape"][p["dimension"]], dtype=p["dtype"]).reshape(places)
+    return [w.constant(np.broadcast_to(numbers, p["shape"]))]
+
+
+def _pad(w: HostWriter, op: Operation) -> list[Value]:
+    shape, dtype = op.result()
+    config = tuple(tuple(map(int, each)) for each in op.params["padding_config"])
+    if not any(itertools.chain(*config)):
+        return [op.inputs[0]]
+    form = f"padded({{0}}, {{1}}, {config!r})"
+    return [w.emit(form, [w.full(each) for each in op.inputs], shape, dtype)]
+
+
+MOVES: dict[str, Rule] = {
+    "broadcast_in_dim": _broadcast,
+    "reshape": _reshape,
+    "expand_dims": _reshape,
+    "slice": _slice,
+    "squeeze": _squeeze,
+    "transpose": _transpose,
+    "rev": _reverse,
+    "unstack": _unstack,
+    "split": _split,
+    "stack": _stack,
+    "concatenate": _concatenate,
+    "iota": _iota,
+    "pad": _pad,
+}

@@ -1,0 +1,191 @@
+"""Host operations: how a host program writes operations of JAX, one rule for each primitive."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from jaxbiped.compiler.host_code._host_writer import (
+    HostWriter,
+    Operation,
+    Rule,
+    UnwrittenError,
+    Value,
+)
+from jaxbiped.compiler.host_code._views import reshaped
+
+_ENTRYWISE = {
+    "add": "({0} + {1})",
+    "add_any": "({0} + {1})",
+    "sub": "({0} - {1})",
+    "mul": "({0} * {1})",
+    "neg": "(-{0})",
+    "abs": "abs({0})",
+    "sign": "sign({0})",
+    "max": "maximum({0}, {1})",
+    "min": "minimum({0}, {1})",
+    "pow": "({0} ** {1})",
+    "square": "({0} * {0})",
+    "sqrt": "sqrt({0})",
+    "rsqrt": "(1.0 / sqrt({0}))",
+    "exp": "exp({0})",
+    "log": "log({0})",
+    "log1p": "log1p({0})",
+    "expm1": "expm1({0})",
+    "sin": "sin({0})",
+    "cos": "cos({0})",
+    "tan": "tan({0})",
+    "asin": "arcsin({0})",
+    "acos": "arccos({0})",
+    "atan": "arctan({0})",
+    "atan2": "arctan2({0}, {1})",
+    "sinh": "sinh({0})",
+    "cosh": "cosh({0})",
+    "tanh": "tanh({0})",
+    "floor": "floor({0})",
+    "ceil": "ceil({0})",
+    "nextafter": "nextafter({0}, {1})",
+    "eq": "({0} == {1})",
+    "ne": "({0} != {1})",
+    "lt": "({0} < {1})",
+    "le": "({0} <= {1})",
+    "gt": "({0} > {1})",
+    "ge": "({0} >= {1})",
+    "and": "({0} & {1})",
+    "or": "({0} | {1})",
+    "xor": "({0} ^ {1})",
+    "not": "(~{0})",
+    "is_finite": "isfinite({0})",
+    "real": "({0}.real)",
+    "imag": "({0}.imag)",
+    "conj": "conj({0})",
+    "clamp": "minimum(maximum({1}, {0}), {2})",
+}
+_SAME = ("stop_gradient", "copy", "copy_p", "optimization_barrier")
+_REDUCTIONS = {
+    "reduce_sum": "add",
+    "reduce_max": "maximum",
+    "reduce_min": "minimum",
+    "reduce_prod": "multiply",
+    "reduce_and": "logical_and",
+    "reduce_or": "logical_or",
+}
+
+
+def _entrywise(w: HostWriter, op: Operation, form: str, inputs: Sequence[Value]) -> Value:
+    """An operation entry by entry, on no more entries than differ."""
+    shape, dtype = op.result()
+    held = np.broadcast_shapes(*(each.held for each in inputs))
+    return w.emit(form, inputs, shape, dtype, held)
+
+
+def _entrywise_rule(form: str) -> Rule:
+    return lambda w, op: [_entrywise(w, op, form, op.inputs)]
+
+
+def _divide(w: HostWriter, op: Operation) -> list[Value]:
+    whole = np.issubdtype(op.inputs[0].dtype, np.integer)
+    form = "divide_whole({0}, {1})" if whole else "({0} / {1})"
+    return [_entrywise(w, op, form, op.inputs)]
+
+
+def _same(w: HostWriter, op: Operation) -> list[Value]:
+    return op.inputs
+
+
+def _convert(w: HostWriter, op: Operation) -> list[Value]:
+    _, dtype = op.result()
+    if dtype == op.inputs[0].dtype:
+        return op.inputs
+    form = "({0} != 0)" if dtype.kind == "b" else f"{{0}}.astype({dtype.name})"
+    return [_entrywise(w, op, form, op.inputs)]
+
+
+def _round(w: HostWriter, op: Operation) -> list[Value]:
+    if int(op.params["rounding_method"]) != 1:  # to the nearest, ties to even
+        raise UnwrittenError("rounding other than to even")
+    return [_entrywise(w, op, "rint({0})", op.inputs)]
+
+
+def _whole_power(w: HostWriter, op: Operation) -> list[Value]:
+    return [_entrywise(w, op, f"power_of({{0}}, {op.params['y']})", op.inputs)]
+
+
+def _bits(w: HostWriter, op: Operation) -> list[Value]:
+    _, dtype = op.result()
+    if dtype.itemsize != np.dtype(op.inputs[0].dtype).itemsize:
+        raise UnwrittenError("bits of types of different sizes")
+    return [_entrywise(w, op, f"{{0}}.view({dtype.name})", op.inputs)]
+
+
+def _select(w: HostWriter, op: Operation) -> list[Value]:
+    which, *cases = op.inputs
+    if len(cases) == 1:
+        return cases
+    if len(cases) > 2 or which.dtype.kind != "b":
+        raise UnwrittenError("a choice among several")
+    if which.constant is not None and which.held == ():
+        return [cases[int(which.constant)]]
+    if which.held == ():
+        shape, dtype = op.result()
+        if cases[0].held != cases[1].held:
+            cases = [w.full(each) for each in cases]
+        form = "({2} if {0} else {1})"
+        return [w.emit(form, [which, *cases], shape, dtype, cases[0].held)]
+    return [_entrywise(w, op, "where({0}, {2}, {1})", op.inputs)]
+
+
+def _reduce_rule(name: str) -> Rule:
+    def rule(w: HostWriter, op: Operation) -> list[Value]:
+        shape, dtype = op.result()
+        axes = tuple(int(axis) for axis in op.params["axes"])
+        if all(op.inputs[0].shape[i] == 1 for i in axes):
+            return [reshaped(w, op.inputs[0], shape)]
+        axis = axes[0] if len(axes) == 1 else axes
+        # Of small whole numbers NumPy would make larger ones.
+        kept = f", {dtype.name}" if dtype.kind == "i" and name in ("add", "multiply") else ""
+        form = f"{name}.reduce({{0}}, {axis}{kept})"
+        if name.startswith("logical") and dtype.kind != "b":
+            raise UnwrittenError("a reduction of bits")
+        return [w.emit(form, [w.full(op.inputs[0])], shape, dtype)]
+
+    return rule
+
+
+def _place_rule(method: str) -> Rule:
+    def rule(w: HostWriter, op: Operation) -> list[Value]:
+        shape, dtype = op.result()
+        (axis,) = op.params["axes"]
+        if op.inputs[0].shape[axis] == 1:
+            return [w.constant(np.zeros(shape, dtype))]
+        form = f"{{0}}.{method}({int(axis)}).astype({dtype.name})"
+        return [w.emit(form, [w.full(op.inputs[0])], shape, dtype)]
+
+    return rule
+
+
+def _sort(w: HostWriter, op: Operation) -> Sequence[Value]:
+    axis, keys = op.params["dimension"], op.params["num_keys"]
+    names = ", ".join(f"{{{i}}}" for i in range(len(op.inputs)))
+    results = [(each.shape, each.dtype, each.shape) for each in op.inputs]
+    only = "[0]" if len(op.inputs) == 1 else ""
+    form = f"sorted_by(({names},), {axis}, {keys}){only}"
+    return w.emit_all(form, [w.full(each) for each in op.inputs], results)
+
+
+OPERATIONS: dict[str, Rule] = (
+    {name: _entrywise_rule(form) for name, form in _ENTRYWISE.items()}
+    | dict.fromkeys(_SAME, _same)
+    | {name: _reduce_rule(how) for name, how in _REDUCTIONS.items()}
+    | {
+        "div": _divide,
+        "rem": _entrywise_rule("remainder({0}, {1})"),
+        "convert_element_type": _convert,
+        "round": _round,
+        "integer_pow": _whole_power,
+        "bitcast_convert_type": _bits,
+        "select_n": _select,
+        "argmax": _place_rule("argmax"),
+        "argmin": _place_rule("argmin"),
+        "sort": _sort,
+    }
+)

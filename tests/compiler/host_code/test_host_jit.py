@@ -1,0 +1,94 @@
+"""Host compilation: what NumPy runs, what is left to XLA, and what another process finds."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped._cached_jit import cached_jit
+from jaxbiped._disk_cache import CACHE_VARIABLE
+from jaxbiped.compiler import host_jit
+from jaxbiped.compiler.host_code import _host_jit
+
+
+@host_jit()
+def _root(x):
+    """Newton's method on y² = x."""
+    return jax.lax.fori_loop(0, 20, lambda _, y: 0.5 * (y + x / y), jnp.ones_like(x))
+
+
+@host_jit(lambda x, on_host: on_host, within=True)
+def _doubled(x, on_host):
+    return 2.0 * x
+
+
+@host_jit()
+def _error_function(x):
+    return jax.lax.erf(x)
+
+
+def _rigid_gait():
+    return jb.find_gait(jb.ladder()["rigid"], parameters=("slope",), radius_sensitivities=False)
+
+
+def _refuse(*_):
+    raise AssertionError("compiled, or written again")
+
+
+def test_numpy_runs_it(monkeypatch):
+    monkeypatch.setattr(cached_jit, "__call__", _refuse)
+    found = _root(np.array([4.0, 2.0]))
+    assert isinstance(found, jax.Array)
+    np.testing.assert_allclose(found, [2.0, np.sqrt(2.0)], rtol=1e-15)
+
+
+def test_traced_it_is_xlas():
+    found = jax.vmap(_root)(jnp.array([4.0, 9.0]))
+    np.testing.assert_allclose(found, [2.0, 3.0], rtol=1e-15)
+    slope = jax.jvp(_root, (jnp.asarray(4.0),), (jnp.asarray(1.0),))[1]
+    assert float(slope) == pytest.approx(0.25, rel=1e-12)
+    assert "scan" in str(jax.make_jaxpr(_root)(jnp.asarray(4.0)))
+
+
+def test_only_where_it_pays(monkeypatch):
+    assert isinstance(_doubled(np.ones(2), False), jax.Array)
+    monkeypatch.setattr(cached_jit, "__call__", _refuse)
+    assert isinstance(_doubled(np.ones(2), True), np.ndarray)
+
+
+def test_what_numpy_lacks_is_compiled():
+    assert float(_error_function(np.asarray(0.5))) == pytest.approx(0.5204998778130465, rel=1e-12)
+
+
+def test_shapes_are_known_before_it_runs():
+    assert _root.result_shape(np.ones(3)).shape == (3,)
+    assert _error_function.result_shape(np.ones(3)).shape == (3,)
+
+
+def test_kept_for_the_next_process(monkeypatch, tmp_path):
+    """A gait search, whose host programs hold programs of lanes."""
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
+
+    jb.clear_caches()
+    first = _rigid_gait()
+    assert len(list((tmp_path / "host").iterdir())) == 2
+    jb.clear_caches()
+
+    monkeypatch.setattr(_host_jit, "write_host_program", _refuse)
+    second = _rigid_gait()
+    for a, b in zip(jax.tree.leaves(first), jax.tree.leaves(second), strict=True):
+        np.testing.assert_array_equal(a, b)
+    jb.clear_caches()
+
+
+@pytest.mark.parametrize("damage", [b"", bytes(5000)], ids=["emptied", "garbage"])
+def test_what_is_damaged_is_written_again(monkeypatch, tmp_path, damage):
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
+    jb.clear_caches()
+    first = _rigid_gait()
+    for path in (tmp_path / "host").iterdir():
+        path.write_bytes(damage)
+    jb.clear_caches()
+    assert float(_rigid_gait().measures.period) == float(first.measures.period)
+    jb.clear_caches()

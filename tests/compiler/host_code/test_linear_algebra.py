@@ -1,0 +1,51 @@
+"""Products and LAPACK in host programs, held against XLA's."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxbiped.linalg._small_matrices import eigenpairs, eigensystem, solve
+from tests.compiler.host_code.host_runs import check_against_xla
+
+GENERATOR = np.random.default_rng(3)
+A, B, C = (GENERATOR.normal(size=shape) for shape in ((5, 5), (5, 3), (4, 5, 5)))
+
+
+def test_products():
+    def function(a, b, c):
+        plain = a @ b, b.T @ a, a @ b[:, 0], b[:, 0] @ a, b[:, 0] @ b[:, 1]
+        return plain, c @ a, jax.vmap(jnp.dot)(c, c), jax.vmap(lambda m: m @ b[:, 0])(c)
+
+    check_against_xla(function, A, B, C, rtol=1e-12)
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_systems(rows):
+    def function(a, b):
+        return solve(a, b[:, :rows]), solve(a.T, b[:, 0]), jax.vmap(solve, (None, 1))(a, b)
+
+    check_against_xla(function, A, B, rtol=1e-12)
+
+
+def test_a_singular_system_has_no_finite_solution():
+    singular = np.ones((3, 3))
+    found = check_against_xla(solve, singular, np.array([1.0, 2.0, 3.0]))
+    assert not np.all(np.isfinite(found[0]))
+
+
+def test_triangles():
+    def function(a, b):
+        how = dict(left_side=True, lower=True)
+        solved = jax.lax.linalg.triangular_solve
+        ways = [dict(transpose_a=t, unit_diagonal=u) for t in (True, False) for u in (True, False)]
+        return [solved(a, b, **how, **way) for way in ways], solved(a, b.T, left_side=False)
+
+    check_against_xla(function, A + 4.0 * np.eye(5), B, rtol=1e-12)
+
+
+def test_eigensystems():
+    """Real and complex pairs, of one matrix and of several one after the other."""
+    pairs = np.array([[0.0, -2.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.5]])
+    check_against_xla(lambda m: (eigensystem(m), eigenpairs(m)), pairs, rtol=1e-12)
+    check_against_xla(jax.vmap(eigensystem), C, rtol=1e-11)
