@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from jaxbiped._jax_versions import called_program, scan_counts
+from tests.compiler.host_code.host_runs import check_against_xla
 from tests.compiler.one_shot import evaluate
 from tests.import_graph import PACKAGE
 
@@ -100,3 +101,5 @@ POINTS = np.array([-0.75, -0.3, 1e-9, 0.3, 0.999999])
 )
 def test_primitives_of_single_versions(function, expected):
     np.testing.assert_allclose(evaluate(function, POINTS), expected(POINTS), rtol=2e-15)
+    (on_host,) = check_against_xla(jax.vmap(function), POINTS)
+    np.testing.assert_allclose(on_host, expected(POINTS), rtol=2e-15)

@@ -13,6 +13,7 @@ from jaxbiped.compiler.host_code._host_writer import (
     Value,
 )
 
+
 def _parts(program: Any) -> tuple[Any, Sequence[Any]]:
     """A program's operations and its constants."""
     return getattr(program, "jaxpr", program), getattr(program, "consts", ())

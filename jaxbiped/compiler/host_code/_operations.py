@@ -30,6 +30,8 @@ _ENTRYWISE = {
     "exp": "exp({0})",
     "log": "log({0})",
     "log1p": "log1p({0})",
+    "log2": "log2({0})",
+    "one_minus_square": "((1.0 - {0}) * (1.0 + {0}))",
     "expm1": "expm1({0})",
     "sin": "sin({0})",
     "cos": "cos({0})",
@@ -110,6 +112,14 @@ def _whole_power(w: HostWriter, op: Operation) -> list[Value]:
     return [_entrywise(w, op, f"power_of({{0}}, {op.params['y']})", op.inputs)]
 
 
+def _polynomial(w: HostWriter, op: Operation) -> list[Value]:
+    """Horner's rule; the constant coefficient comes first."""
+    form = f"{{{len(op.inputs) - 1}}}"
+    for number in range(len(op.inputs) - 2, 0, -1):
+        form = f"({form} * {{0}} + {{{number}}})"
+    return [_entrywise(w, op, form, op.inputs)]
+
+
 def _bits(w: HostWriter, op: Operation) -> list[Value]:
     _, dtype = op.result()
     if dtype.itemsize != np.dtype(op.inputs[0].dtype).itemsize:
@@ -182,6 +192,7 @@ OPERATIONS: dict[str, Rule] = (
         "convert_element_type": _convert,
         "round": _round,
         "integer_pow": _whole_power,
+        "polynomial": _polynomial,
         "bitcast_convert_type": _bits,
         "select_n": _select,
         "argmax": _place_rule("argmax"),
