@@ -17,8 +17,8 @@ from jaxbiped.compiler.host_code import _arrays
 
 _OF_NUMPY = (
     "abs add arccos arcsin arctan arctan2 array ceil complex128 concatenate conj cos cosh exp "
-    "expm1 float32 float64 floor int32 int64 isfinite log log1p log2 logical_and logical_or maximum "
-    "minimum multiply nextafter rint sign sin sinh sqrt tan tanh where"
+    "expm1 float32 float64 floor int32 int64 isfinite log log1p log2 logical_and logical_or "
+    "maximum minimum multiply nextafter rint sign sin sinh sqrt tan tanh where"
 )
 NAMES: dict[str, Any] = {name: getattr(np, name) for name in _OF_NUMPY.split()} | {
     name: getattr(_arrays, name) for name in _arrays.__all__
