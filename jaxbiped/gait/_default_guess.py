@@ -3,9 +3,9 @@
 import jax
 import jax.numpy as jnp
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._caches import bounded_cache
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._formulation import state_type
@@ -23,7 +23,7 @@ def default_guess(scene: AbstractScene) -> WalkerState:
     return _fitted(scene, *jax.tree.map(dtype.type, _seed()))
 
 
-@cached_jit  # many small operations
+@host_jit()  # many small operations
 def _fitted(scene: AbstractScene, seed: State, own: Scene) -> WalkerState:
     """`own` is the seed's scene. As constants XLA would divide by its numbers by reciprocals."""
     if not scene.compliant:

@@ -8,9 +8,9 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._continuation import BranchEnd, FollowedBranch, follow_branch
 from jaxbiped.gait._default_guess import default_guess
@@ -30,7 +30,7 @@ from jaxbiped.gait._poincare_map import (
     state_with,
 )
 from jaxbiped.gait._pseudo_arclength import Change
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._rolling_starts import rolling_starts
 from jaxbiped.gait._settled_walks import component_sizes, settle_walks
 from jaxbiped.scene._abstract_scene import AbstractScene
@@ -242,7 +242,7 @@ def _follow_from_seed(
     return follow_branch(change, point, scales=component_sizes(line.first, like))
 
 
-@cached_jit
+@host_jit(runs_by_lanes, within=True)
 def _scene_along(
     scout: ReturnMapSpec, line: Homotopy, like: WalkerState, point: Scalar, s: Scalar
 ) -> tuple[Scalar, Scalar, Scalar, Scalar]:
