@@ -143,7 +143,7 @@ for turn in range(10):
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_processes_that_are_killed_leave_nothing_half_written(cache):
     """Two hundred at once on a cold cache, killed at random, and garbage written in between."""
     chance = random.Random(5)

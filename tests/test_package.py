@@ -115,7 +115,7 @@ def built(tmp_path_factory):
     return folders
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_builds_are_the_same_to_the_last_byte(built):
     def digests(folder):
         return {
@@ -127,7 +127,7 @@ def test_builds_are_the_same_to_the_last_byte(built):
     assert first == second
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_wheel_alone_passes_its_self_test(built, tmp_path):
     (wheel,) = built[0].glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:

@@ -155,6 +155,7 @@ class _Watch(threading.Thread):
                     return
 
 
+@pytest.mark.nightly
 def test_a_cluster_one_of_whose_workers_is_killed(tmp_path):
     """A scheduler and two worker processes over loopback; nothing is lost."""
     starts = simplest_grid(SCENE, 80)

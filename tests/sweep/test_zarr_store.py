@@ -62,6 +62,7 @@ jb.sweep(LABELLING, simplest_grid(SCENE, 120), store=sys.argv[1], chunk=120, loo
 """
 
 
+@pytest.mark.nightly
 def test_a_killed_run_continues_where_it_was(tmp_path):
     path = tmp_path / "store"
     run = subprocess.Popen([sys.executable, "-c", _RUN, str(path)])

@@ -245,7 +245,7 @@ def test_runs_in_spawned_processes():
         assert list(pool.map(_summary, range(2))) == [_summary(0)] * 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_runs_in_dask_workers():
     here = distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None)
     with here as cluster, cluster.get_client() as client:
