@@ -10,7 +10,9 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._types import Scalar
+from jaxbiped.dynamics._actuation import actuator_powers
 from jaxbiped.dynamics._push_off import push_off_work
+from jaxbiped.dynamics._rolling import rolling_hip_motion
 from jaxbiped.optimise import _certificate
 from jaxbiped.optimise._cycle_functionals import _totals, with_errors
 from jaxbiped.optimise._cycle_integrals import integrals_of
@@ -21,7 +23,7 @@ from jaxbiped.optimise._jacobian_weights import leading_multipliers, weighed
 from jaxbiped.optimise._objectives import Evaluation, _cost_of_transport, _root_of_squares, _Row
 from jaxbiped.optimise._optimality import optimality_of
 from jaxbiped.optimise._requirements import requirements_of
-from jaxbiped.optimise._trust_region import run_trust_region
+from jaxbiped.optimise._trust_region import _Local, run_trust_region
 from jaxbiped.optimise._variables import variables_of
 
 SCENE = jb.ladder()["rigid"]
@@ -341,6 +343,26 @@ def test_an_impact_loses_the_energy_that_is_missing_after_it_and_the_push_off():
     assert float(after.motor_work) == pytest.approx(given)
 
 
+def test_motors_work_where_they_drive_and_not_where_they_brake():
+    walker = jb.Walker(m=1.0, J=0.01, l=0.4, d=0.1, r=0.08, hip_mass=0.5)
+    pulse = jb.actuation.HipPulse(2.0, phase=0.0, width=0.5)
+    scene = jb.RigidScene(walker, jb.Ground(0.02), pulse)
+    system = integrals_of(scene)
+
+    @jax.jit
+    def told(state):
+        hip = rolling_hip_motion(state)
+        motors = actuator_powers(scene, hip, (None, None)).motors
+        return system.vector_field(0.0, system.begin(state), scene).motor_work, motors
+
+    signs = set()
+    for rates in ((3.0, -1.0), (-3.0, 1.0)):
+        work, (power,) = told(jb.dynamics.RigidState(0.0, 0.1, -0.1, *rates))
+        assert float(work) == max(float(power), 0.0)
+        signs.add(bool(power > 0.0))
+    assert signs == {True, False}
+
+
 def kinetic(scene, state):
     """From the velocities of the three masses."""
     walker, whole = scene.walker, jb.dynamics.whole_state(scene, state)
@@ -372,3 +394,13 @@ def test_a_pushed_walk_returns_to_the_gait_or_does_not(last, count, returned, mo
     assert found.period_difference == pytest.approx(last / 0.5 - 1.0)
     assert (found.footsteps, found.asked) == (count, 20)
     np.testing.assert_allclose(asked["state"], [1.0, 0.2, 0.3, -1.01, -2.02])
+
+
+def test_the_merit_of_a_design_counts_what_it_misses():
+    """An equality by its size, an inequality where it is below zero, the largest of the moduli."""
+    none = np.zeros((3, 2))
+    here = _Local(np.zeros(2), 1.0, np.zeros(2), np.array([0.25, 0.5]), np.zeros((2, 2)),
+                  np.array([-0.5, 0.25, -0.125]), none, np.array([False, False, True]))  # fmt: skip
+    assert here.sum == 1.5
+    np.testing.assert_array_equal(here.missed, [0.5, 0.0, 0.125])
+    assert here.merit(8.0) == 1.5 + 8.0 * 0.625
