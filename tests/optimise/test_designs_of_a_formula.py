@@ -23,6 +23,7 @@ from jaxbiped.optimise._jacobian_weights import leading_multipliers, weighed
 from jaxbiped.optimise._objectives import Evaluation, _cost_of_transport, _root_of_squares, _Row
 from jaxbiped.optimise._optimality import optimality_of
 from jaxbiped.optimise._requirements import requirements_of
+from jaxbiped.optimise._runs import Outcome, Runs
 from jaxbiped.optimise._trust_region import _Local, run_trust_region
 from jaxbiped.optimise._variables import variables_of
 
@@ -404,3 +405,22 @@ def test_the_merit_of_a_design_counts_what_it_misses():
     assert here.sum == 1.5
     np.testing.assert_array_equal(here.missed, [0.5, 0.0, 0.125])
     assert here.merit(8.0) == 1.5 + 8.0 * 0.625
+
+
+@pytest.mark.parametrize("optimiser", ["slsqp", "trust-constr"])
+def test_other_optimisers_come_to_the_same_optimum_and_say_so(optimiser):
+    made = problem(BOTH, {"speed": 1.0}, -1.0, "step_length<0.21")
+    runs = Runs(made, 60, optimiser, False)
+    runs.run(made.latest)
+    best = made.variables.named(runs.best.u)
+    mu = 0.015 / 0.005625
+    found = np.log([best["d"] / 0.1, best["slope"] / 0.02])
+    assert found == pytest.approx([0.2 - 0.05 * mu, 0.1 - 0.0125 * mu], abs=3e-3)
+    assert runs.history[-1].objective == pytest.approx(runs.best.known.values["speed"], abs=1e-4)
+
+
+def test_an_optimum_that_misses_a_requirement_is_infeasible():
+    made = problem(BOTH, {"speed": 1.0}, -1.0, "step_length>0.9")
+    runs = Runs(made, 10, "trust-region", False)
+    runs.run(made.latest)
+    assert runs.outcome() is Outcome.INFEASIBLE

@@ -115,19 +115,19 @@ def standing(angle, rate, depth=1e-4, hip_x=0.0):
     )))  # fmt: skip
 
 
-def test_a_foot_that_rolls_does_not_slide_and_one_that_slides_does():
-    places = contact_places(SCENE, standing(0.2, -1.0))
-    rolled = standing(0.1, -1.0)
-    landed, slid = slip_distances(SCENE, rolled, places)
+@pytest.mark.parametrize("leg", [0, 1])
+def test_a_foot_that_rolls_does_not_slide_and_one_that_slides_does(leg):
+    name = (lambda state: state) if leg else jb.dynamics.exchange_legs
+    places = contact_places(SCENE, name(standing(0.2, -1.0)))
+    told = lambda **moved: slip_distances(SCENE, name(standing(0.1, -1.0, **moved)), places)
+    landed, slid = told()
     assert float(slid) == pytest.approx(0.0, abs=1e-12)
-    assert float(landed[1]) == pytest.approx(float(places[1]), abs=1e-15)
-    _, slid = slip_distances(SCENE, standing(0.1, -1.0, hip_x=-0.03), places)
-    assert float(slid) == pytest.approx(0.03)
+    assert float(landed[leg]) == pytest.approx(float(places[leg]), abs=1e-15)
+    assert float(told(hip_x=-0.03)[1]) == pytest.approx(0.03)
     # A foot in the air takes its place along.
-    flying = standing(0.1, -1.0, depth=-1e-3, hip_x=0.07)
-    landed, slid = slip_distances(SCENE, flying, places)
+    landed, slid = told(depth=-1e-3, hip_x=0.07)
     assert float(slid) == 0.0
-    assert float(landed[1]) == pytest.approx(float(places[1]) + 0.07)
+    assert float(landed[leg]) == pytest.approx(float(places[leg]) + 0.07)
 
 
 class Straight:

@@ -1,0 +1,132 @@
+"""How bifurcations move with parameters, and the nearest of them, from numbers written down."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.continuation import _bifurcation_sensitivities as sensitivities
+from jaxbiped.continuation import _nearest_bifurcation as nearest
+from jaxbiped.continuation._bifurcations import BranchEvent
+from jaxbiped.optimise import _bifurcation_distance as distances
+from jaxbiped.optimise._bifurcation_distance import Sought
+
+SCENE = jb.ladder()["rigid"]
+NAMES = jb.parameter_names(SCENE)
+OWN = float(jb.parameter_values(SCENE)["slope"])
+
+
+def test_a_fold_moves_so_that_its_forcing_stays_zero():
+    """Of x → x + q₁ − q₂ x² − … : a fold where q₁ = a(q₂); w ∂P/∂q is that of the left vector."""
+    sizes = np.array([2.0, 0.5, 1.0])
+    left, right = np.array([0.6, -0.8]), np.array([0.3, 1.0])
+    complement = np.array([[0.8, 0.6], [1.0, -0.3]])
+    singular = np.outer(complement[0], complement[1])  # left singular vector `left`, no rank there
+    by_point = np.eye(2) + sizes[:2, None] * singular / sizes[:2]
+    forced = np.array([[2.0, -1.0], [0.5, 3.0]])
+    seen = SimpleNamespace(code=[0], jacobian=[np.hstack([by_point, forced])] * 2)
+    setup = SimpleNamespace(
+        scene=SCENE, footsteps=1, axis=SimpleNamespace(name="slope"),
+        curve=SimpleNamespace(sizes=sizes),
+        problem=SimpleNamespace(cycle=lambda *_: seen),
+    )  # fmt: skip
+    assert abs(complement[1] @ right) < 1e-12
+    rows = sensitivities.fold_forcing(setup, np.zeros(2), 0.02, ("d", "slope"))
+    expected = (left / sizes[:2]) @ forced
+    for row in rows:
+        np.testing.assert_allclose(row / row[0], expected / expected[0])
+
+
+def branch(*values, kinds=None):
+    kinds = [BranchEvent.FOLD] * len(values) if kinds is None else kinds
+    points = [
+        SimpleNamespace(value=v, kind=k, multiplier=1.0 + 0j, error=0.01)
+        for v, k in zip(values, kinds, strict=True)
+    ]
+    return SimpleNamespace(bifurcations=points)
+
+
+@pytest.mark.parametrize(
+    ("slope", "values", "first"),
+    [(0.02, (0.005, 0.05), 0.05), (0.02, (0.01, 0.05), 0.01), (0.0, (-0.01, 0.005), 0.005)],
+)
+def test_the_nearest_is_that_of_the_smallest_factor(slope, values, first, monkeypatch):
+    asked = {}
+
+    def follow(scene, along, *, bounds, **options):
+        asked["bounds"] = bounds
+        return branch(*values)
+
+    monkeypatch.setattr(nearest, "continue_gait", follow)
+    scene = jb.with_parameters(SCENE, {"slope": slope})
+    gait = SimpleNamespace(orbit=(np.zeros((1, 3)), None))
+    found = nearest.nearest_bifurcation(scene, gait)
+    assert found.value == first
+    assert (found.kind, found.error) == (BranchEvent.FOLD, 0.01)
+    if slope:
+        assert found.ratio == pytest.approx(first / slope)
+        assert asked["bounds"] == pytest.approx((slope / 8.0, slope * 8.0))
+    else:
+        assert np.isnan(found.ratio)
+        assert asked["bounds"] == (-0.1, 0.1)
+
+
+@pytest.mark.parametrize("value", [OWN + 0.01, OWN - 0.004])
+def test_a_distance_moves_with_the_bifurcation_and_against_the_gait(value, monkeypatch):
+    slopes = np.arange(len(NAMES)) * 0.1
+    slopes[NAMES.index("slope")] = 0.0
+    located = distances._Located(value, 1e-6, slopes, 0.01 * slopes)
+    other = OWN + 0.02
+    parts = [SimpleNamespace(bifurcations=branch(other).bifurcations, stop=None),
+             SimpleNamespace(bifurcations=branch(value).bifurcations, stop=None)]  # fmt: skip
+    asked = []
+    monkeypatch.setattr(distances, "continuation_setup", lambda *_, **__: None)
+    monkeypatch.setattr(distances, "_both_ways", lambda *_: parts)
+    monkeypatch.setattr(distances, "_located", lambda _, event: asked.append(event) or located)
+    gait = SimpleNamespace(orbit=(np.zeros((1, 3)), None), engine="lanes")
+    found = distances.bifurcation_distance(SCENE, gait)
+    assert asked[0].value == value
+    assert found.outcome is Sought.MET
+    assert found.distance == pytest.approx(abs(value - OWN))
+    way = np.sign(value - OWN)
+    expected = way * slopes
+    expected[NAMES.index("slope")] = -way
+    np.testing.assert_allclose(found.slopes, expected)
+    np.testing.assert_allclose(found.value_slopes, slopes)
+
+
+def test_a_doubling_is_located_by_the_modulus_that_is_one(monkeypatch):
+    """ρ = 0.998 at 0.03, with the slopes −2 in d and 0.5 in slope: the doubling lies at 0.034."""
+    slopes = np.zeros((3, len(NAMES)))
+    slopes[1, NAMES.index("d")], slopes[1, NAMES.index("slope")] = -2.0, 0.5
+    moduli = np.array([1.3, 0.998, 0.2])
+    told = (moduli, np.full(3, 1e-4), slopes, 0.01 * np.abs(slopes), 0)
+    monkeypatch.setattr(distances, "jacobian_functionals", lambda *_, **__: told)
+    setup = SimpleNamespace(
+        scene=SCENE, axis=SimpleNamespace(name="slope"), footsteps=2, accuracy="tight",
+        state_of=lambda point: None,
+        problem=SimpleNamespace(spec=SimpleNamespace(engine="lanes")),
+    )  # fmt: skip
+    event = SimpleNamespace(value=0.03, point=SimpleNamespace(recurring=None))
+    found = distances._located_doubling(setup, event)
+    assert found.value == pytest.approx(0.03 + 0.002 / 0.5)
+    assert found.slopes[NAMES.index("d")] == pytest.approx(4.0)
+    assert found.slopes[NAMES.index("slope")] == 0.0
+    assert found.error == pytest.approx((1e-4 + 0.004 * 0.005) / 0.5)
+    assert found.slope_errors[NAMES.index("d")] == pytest.approx((0.02 + 4.0 * 0.005) / 0.5)
+
+
+def test_a_bifurcations_slopes_are_those_of_its_condition(monkeypatch):
+    """Where f(p, s) = 0 decides, ds/dp = −f_p/f_s; elasticities are relative to both."""
+    rows = [np.array([3.0, -1.0, 2.0]), np.array([3.1, -1.0, 2.0])]
+    monkeypatch.setattr(sensitivities, "_of_fold", lambda *_: rows)
+    monkeypatch.setattr(sensitivities, "check_type", lambda *_: None)
+    found = sensitivities.bifurcation_sensitivities(
+        SimpleNamespace(scene_at=lambda _: SCENE, along="slope"),
+        SimpleNamespace(kind=BranchEvent.FOLD, value=0.05), ("d", "m"),
+    )  # fmt: skip
+    np.testing.assert_allclose(found.slopes, [-1.5, 0.5])
+    np.testing.assert_allclose(found.errors, [0.05, 0.0])
+    values = [float(jb.parameter_values(SCENE)[name]) for name in ("d", "m")]
+    np.testing.assert_allclose(found.elasticities, np.array([-1.5, 0.5]) * values / 0.05)
