@@ -19,9 +19,13 @@ def test_round_trip_through_a_file(seed_walk, tmp_path):
         assert read.attrs["ending"] == "walking"
         assert read.attrs["normal.K"] == 1e6
         assert json.loads(read.attrs["parameter_units"])["normal.K"] == "N/m^n"
-        assert read.theta_1.units == "rad"
+        told = {name: read[name].units for name in read.data_vars if not name.startswith("hip")}
+        angles = {"theta_1": "rad", "theta_2": "rad", "omega_1": "rad/s", "omega_2": "rad/s"}
+        energies = dict.fromkeys(("kinetic_energy", "gravitational_energy", "elastic_energy"), "J")
+        feet = {"normal_force": "N", "tangential_force": "N", "penetration": "m",
+                "slip_speed": "m/s", "touches": "1"}  # fmt: skip
+        assert told == angles | energies | feet
         assert read.normal_force.dims == ("leg", "time")
-        assert read.normal_force.units == "N"
         expected = jb.dynamics.foot_forces(scene, walk.state).foot_2.normal
         np.testing.assert_array_equal(read.normal_force.sel(leg=2), expected)
         total = read.kinetic_energy + read.gravitational_energy + read.elastic_energy
