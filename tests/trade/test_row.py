@@ -38,3 +38,12 @@ def test_a_solve_that_says_that_it_failed_keeps_its_word():
 def test_what_never_ran_has_no_errors_and_took_no_time():
     row = failed_row("a", "rtol=1", "not installed")
     assert (row.errors, row.cpu_s, row.outcome) == ({}, None, "not installed")
+
+
+def test_a_solve_that_is_far_off_in_one_of_its_numbers_is_wrong():
+    values = {"state": np.array([1.0, 0.0]), "period": np.array([2.0])}
+    for period, outcome in ((2.08, "ok"), (2.12, "wrong")):
+        found = values | {"period": np.array([period])}
+        row = row_of("a", "rtol=1", "ok", truth_of(values, {}), found, WORK)
+        assert row.outcome == outcome
+        assert row.errors == pytest.approx({"state": 0.0, "period": 0.5 * period - 1.0})
