@@ -8,13 +8,15 @@ two counts. Since 0.12 `ClosedJaxpr` and `Jaxpr` are one class, and `eval_jaxpr`
 from collections.abc import Sequence
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jax._src.core import trace_state_clean
 from jax.extend.core import Jaxpr, JaxprEqn
 from jaxlib import lapack
 from jaxlib.mlir import ir
 
-from jaxbiped._types import Numbers
+from jaxbiped._types import Numbers, Scalar
 
 CALLS = {
     "call": "call_jaxpr",
@@ -72,3 +74,15 @@ def custom_call_targets(module: Any) -> set[str]:
 
     module.operation.walk(note)
     return names
+
+
+@jax.custom_jvp
+def tanh(x: Scalar) -> Scalar:
+    """Hyperbolic tangent; all versions round its derivative alike, and so take the same steps."""
+    return jnp.tanh(x)
+
+
+@tanh.defjvp
+def _tanh_jvp(primals: tuple[Scalar], tangents: tuple[Scalar]) -> tuple[Scalar, Scalar]:
+    value = tanh(primals[0])
+    return value, tangents[0] * ((1.0 - value) * (1.0 + value))

@@ -27,7 +27,7 @@ LAWS = ("threlfall", "coulomb", "smooth-bengisu-akay", "brown-mcphee")
 def scenes():
     """Forty of them by name."""
     found = {}
-    for slope, K in itertools.product((0.012, 0.015, 0.02, 0.025, 0.03), (5e5, 1e6, 2e6)):
+    for slope, K in itertools.product((0.014, 0.015, 0.02, 0.025, 0.03), (5e5, 1e6, 2e6)):
         found[f"slope {slope}, K {K:g}"] = jb.seed_scene(slope=slope, K=K)
     for slope, c in itertools.product((0.015, 0.02, 0.025), (5e6, 2e7)):
         found[f"slope {slope}, c {c:g}"] = jb.seed_scene(slope=slope, c=c)

@@ -3,8 +3,7 @@
 import dataclasses
 from typing import ClassVar, Self
 
-import jax.numpy as jnp
-
+from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator
@@ -34,7 +33,7 @@ class FootPreload(AbstractActuator):
 
     def set_point(self, angle: Scalar, rate: Scalar) -> tuple[Scalar, Scalar]:
         """How far the foot is extended [m], and how fast it is [m/s]."""
-        rise = jnp.tanh((-angle - self.onset) / self.span)
+        rise = tanh((-angle - self.onset) / self.span)
         half = 0.5 * self.extension
         return half * (1.0 + rise), -half * (1.0 - rise * rise) * rate / self.span
 

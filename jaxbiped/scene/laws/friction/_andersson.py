@@ -2,9 +2,8 @@
 
 from typing import ClassVar, Self
 
-import jax.numpy as jnp
-
 from jaxbiped._checks import check_positive
+from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
@@ -42,7 +41,7 @@ class Andersson(AbstractFrictionLaw):
         coefficient = stribeck_coefficient(
             self.mu_static, self.mu_kinetic, self.v_s, self.p, slip_speed
         )
-        return -normal_force * coefficient * jnp.tanh(self.k * slip_speed)
+        return -normal_force * coefficient * tanh(self.k * slip_speed)
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         """Rest, where p ≤ 1."""

@@ -2,13 +2,12 @@
 
 from typing import ClassVar, Self
 
-import jax.numpy as jnp
-
 from jaxbiped._checks import (
     ArgumentError,
     check_at_least,
     holds_somewhere,
 )
+from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
@@ -61,10 +60,10 @@ class BrownMcPhee(AbstractFrictionLaw):
         u = slip_speed / self.v_t
         well = 0.25 * u * u + 0.75
         peak = (self.mu_static - self.mu_dynamic) * u / (well * well)
-        dry = normal_force * (self.mu_dynamic * jnp.tanh(4.0 * u) + peak)
+        dry = normal_force * (self.mu_dynamic * tanh(4.0 * u) + peak)
         if self.N_t is None:
             return -dry
-        return -dry - self.mu_v * slip_speed * jnp.tanh(4.0 * normal_force / self.N_t)
+        return -dry - self.mu_v * slip_speed * tanh(4.0 * normal_force / self.N_t)
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         return ()

@@ -2,8 +2,7 @@
 
 from typing import ClassVar, Self
 
-import jax.numpy as jnp
-
+from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
@@ -27,7 +26,7 @@ class RegularisedCoulomb(AbstractFrictionLaw):
     v_d: Parameter = parameter("build-up speed", "$v_d$", "m/s", positive=True)
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
-        return -self.mu * normal_force * jnp.tanh(slip_speed / self.v_d)
+        return -self.mu * normal_force * tanh(slip_speed / self.v_d)
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
         return ()

@@ -2,9 +2,8 @@
 
 from typing import ClassVar, Self
 
-import jax.numpy as jnp
-
 from jaxbiped._checks import check_positive
+from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
@@ -51,7 +50,7 @@ class Stribeck(AbstractFrictionLaw):
         coefficient = stribeck_coefficient(
             self.mu_static, self.mu_kinetic, self.v_s, self.p, slip_speed
         )
-        dry = coefficient * jnp.tanh(slip_speed / self.v_d)
+        dry = coefficient * tanh(slip_speed / self.v_d)
         return -normal_force * (dry + self.k_v * slip_speed)
 
     def switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:
