@@ -57,10 +57,9 @@ def test_random_scenes_and_starts_end_alike(noise, slope, factor):
             assert float(a) == pytest.approx(float(b), abs=2e-6)
 
 
-@pytest.mark.parametrize("solver", ["rodas3p", "rodas4", "rodas4p", "rodas5p"])
-def test_every_solver_agrees(solver):
-    """On the scene that XLA compiles soonest; random scenes above are of the seed's laws."""
-    options = dict(duration=0.2, solver=solver, rtol=1e-8, watch=())
+def test_another_solver_agrees():
+    """On the scene that XLA compiles soonest; `test_return_map` holds all to closed forms."""
+    options = dict(duration=0.2, solver="rodas3p", rtol=1e-8, watch=())
     scene = SCENES["frictionless"]
     ends = [_end(jb.seed_state(), e, scene, **options) for e in ("lanes", "xla")]
     assert ends[0].engine == "lanes"
