@@ -18,9 +18,9 @@ def gait_of(scene, guess=None):
 @pytest.mark.parametrize(
     ("which", "kind", "varied"),
     [
-        ("stribeck", "fold", ("r", "J", "d")),
+        pytest.param("stribeck", "fold", ("r", "J", "d"), marks=pytest.mark.nightly),
         ("rigid", "period-doubling", ("r", "J", "d")),
-        ("bristles", "fold", ("J",)),
+        pytest.param("bristles", "fold", ("J",), marks=pytest.mark.nightly),
     ],
 )
 def test_derivatives_are_those_of_central_differences(which, kind, varied):
