@@ -1,4 +1,4 @@
-"""What commands tell of gaits and walks, from numbers that are written down."""
+"""What commands tell of gaits and walks, against numbers that are written down."""
 
 import json
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Events of branches, their errors, cascades and deflation, from numbers that are written down."""
+"""Events of branches, errors, cascades and deflation, against numbers that are written down."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""How bifurcations move with parameters, and the nearest of them, from numbers written down."""
+"""How bifurcations move with parameters, and the nearest, against numbers written down."""
 
 from types import SimpleNamespace
 

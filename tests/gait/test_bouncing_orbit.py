@@ -1,4 +1,4 @@
-"""Orbit of a bouncing mass, whose multiplier, measures and derivatives have closed forms."""
+"""Orbit of a bouncing mass, against closed forms of multiplier, measures and derivatives."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Summary of a gait whose orbit is written down: units, errors, what is unknown."""
+"""Summary of a gait, against an orbit that is written down: units, errors, what is unknown."""
 
 import jax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""Orbit of a map that is written down: Newton's method, sensitivities, errors; no motion."""
+"""Newton's method, sensitivities and errors of orbits, against maps that are written down."""
 
 from types import SimpleNamespace
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Stages of a search, and what is said of them, where each stage comes to what is written down."""
+"""Stages of a search, and what is said of them, against ends that are written down."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""Fits of models whose estimates and errors are known in closed form; no gait is searched for."""
+"""Fits of linear models, against their estimates and errors in closed form."""
 
 import dataclasses
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Measures of walks whose forces, places and powers are written down, not simulated."""
+"""Measures of walks, against forces, places and powers that are written down."""
 
 import dataclasses
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Designs whose measures are formulas: optima, multipliers, costs and norms in closed form."""
+"""Designs whose measures are formulas, against optima, costs and norms in closed form."""
 
 from types import SimpleNamespace
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Error bars of walks from hand-made witnesses, what lanes are asked, and doors of simulations."""
+"""Error bars of walks, against witnesses made by hand; what lanes are asked; doors."""
 
 import jax
 import jax.numpy as jnp

@@ -1,4 +1,4 @@
-"""Endings at states made by hand, on both sides of each threshold."""
+"""Endings, against states made by hand on both sides of each threshold."""
 
 import jax
 import jax.numpy as jnp

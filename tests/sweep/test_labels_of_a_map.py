@@ -1,4 +1,4 @@
-"""Verdicts on arrivals that are written down, and on feet that roll, slide and arrive."""
+"""Verdicts, against arrivals that are written down, and feet that roll, slide and arrive."""
 
 from types import SimpleNamespace
 

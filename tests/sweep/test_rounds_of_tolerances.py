@@ -1,4 +1,4 @@
-"""Rounds of finer tolerances of a sweep whose labels are in doubt as is written down."""
+"""Rounds of finer tolerances of a sweep, against doubts that are written down."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Sweeps, stores and starts where a label is a plain function of its start."""
+"""Sweeps, stores and starts, against labels that are a plain function of the start."""
 
 import json
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""Host compilation: what NumPy runs, what is left to XLA, and what another process finds."""
+"""Host compilation, against XLA: what NumPy runs, what is left, what another process finds."""
 
 import jax
 import jax.numpy as jnp
