@@ -33,6 +33,17 @@ def program_of(page, *, runs):
 
 
 RUN = [page for page in GUIDES if program_of(page, runs=True).strip()]
+SUBJECTS = ("simulating", "gaits", "gradients", "basins")
+LANDING = {"README.md", *(f"docs/{name}.md" for name in SUBJECTS)}
+"""Pages that a change waits for; the others run at night."""
+TIERED = [
+    pytest.param(
+        page,
+        marks=pytest.mark.slow if path_of(page) in LANDING else pytest.mark.nightly,
+        id=path_of(page),
+    )
+    for page in RUN
+]
 
 
 def shown_in(page):
@@ -43,8 +54,7 @@ def shown_in(page):
     return "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("page", RUN, ids=path_of)
+@pytest.mark.parametrize("page", TIERED)
 def test_a_page_runs_from_top_to_bottom_and_prints_what_it_says(page, tmp_path, monkeypatch):
     """A comment behind a `print(…)` is what that prints, as far as an ellipsis."""
     monkeypatch.chdir(tmp_path)
@@ -70,8 +80,7 @@ def test_every_block_of_a_page_is_found(page):
 
 def test_the_readme_is_short_and_it_and_the_pages_of_each_subject_are_run():
     assert len(README.read_text().splitlines()) <= 150
-    subjects = {f"docs/{name}.md" for name in ("simulating", "gaits", "gradients", "basins")}
-    assert {"README.md", *subjects} <= {path_of(page) for page in RUN}
+    assert {path_of(page) for page in RUN} >= LANDING
 
 
 @pytest.mark.parametrize("page", [*GUIDES, *NOTEBOOKS], ids=path_of)

@@ -55,7 +55,7 @@ def test_it_is_one_new_file_one_line_and_one_test():
     assert len(new) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_its_test_and_those_over_all_laws_pass(copy):
     files = [name for name, _ in STEPS if name.startswith("tests/")]
     ran = _run(
@@ -66,14 +66,14 @@ def test_its_test_and_those_over_all_laws_pass(copy):
     assert "resemble_the_seeds[algebraic]" in collected.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_walker_walks_on_it(copy):
     ran = _run(copy, "jaxbiped", "walk", "--friction", "algebraic", "--duration", "1.5")
     assert ran.returncode == 0, ran.stderr
     assert "walking" in ran.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_checks_of_style_and_types_pass(copy):
     path = next(name for name, _ in STEPS if "friction" in name)
     for command in (("ruff", "check"), ("ruff", "format", "--check")):
