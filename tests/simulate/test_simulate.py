@@ -214,6 +214,7 @@ def test_a_bad_lane_ends_alone():
     assert int(attempts[3]) < 30
 
 
+@pytest.mark.nightly
 def test_forward_and_reverse_derivatives_of_a_swing_equal_differences():
     """Single support, away from every switch, where plain stepping may be differentiated.
 
