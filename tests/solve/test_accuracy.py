@@ -3,9 +3,13 @@
 import jax
 import jax.numpy as jnp
 import pytest
+from scipy.integrate import solve_ivp
 
 import jaxbiped as jb
 from jaxbiped.solve._accuracy import ACCURACIES, tolerances
+from tests.reference import SEED as REFERENCE
+from tests.reference import START as INDEPENDENT
+from tests.reference import derivative
 
 SEED, START = jb.seed_scene(), jb.seed_state()
 
@@ -17,6 +21,35 @@ def test_the_seeds_tolerances_are_those_of_the_name(accuracy):
         ACCURACIES[accuracy].walk,
         1e-2 * ACCURACIES[accuracy].walk,
     )
+
+
+BOUNDS = {"draft": 1e-5, "balanced": 6e-7, "tight": 7e-10}
+"""Errors of the seed's walk after 0.3 s, in SI units: some 2.5 times those at these tolerances."""
+
+
+def test_named_walks_are_as_exact_as_their_names_say():
+    """Ten times looser tolerances have six to thirteen times the errors."""
+    exact = solve_ivp(
+        derivative,
+        (0.0, 0.3),
+        INDEPENDENT,
+        method="Radau",
+        rtol=1e-10,
+        atol=1e-12,
+        args=(REFERENCE,),
+    ).y[:, -1]
+    for accuracy, bound in BOUNDS.items():
+        walk = jb.simulate(SEED, START, duration=0.3, accuracy=accuracy, save="end")
+        off = max(abs(float(a) - b) for a, b in zip(walk.final, exact, strict=True))
+        assert 0.1 * bound < off < bound, accuracy
+
+
+def test_derivatives_have_ten_times_the_tolerance_of_the_state():
+    for each in ACCURACIES.values():
+        for precision in (each.gait, each.rigid_gait):
+            assert precision.tangent_rtol == pytest.approx(10.0 * precision.rtol)
+    draft, balanced, tight = ACCURACIES.values()
+    assert draft.gait.rtol > 100.0 * balanced.gait.rtol > 1e4 * tight.gait.rtol
 
 
 def test_a_slip_speed_is_resolved_and_what_is_given_stays():
