@@ -264,8 +264,12 @@ def _compile(searching: SearchArguments, describing: Described, origin: Origin) 
             no_result = _empty_arrays(_search.result_shape(*searching))
             finish = summarise_gait.begin(spec, scene, start, no_result, *describing, origin)
             ready.append(meanwhile.submit(finish))
-        for program in programs:
-            program.check()
+        try:
+            for program in programs:
+                program.check()
+        except BaseException:
+            _search.clear()  # it would be found compiled, and fail where XLA runs it
+            raise
         for each in ready:
             each.result()
 

@@ -1,5 +1,6 @@
 """The same gait from both engines, against each other."""
 
+import dataclasses
 import functools
 
 import jax
@@ -104,3 +105,22 @@ def test_lanes_are_refused_what_they_cannot_do():
         jb.find_gait(jb.seed_scene(), solver="kvaerno3", engine="lanes")
     with pytest.raises(jb.ArgumentError, match="choose one of auto, xla, lanes"):
         jb.find_gait(jb.seed_scene(), engine="fast")
+
+
+class ErrorFunction(jb.laws.AbstractFrictionLaw):
+    """A law that lanes cannot express."""
+
+    mu: float
+
+    def force(self, normal_force, slip_speed):
+        return -self.mu * normal_force * jax.scipy.special.erf(slip_speed / 1e-2)
+
+    def switches(self, slip_speed):
+        return ()
+
+
+def test_every_search_by_what_lanes_lack_is_refused_in_the_same_sentence():
+    scene = dataclasses.replace(jb.seed_scene(), friction=ErrorFunction(mu=0.5))
+    for _ in range(2):
+        with pytest.raises(jb.ArgumentError, match=r"'erf'.*engine=\"xla\""):
+            jb.find_gait(scene, parameters=(), radius_sensitivities=False)
