@@ -3,6 +3,7 @@
 import gc
 import os
 import shutil
+import signal
 import tempfile
 from pathlib import Path
 
@@ -60,6 +61,8 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     """One cache on disk for all workers: what one compiled others load. In CI it is new."""
+    # Commands in the background of a script ignore interrupts, which tests raise.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     if "PYTEST_XDIST_WORKER" in os.environ:
         return
     if config.option.nightly_share is None:
