@@ -6,7 +6,7 @@ two counts. Since 0.12 `ClosedJaxpr` and `Jaxpr` are one class, and `eval_jaxpr`
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +18,8 @@ from jaxlib.mlir import ir
 
 from jaxbiped._types import Numbers, Scalar
 
+ClosedJaxpr: TypeAlias = Any
+"""A program with its constants: its `jaxpr` and its `consts`."""
 CALLS = {
     "call": "call_jaxpr",
     "checkpoint": "jaxpr",

@@ -59,7 +59,7 @@ Judged = tuple[PyTree, float, str]
 def check_wanted(accuracy: object, **replaced: object) -> None:
     """Raises `ArgumentError` unless a number may be asked for beside what else is given."""
     check_positive("accuracy", accuracy)
-    if np.ndim(accuracy):  # type: ignore[arg-type]
+    if np.asarray(accuracy).ndim:
         raise ArgumentError("accuracy has several entries: give one number.")
     for name, value in replaced.items():
         if value is not None:

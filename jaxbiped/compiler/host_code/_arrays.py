@@ -241,7 +241,7 @@ def eigensystem_of(matrix: np.ndarray, *, left: bool, right: bool) -> list[np.nd
 def _complex_vectors(vectors: np.ndarray, imag: np.ndarray) -> np.ndarray:
     """LAPACK tells of a pair the real part and then the imaginary one."""
     found = vectors.astype(np.complex128)
-    for k in np.flatnonzero(imag > 0.0):
+    for k in np.flatnonzero(imag > 0.0).tolist():
         found[:, k] = vectors[:, k] + 1j * vectors[:, k + 1]
         found[:, k + 1] = np.conj(found[:, k])
     return found

@@ -8,10 +8,10 @@ from typing import Any, TypeAlias, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
-from jax.extend.core import ClosedJaxpr, Jaxpr, JaxprEqn, Literal, Var
+from jax.extend.core import Jaxpr, JaxprEqn, Literal, Var
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._jax_versions import called_program, scan_counts
+from jaxbiped._jax_versions import ClosedJaxpr, called_program, scan_counts
 from jaxbiped._types import Numbers
 from jaxbiped.compiler.ir._array_primitives import MOVES, REDUCTIONS, product, reduce
 from jaxbiped.compiler.ir._elementwise_primitives import (

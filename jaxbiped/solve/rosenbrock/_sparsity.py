@@ -5,9 +5,9 @@ Entries that are zero by structure are left out of the elimination.
 
 from typing import NamedTuple
 
-from jax.extend.core import ClosedJaxpr, Jaxpr, Literal, Var
+from jax.extend.core import Jaxpr, Literal, Var
 
-from jaxbiped._jax_versions import called_program
+from jaxbiped._jax_versions import ClosedJaxpr, called_program
 
 
 class Structure(NamedTuple):
