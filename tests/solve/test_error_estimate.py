@@ -48,7 +48,7 @@ def test_a_tolerance_is_tightened_until_the_error_is_what_is_wanted():
         (errors(1.0, floor=1e-5), 1e-12, "rounding of float64: finer steps gain nothing"),
         (errors(1.0), 1e-6, "1e-06 is the finest tolerance"),
         (errors(1.0, hopeless="the foot grazes"), 1e-12, "the foot grazes"),
-        (falling(0.66), 1e-12, "6 tolerances were tried"),
+        (falling(0.66), 1e-14, "6 tolerances were tried"),
     ],
 )
 def test_what_cannot_be_met_says_why_and_keeps_the_best(attempt, finest, reason):
