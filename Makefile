@@ -34,7 +34,7 @@ test: lint
 	$(MAKE) --no-print-directory --jobs 2 types landing
 
 unit: $(VENV)/.installed-dev
-	$(PYTEST) -m "not slow and not nightly"
+	$(PYTEST) -m "not slow"
 
 landing: $(VENV)/.installed-dev
 	$(PYTEST) -m "not nightly"

@@ -87,8 +87,15 @@ def pytest_collection_finish():
     gc.freeze()
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Files with slow tests begin first, so that no worker is left alone with one at the end."""
+    """Files with slow tests begin first, so that no worker is left alone with one at the end.
+
+    Whatever is nightly is slow.
+    """
+    for item in items:
+        if item.get_closest_marker("nightly"):
+            item.add_marker("slow")
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     items.sort(key=lambda item: item.path not in slow)
     if config.option.nightly_share is not None:
@@ -102,7 +109,7 @@ LONGEST_UNIT = 10.0
 
 def pytest_terminal_summary(terminalreporter, config):
     """Names tests that `make check` waits for too long, so that they can be marked."""
-    if "not slow" not in config.option.markexpr:
+    if config.option.markexpr != "not slow":
         return
     seconds: dict[str, float] = {}
     for report in terminalreporter.getreports("passed") + terminalreporter.getreports(""):
