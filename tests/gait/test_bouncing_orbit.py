@@ -18,7 +18,7 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import precision_of
 
 HEIGHT, DRIFT = 0.3, 0.7
-"""Height of the section [m], and speed of the cyclic coordinate [m/s]."""
+"""Height of the section [m], and what the cyclic coordinate gains of the squared speed [s/m]."""
 
 
 class Numbers(NamedTuple):
@@ -44,7 +44,7 @@ class Trampoline(jb.gait.AbstractSystem):
     def vector_field(self, t, y, args):
         depth = args.level - y[1]
         force = jnp.where(depth > 0.0, args.k * depth + args.push, 0.0)
-        return DRIFT + 0.0 * y[2], y[2], force - args.g
+        return DRIFT * y[2] * y[2], y[2], force - args.g
 
     def switches(self, args, y):
         return (Switch(y[1] - args.level, True, force_jumps=self.jumps),)
@@ -80,8 +80,11 @@ def gait(n):
     v = (jnp.sqrt(loss**2 + 4 * n.curb * n.kick) - loss) / (2 * n.curb)
     square = v * v + 2 * n.g * (HEIGHT - n.level)
     peak = n.g + jnp.sqrt(n.g**2 + n.k * square)
-    period = times(n, v)
-    return jnp.stack([v, period, DRIFT * period, peak, n.keep - 2 * n.curb * v])
+    # ∫ v² dt is the area within the cycle: of parabolas above, of an ellipse's part below.
+    reach, root = jnp.sqrt(n.g**2 + n.k * square) / n.k, jnp.sqrt(n.k)
+    low = -jnp.arcsin(n.g / (n.k * reach))
+    area = 2 * square**1.5 / (3 * n.g) + root * reach**2 * (jnp.pi / 2 - low - jnp.sin(2 * low) / 2)
+    return jnp.stack([v, times(n, v), DRIFT * area, peak, n.keep - 2 * n.curb * v])
 
 
 def test_an_orbit_with_its_multiplier_and_all_derivatives():

@@ -9,13 +9,15 @@ from scipy.optimize import brentq
 
 import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
+from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve.controllers._step_control import step_control
 from jaxbiped.variational._flow import Flow
 from jaxbiped.variational._grazing import turns_of
 from jaxbiped.variational._hybrid_system import RedundantWalking, Rolling, Walking
 from jaxbiped.variational._radau_collocation import RADAU, KnownStep
 from jaxbiped.variational._saltation import saltation_at
 from jaxbiped.variational._section_tangents import after_reset, on_section, tangent_on_section
-from jaxbiped.variational._switch_locator import Watch
+from jaxbiped.variational._switch_locator import SwitchLocator, Watch
 from jaxbiped.variational._tangent_solver import TangentSolver, VariationalField
 from jaxbiped.variational._tangents import Seeded, Tangents
 
@@ -73,6 +75,43 @@ def test_of_two_switches_it_is_the_one_that_was_passed_last():
     found = jax.jit(lambda y: saltation_at(other, y, seeded(3), jnp.asarray(True)))(at)
     np.testing.assert_array_equal(found.which, [False, False, True])
     np.testing.assert_array_equal(found.by_state, [0.0, 1.0])
+
+
+def test_across_a_speed_the_rate_of_crossing_is_the_one_before():
+    """Friction that comes on at −2 m/s: the speed falls by 9.8 m/s² before and by 4.8 behind."""
+    watch = Watch(
+        field=lambda t, y, args: (y[1], jnp.where(y[1] > -2.0, -9.8, -4.8)),
+        switches=lambda args, y: (Switch(y[1] + 2.0, True, force_jumps=True),),
+    )
+    at = (jnp.asarray(1.0), jnp.asarray(-2.0 - 1e-12))
+    found = jax.jit(lambda y: saltation_at(watch, y, seeded(3), jnp.asarray(True)))(at)
+    np.testing.assert_allclose(found.change, [0.0, 5.0 / -9.8], atol=1e-9)
+
+
+@pytest.mark.parametrize(("levels", "first"), [((0.25, 0.625), 0.375), ((0.625, 0.25), 0.375)])
+def test_of_the_switches_within_a_step_the_first_one_ends_it(levels, first):
+    """From 1 to 0 in a second, at constant speed."""
+    watch = Watch(
+        field=lambda t, y, args: (-1.0 + 0.0 * y[0],),
+        switches=lambda args, y: tuple(Switch(y[0] - level, True) for level in levels),
+        section=lambda args, y: (0.1 - y[0], jnp.asarray(True)),
+    )
+    locator = SwitchLocator(step_control(1e-6, 1e-8, rms_norm), watch)
+    ends = (jnp.asarray(1.0),), (jnp.asarray(0.0),)
+
+    @jax.jit
+    def told(before, after):
+        zero, one = jnp.zeros(()), jnp.ones(())
+        begun = locator.init(None, zero, one, before, one, (), None, 4.0)[1]
+        later = begun._replace(accepted=jnp.asarray(1))
+        return [locator._crossings(one, (), before, after, each) for each in (begun, later)]
+
+    (crossed, part), (arrives, _) = told(*ends)
+    assert float(part) == pytest.approx(first)
+    assert bool(crossed.any)
+    assert bool(crossed.switch)
+    # The first step of a solve is no arrival.
+    assert (bool(crossed.section), bool(arrives.section)) == (False, True)
 
 
 def test_a_step_behind_a_jump_carries_the_columns_of_the_exact_motion():
