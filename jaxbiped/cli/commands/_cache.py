@@ -10,6 +10,7 @@ from jaxbiped.cli._report import Report, table
 _CONTENT = {
     "lanes": "machine code of lanes",
     "programs": "programs of lanes, without their code",
+    "host": "programs run by NumPy",
     "sources": "digests of the package's source",
     "xla": "programs compiled by XLA",
 }
