@@ -14,6 +14,7 @@ from jaxbiped.continuation import (
     BranchStop,
 )
 from jaxbiped.plot import bifurcation_curves, branch
+from jaxbiped.plot._branch import _value
 from tests.drawn import assert_is_drawn, points_of
 
 STOP = BranchStop(jb.gait.BranchEnd.REACHED, "the range ends", 0.0)
@@ -128,3 +129,11 @@ def test_what_cannot_be_drawn():
         branch([_branch(POINTS), _branch(POINTS, name="m")])
     with pytest.raises(jb.ArgumentError, match="measure = 'hip_z' is not known"):
         branch(_branch(POINTS), "hip_z")
+
+
+def test_measures_are_of_a_footstep():
+    found = _branch([_point(0.02, 0.5, length=0.3)], footsteps=2)
+    measures = {"speed": 0.3 / 0.4, "period": 0.2, "step_length": 0.15, "peak_normal": 20.0,
+                "spectral_radius": 0.5, "omega_1": -1.0}  # fmt: skip
+    for name, value in measures.items():
+        assert _value(name, found, found.points[0]) == pytest.approx(value), name

@@ -1,0 +1,46 @@
+"""Verdicts on results and checks that are written down: by how much they are off."""
+
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from jaxbiped.extremes import Case, judge
+from jaxbiped.extremes import _verdict as verdicts
+from jaxbiped.extremes._check_solve import Checked
+from jaxbiped.solve._error_estimate import ErrorEstimate
+from jaxbiped.solve._trajectory import Trajectory
+
+CASE = Case("K", {"K": 1e6}, {"K": 1e6}, duration=0.02)
+STATE = np.array([float(leaf) for leaf in jb.seed_state()])
+
+
+@pytest.mark.parametrize(
+    ("off", "doubt", "met", "lowest", "verdict"),
+    [
+        (0.9e-4, 1e-7, True, 0.1, "accurate"),
+        (1.1e-4, 1e-7, True, 0.1, "silently_wrong"),
+        (0.0, 0.31e-4, True, 0.1, "unresolved"),
+        (0.0, 0.29e-4, True, 0.1, "accurate"),
+        (1.1e-4, 1e-7, False, 0.1, "flagged"),
+        (0.0, 1e-7, True, -0.01, "silently_wrong"),
+        (np.nan, 1e-7, True, 0.1, "silently_wrong"),
+    ],
+)
+def test_a_verdict_is_by_the_error_that_was_asked_for(
+    off, doubt, met, lowest, verdict, monkeypatch
+):
+    """The rate of leg 1 is off by so much, in units of √(g/l), where 1e-4 was wanted."""
+    moved = STATE + off * np.sqrt(9.8 / 0.4) * np.eye(8)[6]
+    error = ErrorEstimate(None, 1e-5, 1e-4, 1e-7, 2, met, "" if met else "it is too stiff")
+    whole = np.asarray(0)
+    walk = Trajectory(np.array([0.02]), jb.State(*moved[:, None]), whole, whole, whole, error=error)
+    monkeypatch.setattr(verdicts, "simulate", lambda *_, **__: walk)
+    monkeypatch.setattr(verdicts, "checked", lambda *_, **__: Checked(STATE, doubt, lowest))
+    found = judge(CASE)
+    assert found.verdict == verdict
+    assert found.wanted == 1e-4
+    if verdict == "accurate":
+        assert found.error == pytest.approx(off, abs=1e-15)
+        assert (found.told, found.outcome) == (1e-5, "walking")
+    if not met:
+        assert found.reason == "accuracy not met: it is too stiff"
