@@ -24,7 +24,7 @@ from jaxbiped.optimise._objectives import Evaluation, _cost_of_transport, _root_
 from jaxbiped.optimise._optimality import optimality_of
 from jaxbiped.optimise._requirements import requirements_of
 from jaxbiped.optimise._runs import Outcome, Runs
-from jaxbiped.optimise._trust_region import _Local, run_trust_region
+from jaxbiped.optimise._trust_region import _Local, _updated, run_trust_region
 from jaxbiped.optimise._variables import variables_of
 
 SCENE = jb.ladder()["rigid"]
@@ -424,3 +424,20 @@ def test_an_optimum_that_misses_a_requirement_is_infeasible():
     runs = Runs(made, 10, "trust-region", False)
     runs.run(made.latest)
     assert runs.outcome() is Outcome.INFEASIBLE
+
+
+def test_curvature_is_learnt_from_two_gradients():
+    """The secant condition B s = y of a quadratic, and Powell's damping where it curves down."""
+    hessian = np.array([[2.0, 0.5], [0.5, 1.0]])
+    none, step = np.zeros((0, 2)), np.array([0.1, -0.3])
+
+    def local(u, matrix):
+        empty = np.zeros(0)
+        return _Local(u, 0.0, matrix @ u, empty, none, empty, none, np.zeros(0, bool))
+
+    here = np.array([0.2, 0.4])
+    learnt = _updated(np.eye(2), local(here, hessian), local(here + step, hessian))
+    np.testing.assert_allclose(learnt @ step, hessian @ step)
+    assert np.linalg.eigvalsh(learnt).min() > 0.0
+    damped = _updated(np.eye(2), local(here, -hessian), local(here + step, -hessian))
+    assert step @ damped @ step == pytest.approx(0.2 * step @ step)
