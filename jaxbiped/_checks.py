@@ -89,7 +89,7 @@ def holds_somewhere(condition: "ArrayLike") -> bool:
     """Whether a condition is known to hold in any entry; what is being traced is not known."""
     import numpy as np
 
-    return not _is_traced(condition) and bool(np.any(condition))
+    return not _is_traced(condition) and bool(np.any(np.asarray(condition)))
 
 
 def is_zero_somewhere(value: "ArrayLike") -> bool:

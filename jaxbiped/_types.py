@@ -52,6 +52,28 @@ def choose(condition: Scalar, a: SomeTree, b: SomeTree) -> SomeTree:
     return jax.lax.cond(condition, lambda: a, lambda: b)
 
 
+def as_array(values: np.ndarray) -> Array:
+    """An array of JAX from one of NumPy's that nobody changes any more.
+
+    Told its own type, JAX compiles no program for it: else one for each shape.
+    """
+    values = np.asarray(values)  # an entry of one, too
+    return jnp.asarray(values, dtype=values.dtype)
+
+
+def by_numpy(function: Callable[..., Any], *given: Any) -> Any:
+    """`function(numpy, *given)` of arrays: by JAX's NumPy where any is traced, else by NumPy.
+
+    There JAX would compile a program for each operation. The results are arrays of JAX, of plain
+    numbers plain numbers.
+    """
+    if any(isinstance(each, jax.core.Tracer) for each in given):
+        return function(jnp, *given)
+    if all(isinstance(each, float | int) for each in given):
+        return function(np, *given)
+    return jtu.tree_map(as_array, function(np, *map(np.asarray, given)))
+
+
 def as_float(value: Parameter) -> Scalar:
     """A floating-point array of JAX's default width (64 bits unless changed) or its own.
 
@@ -64,7 +86,7 @@ def as_float(value: Parameter) -> Scalar:
     if not is_number(value):
         return value
     try:
-        # By NumPy: JAX would compile a program for each kind of number.
-        return jnp.asarray(np.asarray(value, dtype=jax.dtypes.canonicalize_dtype(float)))
+        # A copy: the caller's own array may change.
+        return as_array(np.array(value, dtype=jax.dtypes.canonicalize_dtype(float)))
     except (TypeError, ValueError):
         return value

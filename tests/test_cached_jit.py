@@ -89,6 +89,21 @@ def test_traced_and_transformed_it_is_a_part_of_the_whole(cache):
     )
 
 
+def test_alone_it_is_one_program_and_traced_a_part_of_the_whole(cache):
+    """An energy by itself; its numbers are plain, and not compiled in."""
+    scene, plain = jb.seed_scene(), jb.State(*[float(leaf) for leaf in jb.seed_state()])
+    found = jb.dynamics.energies(scene, plain)
+    (kept,) = cache.iterdir()
+    still = dict.fromkeys(("hip_vx", "hip_vz", "omega_1", "omega_2"), 0.0)
+    assert jb.dynamics.energies(scene, plain._replace(**still)).kinetic == 0.0 < found.kinetic
+    assert list(cache.iterdir()) == [kept]
+    of = jb.dynamics.energies
+    traced, plainly = (jax.make_jaxpr(f)(scene, jb.seed_state()) for f in (of, of.__wrapped__))
+    assert str(traced) == str(plainly)
+    whole = jax.jit(jb.dynamics.energies)(scene, jb.seed_state())
+    np.testing.assert_allclose(found.kinetic, whole.kinetic, rtol=1e-14)
+
+
 def test_functions_of_a_notebook_are_compiled_as_ever(cache):
     @cached_jit
     def double(x, name="a"):

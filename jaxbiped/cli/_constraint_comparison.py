@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxbiped._ending import Ending
 from jaxbiped._progress import stage
+from jaxbiped._types import as_float
 from jaxbiped.cli._integrator import Integrator
 from jaxbiped.compiler import default_threads
 from jaxbiped.constraints._constraint_methods import method_named
@@ -155,7 +156,8 @@ def _compiled(
     )
     # XLA takes over where the scene holds an operation that lanes lack.
     request = replace(request, replaceable=True)
-    jax.block_until_ready(replace(request, duration=_MOMENT * request.duration)())
+    moment = as_float(_MOMENT * float(request.duration))
+    jax.block_until_ready(replace(request, duration=moment)())
     return request
 
 

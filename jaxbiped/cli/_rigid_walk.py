@@ -77,7 +77,7 @@ def run_rigid_walk(
         "model": "rigid",
         "ending": str(walk.outcome),
         "slope_rad": float(scene.ground.slope),
-        "duration_s": float(walk.t[-1]),
+        "duration_s": float(np.asarray(walk.t)[-1]),
         "footsteps": max(int(walk.arrivals.total) - 1, 0),
         "steps": _footsteps(scene, walk.arrivals),
         "solver": {
@@ -107,7 +107,8 @@ def run_rigid_walk(
         from jaxbiped import plot
 
         path = output.out / "leg_angles.png"
-        plot.rigid_leg_angles(scene, state, duration=min(float(walk.t[-1]), _SHOWN)).savefig(path)
+        shown = min(numbers["duration_s"], _SHOWN)
+        plot.rigid_leg_angles(scene, state, duration=shown).savefig(path)
         page = plot.view(scene, _beginning(walk), start=state).save(output.out / "walk.html")
         for written in (path, page):
             report.say(f"wrote {written}")
@@ -126,7 +127,7 @@ def _walk(scene: RigidScene, state: RigidState, options: JsonObject) -> Trajecto
 def _beginning(walk: Trajectory[RigidState]) -> Trajectory[RigidState]:
     """The part of a long walk that can be watched: as far as its last heel strike there."""
     assert walk.arrivals is not None
-    if float(walk.t[-1]) <= _SHOWN:
+    if float(np.asarray(walk.t)[-1]) <= _SHOWN:
         return walk
     count = int(np.searchsorted(np.asarray(walk.arrivals.t), _SHOWN))
     t, state = jtu.tree_map(lambda leaf: leaf[:count], walk.arrivals[1:])

@@ -6,11 +6,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxbiped._cached_jit import cached_jit
+from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.simulate._rigid_walk import rigid_walk
@@ -55,15 +58,20 @@ def self_test() -> tuple[Truth, ...]:
 def _fall() -> tuple[float, float]:
     """Of a walker that is let go 2 m above level ground: height of its hip, and by gravity."""
     scene = with_parameters(seed_scene(), {"slope": 0.0})
-    start = State(*map(jnp.asarray, (0.0, 2.0, 0.1, -0.1, 0.0, 0.0, 0.0, 0.0)))
+    start = State(*map(as_float, (0.0, 2.0, 0.1, -0.1, 0.0, 0.0, 0.0, 0.0)))
+    found, slope = _height_and_slope(scene, start, as_float(9.8))
+    return float(found), float(slope)
 
+
+@cached_jit
+def _height_and_slope(scene: Scene, start: State, g: Scalar) -> tuple[Scalar, Scalar]:
     def height(g: jax.Array) -> jax.Array:
         moved = with_parameters(scene, {"g": g})
         end = simulate(moved, start, duration=_FALL, save="end", engine="lanes")
         return end.final.hip_z
 
-    found, slope = jax.jvp(height, (jnp.asarray(9.8),), (jnp.ones(()),))
-    return float(found), float(slope)
+    found: tuple[Scalar, Scalar] = jax.jvp(height, (g,), (jnp.ones_like(g),))
+    return found
 
 
 def _footstep() -> float:
@@ -73,6 +81,6 @@ def _footstep() -> float:
     walker = Walker(m=1e-13, J=0.0, l=1.0, d=1.0, r=0.0, hip_mass=1.0)
     scene = RigidScene(walker=walker, ground=Ground(slope=0.009, g=1.0))
     swing = rate - rate * (1.0 - np.cos(2.0 * theta))
-    start = RigidState(*map(jnp.asarray, (0.0, -theta, theta, swing, rate)))
+    start = RigidState(*map(as_float, (0.0, -theta, theta, swing, rate)))
     end = rigid_walk(scene, start, footsteps=1)
-    return float(jnp.max(jnp.stack([end.final.theta_1, end.final.theta_2])))
+    return max(float(end.final.theta_1), float(end.final.theta_2))

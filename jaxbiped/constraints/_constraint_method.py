@@ -7,7 +7,7 @@ import equinox as eqx
 
 from jaxbiped._checks import check_at_least
 from jaxbiped._parameter import check_parameters
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.linalg._symmetric import factorise, solve
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def stabilised(system: Constrained, damping: Scalar, stiffness: Scalar) -> list[
 
 def inverse_masses(masses: list[Scalar]) -> list[Scalar]:
     """The diagonal of M⁻¹."""
-    return [1.0 / mass for mass in masses]
+    return [by_numpy(lambda _, mass: 1.0 / mass, mass) for mass in masses]
 
 
 class AbstractExactProjection(AbstractProjectingMethod):

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, gram, inverse_masses
@@ -27,8 +28,7 @@ def check_independent(
     """
     if not method.needs_independent or not linkage.joints:
         return
-    at = constraints_of(linkage, q, [jnp.zeros_like(value) for value in q])
-    lower = gram(at.rows, inverse_masses(masses_of(linkage)))
+    lower = _gram_of(linkage, list(q))
     entries = [entry for row in lower for entry in row]
     if any(isinstance(entry, jax.core.Tracer) or jnp.ndim(entry) for entry in entries):
         return
@@ -43,3 +43,10 @@ def check_independent(
             "constraints say what others say already, which makes it singular; use Penalty, "
             "Augmented or Index1Augmented."
         )
+
+
+@kept_alone
+def _gram_of(linkage: Linkage, q: list[Scalar]) -> list[list[Scalar]]:
+    """J M⁻¹ Jᵀ of its constraints at rest: the entries of the lower triangle."""
+    at = constraints_of(linkage, q, [jnp.zeros_like(value) for value in q])
+    return gram(at.rows, inverse_masses(masses_of(linkage)))

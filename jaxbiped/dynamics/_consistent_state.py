@@ -3,9 +3,11 @@
 from typing import NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._checks import ArgumentError, holds_somewhere
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
 from jaxbiped.constraints._linkage_constraints import masses_of
 from jaxbiped.constraints._projection import correct_step, nearest_consistent
@@ -91,11 +93,17 @@ def consistent_state(
     units = {"position": "m", "rate": "m/s", "normalisation": "(no unit)"}
     for name, unit in units.items():
         value, bound = getattr(off, name), getattr(max_violation, name)
-        if holds_somewhere(value > bound):
+        if holds_somewhere(by_numpy(lambda _, value, bound: value > bound, value, bound)):
             raise ArgumentError(
-                f"state violates its constraints by {float(jnp.max(value)):.3g} {unit} "
+                f"state violates its constraints by {float(np.max(np.asarray(value))):.3g} {unit} "
                 f"({name}), which is too far to correct: at most {float(bound):g} is allowed."
             )
+    return _corrected(scene, state, off)
+
+
+@kept_alone
+def _corrected(scene: RedundantScene, state: LegsState, off: Violation) -> Consistent:
+    """The nearest state that keeps the constraints."""
     q, v = coordinates_of(scene, state)
     masses = masses_of(scene.linkage)
     new_q, new_v = nearest_consistent(scene.linkage, q, v)

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
 from jaxbiped.dynamics._feet import Foot, feet, touches
@@ -55,6 +56,7 @@ class Powers(NamedTuple):
     motors: tuple[Scalar, ...] | None = None
 
 
+@kept_alone
 def energies(scene: Scene, state: State) -> Energies:
     """Kinetic, gravitational and elastic energy; leaves shaped as the state's.
 
@@ -88,6 +90,7 @@ def kinetic_and_moment(scene: AbstractScene, state: State) -> tuple[Scalar, Scal
     return kinetic, height
 
 
+@kept_alone
 def powers(scene: Scene, state: State) -> Powers:
     """Power of gravity and the contact's powers; leaves shaped as the state's.
 

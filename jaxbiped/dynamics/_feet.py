@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._actuation import preload
 from jaxbiped.dynamics._redundant_state import CompliantState, Leg, legs_of
@@ -49,6 +50,7 @@ class Feet(NamedTuple):
     foot_2: Foot
 
 
+@kept_alone
 def feet(scene: CompliantScene, state: CompliantState) -> Feet:
     """Both feet's kinematics (model: foot centre O = S + (l − r)(sin θ, −cos θ)).
 
@@ -97,6 +99,7 @@ def _foot(scene: CompliantScene, number: int, leg: Leg) -> Foot:
     )
 
 
+@kept_alone
 def touches(foot: Foot) -> Scalar:
     """Whether the foot is in contact (boolean): indented and admitted by the clearance rule.
 
@@ -110,6 +113,7 @@ def touches(foot: Foot) -> Scalar:
     return below if foot.admitted is None else below & foot.admitted
 
 
+@kept_alone
 def landings(before: Feet, after: Feet) -> tuple[Scalar, Scalar]:
     """Whether each foot comes to touch between two moments and is the one ahead (booleans).
 
@@ -123,6 +127,7 @@ def landings(before: Feet, after: Feet) -> tuple[Scalar, Scalar]:
     return lands(0), lands(1)
 
 
+@kept_alone
 def standing_foot(both: Feet) -> Scalar:
     """The foot that alone touches: 1 or 2, or 0 where none or both do."""
     touch_1, touch_2 = touches(both.foot_1), touches(both.foot_2)

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet
@@ -56,6 +57,7 @@ class FootForces(NamedTuple):
     foot_2: FootForce
 
 
+@kept_alone
 def foot_forces(scene: CompliantScene, state: CompliantState) -> FootForces:
     """Forces on both feet at a state; leaves shaped as the state's.
 

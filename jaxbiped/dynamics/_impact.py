@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._push_off import push_off_impulse
@@ -26,6 +27,7 @@ class Impact(NamedTuple):
     lifting: Scalar
 
 
+@kept_alone
 def impact(scene: RigidScene, state: RigidState) -> Impact:
     """The plastic impact of leg 1's foot, leg 2's being released at once.
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._types import Scalar, Time
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
 from jaxbiped.constraints._linkage import Linkage
@@ -59,6 +60,7 @@ def motion_under(
     return LinkageMotion(accelerations, joints, at.violation)
 
 
+@kept_alone
 def linkage_motion(scene: LinkageScene, state: LinkageState) -> LinkageMotion:
     """Accelerations and joint forces of a linkage in gravity; leaves shaped as the state's.
 
@@ -77,6 +79,7 @@ def linkage_motion(scene: LinkageScene, state: LinkageState) -> LinkageMotion:
     return motion_under(linkage, scene.method, state.q, state.v, applied)
 
 
+@kept_alone
 def linkage_field(t: Time, state: LinkageState, scene: LinkageScene) -> LinkageState:
     """Time derivative of a linkage's state, in the form that `diffrax.ODETerm` takes.
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.dynamics._actuation import hip_torques
@@ -76,6 +77,7 @@ def leg_acceleration(leg: LegLoad, hip_ax: Scalar, hip_az: Scalar) -> Scalar:
     return (leg.torque - leg.coupling_x * hip_ax - leg.coupling_z * hip_az) / leg.inertia
 
 
+@kept_alone
 def accelerations(scene: Scene, state: State) -> Accelerations:
     """Accelerations at a state; leaves shaped as the state's.
 
@@ -144,6 +146,7 @@ def bristle_rates(
     return rates
 
 
+@kept_alone
 def vector_field(t: Time, state: State, scene: Scene) -> State:
     """Time derivative of the state, in the form that `diffrax.ODETerm` takes.
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._actuation import actuators_of
@@ -35,6 +36,7 @@ def push_off_impulse(scene: RigidScene, state: RigidState) -> Impulse | None:
     return Impulse(-size * sine, size * cosine)
 
 
+@kept_alone
 def push_off_work(scene: RigidScene, state: RigidState) -> Scalar:
     """Work of the push-off at a state just before the impact [J]; zero without one.
 

@@ -5,6 +5,7 @@ from typing import NamedTuple, cast
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
 from jaxbiped.constraints._linkage_constraints import (
@@ -82,6 +83,7 @@ def with_coordinates(state: PyTree, q: list[Scalar], v: list[Scalar]) -> LegsSta
     return type(state)(*q, *v, state.bristle_1, state.bristle_2)
 
 
+@kept_alone
 def redundant_motion(scene: RedundantScene, state: LegsState) -> RedundantMotion:
     """Accelerations and the hip's reaction by the scene's method.
 
@@ -101,6 +103,7 @@ def redundant_motion(scene: RedundantScene, state: LegsState) -> RedundantMotion
     return RedundantMotion(moved.accelerations, force, minimal)
 
 
+@kept_alone
 def redundant_field(t: Time, state: LegsState, scene: RedundantScene) -> LegsState:
     """Time derivative of a redundant state, in the form that `diffrax.ODETerm` takes.
 
@@ -125,6 +128,7 @@ def _(scene: RedundantScene) -> VectorField:
     return redundant_field
 
 
+@kept_alone
 def violation(scene: RedundantScene, state: LegsState) -> Violation:
     """How far apart the two legs' hips are, and how fast they part.
 
@@ -142,6 +146,7 @@ def violation(scene: RedundantScene, state: LegsState) -> Violation:
     return Violation(jnp.hypot(*at.violation[:2]), jnp.hypot(*at.rate[:2]), off)
 
 
+@kept_alone
 def hip_force(scene: CompliantScene, state: PyTree) -> HipForce:
     """The hip's reaction on leg 1, in either formulation.
 

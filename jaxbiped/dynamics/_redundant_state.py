@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias, cast
 
 import jax.numpy as jnp
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._bristle_state import BristleState, MinimalState
@@ -140,6 +141,7 @@ def _(scene: RedundantScene) -> type[LegsState]:
     return EulerState if scene.orientation == "euler" else RedundantState
 
 
+@kept_alone
 def redundant_state(scene: RedundantScene, state: MinimalState) -> LegsState:
     """The consistent state of a redundant scene that is the same as a minimal one.
 
@@ -190,8 +192,11 @@ def minimal_state(scene: AbstractScene, state: CompliantState) -> MinimalState:
     Returns:
         A `State`, or a `BristleState` where there are bristles.
     """
-    if not is_redundant(state):
-        return state
+    return _half_way(scene, state) if is_redundant(state) else state
+
+
+@kept_alone
+def _half_way(scene: AbstractScene, state: LegsState) -> MinimalState:
     one, two = legs_of(scene, state)
     values = dict(
         hip_x=0.5 * (one.hip_x + two.hip_x),

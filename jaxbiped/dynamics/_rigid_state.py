@@ -4,6 +4,7 @@ from typing import NamedTuple, TypeAlias
 
 import jax.numpy as jnp
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._bristle_state import MinimalState
 from jaxbiped.dynamics._formulation import state_type
@@ -39,6 +40,7 @@ def _(scene: RigidScene) -> type[RigidState]:
     return RigidState
 
 
+@kept_alone
 def whole_state(scene: RigidScene, state: RigidState) -> State:
     """The same motion in the compliant walker's coordinates, its stance foot just touching.
 

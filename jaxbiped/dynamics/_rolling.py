@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.dynamics._actuation import hip_torques
@@ -141,6 +142,7 @@ class RollingMotion(NamedTuple):
     force: FootForce
 
 
+@kept_alone
 def rolling(scene: RigidScene, state: RigidState) -> RollingMotion:
     """Accelerations and the ground's reaction at a state; leaves shaped as the state's.
 
@@ -176,6 +178,7 @@ def rolling(scene: RigidScene, state: RigidState) -> RollingMotion:
     return RollingMotion(alpha_1, alpha_2, force)
 
 
+@kept_alone
 def rolling_field(t: Time, state: RigidState, scene: RigidScene) -> RigidState:
     """Time derivative of the state, in the form that `diffrax.ODETerm` takes.
 

@@ -63,7 +63,7 @@ def judge(case: Case) -> Verdict:
             asked = dict(case.asked)
             state = start_of(scene, start, asked.pop("dtype", "float64"))
             walk = simulate(scene, state, duration=case.time, save="end", **asked)
-            end = np.array([float(leaf[-1]) for leaf in walk.state], float)
+            end = np.array([float(leaf) for leaf in walk.final], float)
         except ArgumentError as error:
             return Verdict("refused", str(error))
         except Exception as error:

@@ -2,14 +2,14 @@
 
 import enum
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.gait._newton import (
     Method,
     Progress,
@@ -144,10 +144,12 @@ def search(
 
 def walks_only(found: Found) -> Found:
     """The same, told as no walk where the orbit is none."""
-    no_walk = (found.ending == int(Search.FOUND)) & ~found.sound
-    # A sum, which NumPy takes as well: what is found has code 0.
-    added = no_walk.astype(found.ending.dtype) * int(Search.NO_WALK)
-    return found._replace(ending=found.ending + added)
+
+    def told(numpy: Any, ending: Any, sound: Any) -> Any:
+        no_walk = (ending == int(Search.FOUND)) & ~sound
+        return numpy.where(no_walk, int(Search.NO_WALK), ending)
+
+    return found._replace(ending=by_numpy(told, found.ending, found.sound))
 
 
 def _with_soundness(spec: ReturnMapSpec, args: PyTree, guess: PyTree, end: Progress) -> Scalar:

@@ -12,7 +12,7 @@ from jaxtyping import PyTree
 from jaxbiped._ending import Ending
 from jaxbiped._quantity import Quantity
 from jaxbiped._summary import summary
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._fixed_point_search import Found, Search
@@ -159,7 +159,12 @@ class Gait(eqx.Module):
     @property
     def stable(self) -> Scalar:
         """Whether a gait was found and all its multipliers lie inside the unit circle."""
-        return (self.ending == int(Search.FOUND)) & (self.measures.spectral_radius < 1.0)
+        found: Scalar = by_numpy(
+            lambda _, ending, radius: (ending == int(Search.FOUND)) & (radius < 1.0),
+            self.ending,
+            self.measures.spectral_radius,
+        )
+        return found
 
 
 Described: TypeAlias = tuple[tuple[str, ...], tuple[int, ...], bool]

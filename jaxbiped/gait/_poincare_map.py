@@ -12,7 +12,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._cached_jit import cached_jit
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import Recorded
 from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
@@ -85,7 +85,9 @@ def recurring_indices(system: AbstractSystem, y: PyTree) -> list[int]:
 def recurring_components(system: AbstractSystem, y: PyTree) -> Scalar:
     """The components that must return, shape (m,)."""
     leaves = jtu.tree_leaves(y)
-    return jnp.stack([leaves[i] for i in recurring_indices(system, y)])
+    parts = [leaves[i] for i in recurring_indices(system, y)]
+    found: Scalar = by_numpy(lambda numpy, *leaves: numpy.stack(leaves), *parts)
+    return found
 
 
 def state_with(system: AbstractSystem, like: PyTree, recurring: Scalar) -> PyTree:

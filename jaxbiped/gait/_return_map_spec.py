@@ -4,12 +4,9 @@ from typing import cast
 
 import diffrax
 import equinox as eqx
-import jax
-import jax.numpy as jnp
-import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, Time
+from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.scene._abstract_scene import AbstractScene
@@ -107,7 +104,5 @@ class _Arrival(eqx.Module):
 
 
 def _patience(length: Scalar, g: Scalar) -> Scalar:
-    if isinstance(length, jax.core.Tracer) or isinstance(g, jax.core.Tracer):
-        return _PATIENCE * jnp.sqrt(length / g)
-    # By NumPy, to the same bits: JAX would compile a program for each operation.
-    return jnp.asarray(_PATIENCE * np.sqrt(np.asarray(length) / np.asarray(g)))
+    found: Scalar = by_numpy(lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), length, g)
+    return found

@@ -44,7 +44,9 @@ class Prediction(NamedTuple):
     def state_at(self, moved: np.ndarray) -> PyTree:
         """The state where parameters are so many sizes further, to first order."""
         return jtu.tree_map(
-            lambda leaf, slope: as_float(leaf + float(slope @ moved)), self.state, self.state_slopes
+            lambda leaf, slope: as_float(np.asarray(leaf) + float(slope @ moved)),
+            self.state,
+            self.state_slopes,
         )
 
 

@@ -6,10 +6,9 @@ They are what the walker itself does not know: integrals over a cycle, a clock, 
 from collections import namedtuple
 from typing import Any
 
-import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import AbstractSection
 
@@ -40,7 +39,7 @@ def _put_together(motion: Any, coordinates: dict[str, Any]) -> Any:
 
 def augment(state: WalkerState, names: tuple[str, ...]) -> PyTree:
     """A walker's state with coordinates of these names, which begin at zero."""
-    zero = jnp.zeros_like(state.hip_x)
+    zero = by_numpy(lambda numpy, hip_x: numpy.zeros_like(hip_x), state.hip_x)
     return _augmented(type(state), names)(**dict.fromkeys(names, zero), **state._asdict())
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from tqdm import tqdm
 
 from jaxbiped._checks import check_choice, check_not_negative, check_positive, check_type
+from jaxbiped._types import as_float
 from jaxbiped.basins._fractions import Fraction, wilson_interval
 from jaxbiped.basins._label import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock
@@ -176,7 +177,7 @@ def certify(
         multiplier_errors=errors,
         unit_multiplier_error=float(gait.unit_multiplier_error),
         stable=None if undecided else bool(np.all(sizes < 1.0)),
-        sensitivity_norm=(float(norm.values[0]), float(norm.errors[0])),
+        sensitivity_norm=(np.asarray(norm.values).item(), np.asarray(norm.errors).item()),
         basin=basin,
         fatal_push=push_found,
         walk=walk,
@@ -226,7 +227,8 @@ def _fatal_push(knows: Labelling) -> FatalShock:
 def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> Walked:
     state: WalkerState = gait.measures.state
     fast = [name for name in state._fields if name.startswith(("hip_v", "omega"))]
-    pushed = state._replace(**{name: getattr(state, name) * (1.0 + push) for name in fast})
+    faster = {name: as_float(float(getattr(state, name)) * (1.0 + push)) for name in fast}
+    pushed = state._replace(**faster)
     walk: Trajectory[Any]
     if isinstance(scene, RigidScene):
         walk = rigid_walk(scene, cast(RigidState, pushed), footsteps=count, max_arrivals=count)

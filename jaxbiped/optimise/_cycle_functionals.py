@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._cached_jit import cached_jit
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, as_float, by_numpy
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._fixed_point_search import LOOSER
@@ -100,7 +100,9 @@ def cycle_spec(
         system=system,
         section=section,
         solver=orbit_solver(None, rigid=not scene.compliant),
-        max_time=_PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g),
+        max_time=by_numpy(
+            lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.walker.l, scene.ground.g
+        ),
         steps=footsteps,
         max_solver_steps=max(each.max_solver_steps for each in ACCURACIES.values()),
         engine=engine,
@@ -115,7 +117,7 @@ def functional_precision(
     if scene.compliant and accuracy in _COMPLIANT:
         found, share = _COMPLIANT[accuracy], 1.0 if scene.actuation is None else _DRIVEN
         share = _BOUND if "radius_bound" in names else share
-    return Precision(*(jnp.asarray(share * tolerance) for tolerance in found))
+    return Precision(*(as_float(share * tolerance) for tolerance in found))
 
 
 @cached_jit

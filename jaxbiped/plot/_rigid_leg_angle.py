@@ -1,12 +1,14 @@
 """Leg angles of the rigid walker over time."""
 
 import jax
-import jax.numpy as jnp
+import jax.tree_util as jtu
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import check_positive
+from jaxbiped._types import Scalar, as_array, as_float
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.plot._leg_angle import draw_leg_angles
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -35,10 +37,17 @@ def rigid_leg_angles(
         ArgumentError: a duration not above 0.
     """
     check_positive("duration", duration, "s")
-    times = duration * jnp.linspace(1.0 / _SAMPLES, 1.0, _SAMPLES)
-    walks = jax.vmap(lambda t: rigid_walk(scene, state, duration=t))(times)
-    assert walks.arrivals is not None
-    odd = np.asarray(walks.arrivals.total) % 2 == 1
-    one, two = np.asarray(walks.final.theta_1), np.asarray(walks.final.theta_2)
+    times = float(duration) * np.linspace(1.0 / _SAMPLES, 1.0, _SAMPLES)
+    scene, state = jtu.tree_map(as_float, (scene, state))
+    total, one, two = map(np.asarray, _walked(scene, state, as_array(times)))
+    odd = total % 2 == 1
     angles = (np.where(odd, two, one), np.where(odd, one, two))
     return draw_leg_angles(times, angles, "Leg angles on rigid feet", ax)
+
+
+@cached_jit
+def _walked(scene: RigidScene, state: RigidState, times: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """Of walks for these times [s]: how many feet came down, and the legs' last angles."""
+    walks = jax.vmap(lambda t: rigid_walk(scene, state, duration=t))(times)
+    assert walks.arrivals is not None
+    return walks.arrivals.total, walks.final.theta_1, walks.final.theta_2

@@ -27,7 +27,7 @@ def end_time(trajectory: Trajectory) -> float:
         ValueError: the trajectory was not saved step by step, or this is a batch.
     """
     trajectory.require_dense()
-    return float(trajectory.t[-1])
+    return float(np.asarray(trajectory.t)[-1])
 
 
 def state_at(trajectory: Trajectory, t: npt.ArrayLike) -> State:

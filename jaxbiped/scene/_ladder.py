@@ -3,6 +3,7 @@
 import dataclasses
 
 from jaxbiped._checks import check_type
+from jaxbiped._types import by_numpy
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._seed import seed_scene
@@ -48,8 +49,8 @@ def ladder(scene: Scene | None = None) -> dict[str, Scene | RigidScene]:
     bristles = LuGre(
         mu_static=law.mu_static,
         mu_kinetic=law.mu_kinetic,
-        v_s=1.0 / law.xi,
-        sigma_0=law.mu_static / _GIVE,
+        v_s=by_numpy(lambda _, xi: 1.0 / xi, law.xi),
+        sigma_0=by_numpy(lambda _, mu: mu / _GIVE, law.mu_static),
         sigma_1=_BRISTLE_DAMPING,
     )
     creep = RegularisedCoulomb(mu=law.mu_kinetic, v_d=_CREEP)

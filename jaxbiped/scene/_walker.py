@@ -8,7 +8,7 @@ from jaxbiped._checks import (
     is_zero_somewhere,
 )
 from jaxbiped._parameter import check_parameters, parameter
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Parameter, Scalar, by_numpy
 
 
 class Walker(eqx.Module):
@@ -50,9 +50,11 @@ class Walker(eqx.Module):
     @property
     def hip_to_foot(self) -> Scalar:
         """Distance from the hip to the centre of the foot, l − r [m]."""
-        return self.l - self.r
+        found: Scalar = by_numpy(lambda _, l, r: l - r, self.l, self.r)
+        return found
 
     @property
     def total_mass(self) -> Scalar:
         """Mass of both legs and the hip [kg]."""
-        return 2.0 * self.m + self.hip_mass
+        found: Scalar = by_numpy(lambda _, m, hip: 2.0 * m + hip, self.m, self.hip_mass)
+        return found

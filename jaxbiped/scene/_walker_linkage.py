@@ -1,8 +1,8 @@
 """The walker as a linkage: two legs and one pin."""
 
-import jax.numpy as jnp
+from typing import Any
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.constraints._linkage import Body, Joint, Linkage
 from jaxbiped.scene._walker import Walker
 
@@ -12,9 +12,13 @@ def leg_of(walker: Walker) -> tuple[Body, Scalar]:
 
     Both halves move with the hip, so that together they are the walker's hip mass.
     """
-    mass = walker.m + 0.5 * walker.hip_mass
-    distance = walker.m * walker.d / mass
-    inertia = walker.J + walker.m * walker.d * (walker.d - distance)
+
+    def of(_: Any, m: Any, d: Any, J: Any, hip_mass: Any) -> tuple[Any, Any, Any]:
+        mass = m + 0.5 * hip_mass
+        distance = m * d / mass
+        return mass, J + m * d * (d - distance), distance
+
+    mass, inertia, distance = by_numpy(of, walker.m, walker.d, walker.J, walker.hip_mass)
     return Body(mass, inertia), distance
 
 
@@ -34,5 +38,5 @@ def walker_linkage(walker: Walker, orientation: str = "angle") -> Linkage:
         ArgumentError: an unknown orientation.
     """
     leg, distance = leg_of(walker)
-    hip = (jnp.zeros_like(distance), distance)
+    hip = (by_numpy(lambda numpy, distance: numpy.zeros_like(distance), distance), distance)
     return Linkage((leg, leg), (Joint(hip, hip, 0, 1),), orientation)

@@ -7,10 +7,10 @@ import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, ArrayLike
+from jaxtyping import Array
 
 from jaxbiped._cached_jit import cached_jit
-from jaxbiped._types import Scalar
+from jaxbiped._types import as_float
 from jaxbiped.compiler import LaneEngine, Request
 from jaxbiped.dynamics._state import State
 from jaxbiped.simulate._recorded_steps import recorded_steps
@@ -127,9 +127,6 @@ def _setting(run: "Simulation") -> Setting:
 
 
 def _solve(run: "Simulation") -> Solve:
-    def number(value: ArrayLike) -> Scalar:
-        return jnp.asarray(value, dtype=jnp.float64)
-
     footsteps = 0 if run.footsteps is None else run.footsteps
     return Solve(
         scene=run.scene,
@@ -139,7 +136,7 @@ def _solve(run: "Simulation") -> Solve:
         rtol=run.rtol,
         atol=run.atol,
         units=run.units,
-        footsteps=number(footsteps),
-        patience=number(PATIENCE * footsteps),
-        max_attempts=number(run.max_solver_steps),
+        footsteps=as_float(footsteps),
+        patience=as_float(PATIENCE * footsteps),
+        max_attempts=as_float(run.max_solver_steps),
     )

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import diffrax
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
@@ -33,14 +32,15 @@ def recorded_steps(start: State, rows: np.ndarray, solver: AbstractRosenbrock) -
     infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
     groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
     # One transfer for all of them: each costs as much as several steps.
-    parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0)
-    times, groups, t, states, zero = jax.device_put(parts)
+    counts = np.asarray(len(rows) + 1), np.asarray(1)
+    parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0), counts
+    times, groups, t, states, zero, (count, one) = jax.device_put(parts)
     dense = diffrax.DenseInterpolation(
         ts=times,
-        ts_size=jnp.asarray(len(rows) + 1),
+        ts_size=count,
         infos=dict(y0=groups[0], y1=groups[1], coefficients=tuple(groups[2:])),
         interpolation_cls=solver.interpolation_cls,
-        direction=jnp.asarray(1),
+        direction=one,
         t0_if_trivial=zero,
         y0_if_trivial=start,
     )

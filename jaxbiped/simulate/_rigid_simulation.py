@@ -4,7 +4,7 @@ import dataclasses
 from typing import Any
 
 import equinox as eqx
-import jax.numpy as jnp
+import numpy as np
 
 from jaxbiped._types import Parameter, as_float
 from jaxbiped.compiler import Request
@@ -47,7 +47,7 @@ class RigidSimulation(eqx.Module):
         program = rigid_program(self.max_arrivals > 0, self.waits, self.embedded)
         request = Request(program, self.walk, room=self.max_arrivals, quick=True)
         found, recorded, _ = engine_named(self.engine).run(request)
-        no_rows = jnp.zeros((0, 1 + len(state)), state.theta_1.dtype)
+        no_rows = np.zeros((0, 1 + len(state)), state.theta_1.dtype)
         rows = no_rows if recorded is None else recorded.values
         t, end = single_time(found.t, found.state)
         return Trajectory(

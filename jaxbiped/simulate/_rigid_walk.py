@@ -10,7 +10,7 @@ from jaxbiped._checks import (
     check_type,
     check_unbatched,
 )
-from jaxbiped._types import as_float
+from jaxbiped._types import as_float, by_numpy
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import check_state
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -99,8 +99,13 @@ def rigid_walk(
     chosen = engine_for(
         engine, obstacle="it computes in 64 bits" if narrow else None, by_device=True
     )
-    patience = _PATIENCE * jnp.sqrt(scene.walker.l / scene.ground.g)
-    longest = (1 if footsteps is None else footsteps) * patience if duration is None else duration
+    count, longest = 1 if footsteps is None else footsteps, duration
+    if duration is None:
+        longest = by_numpy(
+            lambda numpy, l, g: count * (_PATIENCE * numpy.sqrt(l / g)),
+            scene.walker.l,
+            scene.ground.g,
+        )
     walk = RigidWalk(
         scene=scene,
         state=state,

@@ -19,7 +19,7 @@ from jaxbiped._checks import (
     check_type,
     check_unbatched,
 )
-from jaxbiped._types import Numbers, Scalar
+from jaxbiped._types import Numbers, Scalar, as_array
 from jaxbiped.compiler import Request
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._consistent_state import Consistent
@@ -132,7 +132,9 @@ class Simulation(eqx.Module):
             check_adjoint(scene.method, adjoint)
 
         def cast(leaf: ArrayLike) -> Array:
-            return jnp.asarray(leaf, dtype=dtype)
+            if isinstance(leaf, jax.Array):
+                return jnp.asarray(leaf, dtype=dtype)
+            return as_array(np.array(leaf, dtype))
 
         def known(leaf: ArrayLike) -> Numbers:
             # As it is where nothing is traced: each array of JAX's costs 0.1 ms.

@@ -1,6 +1,7 @@
 """Trajectory: the result of a simulation."""
 
-from typing import TYPE_CHECKING, Generic, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple
 
 import diffrax
 import equinox as eqx
@@ -14,7 +15,7 @@ from jaxtyping import Array, Float, Int, PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped._summary import summary
-from jaxbiped._types import Numbers, Scalar
+from jaxbiped._types import Numbers, Scalar, by_numpy
 from jaxbiped.dynamics._state import State
 from jaxbiped.solve._dense_output import evaluate_dense
 from jaxbiped.solve._error_estimate import ErrorEstimate
@@ -88,12 +89,13 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     @property
     def attempted(self) -> Int[Array, "..."]:
         """How many steps the solver attempted, accepted or not."""
-        return self.accepted + self.rejected
+        found: Array = by_numpy(lambda _, a, b: a + b, self.accepted, self.rejected)
+        return found
 
     @property
     def final(self) -> SomeState:
         """The last state saved."""
-        return jtu.tree_map(lambda leaf: leaf[..., -1], self.state)
+        return jtu.tree_map(lambda leaf: by_numpy(lambda _, x: x[..., -1], leaf), self.state)
 
     @property
     def outcome(self) -> Ending:
@@ -141,14 +143,19 @@ class Trajectory(eqx.Module, Generic[SomeState]):
 
 def arrivals_among(rows: Numbers, total: Scalar, like: SomeState) -> Arrivals[SomeState]:
     """The arrivals that a program recorded: rows of a time and a state `like` this one."""
-    reached = jnp.arange(rows.shape[0]) < total
-    t, *leaves = jnp.where(reached[:, None], rows, jnp.inf).T
+
+    def columns(numpy: Any, rows: Any, total: Any) -> tuple[Any, ...]:
+        reached = numpy.arange(rows.shape[0]) < total
+        return tuple(numpy.where(reached[:, None], rows, numpy.inf).T)
+
+    t, *leaves = by_numpy(columns, rows, total)
     return Arrivals(total, t, jtu.tree_unflatten(jtu.tree_structure(like), leaves))
 
 
 def single_time(t: Scalar, state: SomeState) -> tuple[Scalar, SomeState]:
     """A time and the state then as a trajectory has them, leaves of shape (1,)."""
-    return jtu.tree_map(lambda leaf: jnp.reshape(leaf, (1,)), (t, state))
+    as_one = partial(by_numpy, lambda numpy, leaf: numpy.reshape(leaf, (1,)))
+    return jtu.tree_map(as_one, (t, state))
 
 
 def _check_inside(dense: diffrax.DenseInterpolation, times: np.ndarray) -> None:

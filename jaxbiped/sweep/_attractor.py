@@ -3,13 +3,15 @@
 from typing import NamedTuple, cast
 
 import jax
-import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
+from jaxbiped._types import as_float
 from jaxbiped.dynamics._feet import feet
+from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -94,10 +96,14 @@ def section_tangents(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
     """Orthonormal directions in which the section extends at a state, shape (m, m − 1)."""
     import scipy.linalg
 
-    section = section_of(scene, None)
-    slope = jax.grad(lambda y: section.value(scene, y))(jtu.tree_map(jnp.asarray, state))
+    slope = _section_slope(section_of(scene, None), scene, jtu.tree_map(as_float, state))
     normal = np.array([float(leaf) for leaf in slope[1:]])
     return scipy.linalg.null_space(normal[None])
+
+
+@cached_jit
+def _section_slope(section: AbstractSection, scene: Scene | RigidScene, state: PyTree) -> PyTree:
+    return jax.grad(lambda y: section.value(scene, y))(state)
 
 
 def component_scales(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:

@@ -1,12 +1,12 @@
 """Following of starts until each is certain, by any engine."""
 
-import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
+from jaxbiped._types import as_float
 from jaxbiped.compiler import Program, Request
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -57,7 +57,7 @@ def follow_starts(
     if not scene.compliant:
         solve = RigidWalk(**common)
     else:
-        last = same(just_before_end(jnp.asarray(_LONGEST)))
+        last = same(just_before_end(as_float(_LONGEST)))
         atol = same(1e-2 * effort.rtol)
         units = jtu.tree_map(same, units_of(scene, states))
         solve = Solve(**common, almost=last, atol=atol, units=units, patience=same(np.inf))

@@ -1,5 +1,6 @@
 """Trade of a walk: state at its end, times of its heel strikes and energy ledger, against cost."""
 
+import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -90,7 +91,7 @@ class WalkTrade(NamedTuple):
 
     def time_unit(self) -> float:
         """√(l/g) [s]."""
-        return float(np.sqrt(self.scene.walker.l / self.scene.ground.g))
+        return math.sqrt(float(self.scene.walker.l) / float(self.scene.ground.g))
 
     def _books(self, walk: Trajectory) -> dict[str, np.ndarray]:
         ledger = energy_ledger(self.scene, walk)

@@ -16,7 +16,7 @@ from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, PyTree
 
 from jaxbiped._host_call import host_call, lower_host_call
-from jaxbiped._types import Numbers
+from jaxbiped._types import Numbers, as_array
 from jaxbiped.compiler.host_code._host_program import register_rule
 from jaxbiped.compiler.host_code._host_writer import HostWriter, Operation, Value
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
@@ -149,7 +149,7 @@ def _bind(given: list[Numbers], params: dict[str, Any]) -> list[Any]:
         rows = [jax.lax.expand_dims(x, (0,)) for x in given]
         return [jax.lax.squeeze(leaf, (0,)) for leaf in _RUN.bind(*rows, **params)]
     found = run_lanes(*[np.asarray(x)[None] for x in given], **params)
-    return [jnp.asarray(leaf[0]) for leaf in found]
+    return [as_array(leaf[0]) for leaf in found]
 
 
 def _outputs(compiled: CompiledProgram, table: Array) -> PyTree:
@@ -157,7 +157,7 @@ def _outputs(compiled: CompiledProgram, table: Array) -> PyTree:
     if not _is_traced(table):
         # By NumPy: JAX would compile a program for each of these.
         parts = leaves_of(compiled.outline.outputs, np.asarray(table))
-        leaves = [jnp.asarray(p.astype(s.dtype)) for p, s in zip(parts, shapes, strict=True)]
+        leaves = [as_array(p.astype(s.dtype)) for p, s in zip(parts, shapes, strict=True)]
         return jtu.tree_unflatten(structure, leaves)
     if all(s.ndim == 0 for s in shapes):
         # The same as what follows, by one operation.

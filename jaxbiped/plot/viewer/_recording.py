@@ -2,6 +2,7 @@
 
 import base64
 import dataclasses
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -103,12 +104,12 @@ def recording(
 
 
 def _weight(scene: Any) -> float:
-    return float(scene.walker.total_mass * scene.ground.g)
+    return float(scene.walker.total_mass) * float(scene.ground.g)
 
 
 def time_unit(scene: Any) -> float:
     """√(l/g), in which a walker moves [s]."""
-    return float(np.sqrt(scene.walker.l / scene.ground.g))
+    return math.sqrt(float(scene.walker.l) / float(scene.ground.g))
 
 
 def tolerances_for(scene: Any, exact: float) -> Tolerances:

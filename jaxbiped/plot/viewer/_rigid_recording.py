@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Scalar, as_array, as_float
 from jaxbiped.dynamics._energy import kinetic_and_moment
 from jaxbiped.dynamics._rigid_state import RigidState, whole_state
 from jaxbiped.dynamics._rolling import rolling
@@ -67,7 +67,7 @@ def _footsteps(
     walk: Trajectory[RigidState], start: RigidState | None
 ) -> tuple[np.ndarray, RigidState, float]:
     """When each footstep begins [s], the states then, and when the last one ends."""
-    times, states, end = np.zeros(0), walk.state, float(walk.t[-1])
+    times, states, end = np.zeros(0), walk.state, float(np.asarray(walk.t)[-1])
     if walk.arrivals is not None:
         kept = np.isfinite(np.asarray(walk.arrivals.t))
         times = np.asarray(walk.arrivals.t)[kept]
@@ -108,10 +108,10 @@ def _walked(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> Rig
         rows = slice(k, k + _AT_ONCE)
         missing = _AT_ONCE - len(durations[rows])
         padded = [np.pad(leaf[rows], (0, missing), mode="edge") for leaf in (*starts, durations)]
-        part = RigidState(*map(jnp.asarray, padded[:-1]))
+        part = RigidState(*map(as_array, padded[:-1]))
         states = _states_after(arrays, part, np.maximum(padded[-1], shortest))
-        found.append([leaf[: _AT_ONCE - missing] for leaf in states])
-    return RigidState(*[jnp.concatenate(leaves) for leaves in zip(*found, strict=True)])
+        found.append([np.asarray(leaf)[: _AT_ONCE - missing] for leaf in states])
+    return RigidState(*[as_array(np.concatenate(leaves)) for leaves in zip(*found, strict=True)])
 
 
 _states_after = cached_jit(states_after)

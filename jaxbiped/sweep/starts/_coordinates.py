@@ -96,7 +96,7 @@ def place_states(
     """
     if isinstance(states, RigidState):
         return states
-    length, radius = scene.walker.hip_to_foot, scene.walker.r
+    length, radius = np.asarray(scene.walker.hip_to_foot), np.asarray(scene.walker.r)
 
     def rolling(state: State | BristleState) -> dict[str, np.ndarray]:
         sine, cosine = np.sin(state.theta_2), np.cos(state.theta_2)

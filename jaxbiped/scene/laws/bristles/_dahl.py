@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 import jax.numpy as jnp
 
 from jaxbiped._parameter import parameter
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
@@ -56,4 +56,5 @@ class Dahl(AbstractBristleLaw):
         walk takes nearly five times as many steps as with the seed's law, and `find_gait` finds
         its gait. With less than about 2e-4 m it does so by accuracy="tight" only.
         """
-        return cls(mu=seed.mu_kinetic, sigma_0=seed.mu_kinetic / _GIVE)
+        stiffness = by_numpy(lambda _, mu: mu / _GIVE, seed.mu_kinetic)
+        return cls(mu=seed.mu_kinetic, sigma_0=stiffness)

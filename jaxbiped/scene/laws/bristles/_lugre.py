@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from jaxbiped._checks import check_positive
 from jaxbiped._parameter import parameter
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
@@ -79,11 +79,13 @@ class LuGre(AbstractBristleLaw):
         Their damping is critical for 1 kg that carries 20 N, and sigma_2 = 0.
         """
         check_positive("xi", seed.xi, "s/m")
-        sigma_0 = seed.mu_static / _GIVE
+        sigma_0: Scalar = by_numpy(lambda _, mu: mu / _GIVE, seed.mu_static)
         return cls(
             mu_static=seed.mu_static,
             mu_kinetic=seed.mu_kinetic,
-            v_s=1.0 / seed.xi,
+            v_s=by_numpy(lambda _, xi: 1.0 / xi, seed.xi),
             sigma_0=sigma_0,
-            sigma_1=2.0 * jnp.sqrt(sigma_0 * _MASS_PER_LOAD),
+            sigma_1=by_numpy(
+                lambda numpy, sigma_0: 2.0 * numpy.sqrt(sigma_0 * _MASS_PER_LOAD), sigma_0
+            ),
         )

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from jaxbiped._checks import check_positive
 from jaxbiped._parameter import check_parameters, parameter
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
@@ -41,7 +41,7 @@ class Ambrosio(AbstractFrictionLaw):
 
     def __check_init__(self) -> None:
         check_parameters(self)
-        check_positive("v1 − v0", self.v1 - self.v0, "m/s")
+        check_positive("v1 − v0", by_numpy(lambda _, v1, v0: v1 - v0, self.v1, self.v0), "m/s")
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:
         part = jnp.clip((jnp.abs(slip_speed) - self.v0) / (self.v1 - self.v0), 0.0, 1.0)
@@ -54,4 +54,4 @@ class Ambrosio(AbstractFrictionLaw):
     @classmethod
     def like_seed(cls, seed: BengisuAkay) -> Self:
         """The kinetic coefficient, from v0/2 to v0 with the slope 2 mu/v0."""
-        return cls(mu=seed.mu_kinetic, v0=0.5 * seed.v0, v1=seed.v0)
+        return cls(mu=seed.mu_kinetic, v0=by_numpy(lambda _, v0: 0.5 * v0, seed.v0), v1=seed.v0)

@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 from jaxbiped._checks import check_positive
 from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter import parameter
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 from jaxbiped.scene.laws.friction._stribeck_curve import stribeck_coefficient, stribeck_switches
@@ -54,7 +54,7 @@ class Andersson(AbstractFrictionLaw):
         return cls(
             mu_static=seed.mu_static,
             mu_kinetic=seed.mu_kinetic,
-            v_s=1.0 / seed.xi,
+            v_s=by_numpy(lambda _, xi: 1.0 / xi, seed.xi),
             p=1.0,
-            k=2.0 / seed.v0,
+            k=by_numpy(lambda _, v0: 2.0 / v0, seed.v0),
         )

@@ -9,7 +9,7 @@ from jaxbiped._checks import (
 )
 from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter import check_parameters, parameter
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
@@ -53,7 +53,7 @@ class BrownMcPhee(AbstractFrictionLaw):
     def __check_init__(self) -> None:
         check_parameters(self)
         check_at_least("mu_static", self.mu_static, "mu_dynamic", self.mu_dynamic)
-        if self.N_t is None and holds_somewhere(self.mu_v > 0.0):
+        if self.N_t is None and holds_somewhere(by_numpy(lambda _, mu: mu > 0.0, self.mu_v)):
             raise ArgumentError("N_t = None is not allowed where mu_v is above 0: give a load [N].")
 
     def force(self, normal_force: Scalar, slip_speed: Scalar) -> Scalar:

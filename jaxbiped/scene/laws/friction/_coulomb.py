@@ -4,7 +4,7 @@ from typing import ClassVar, Self
 
 from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter import parameter
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
@@ -34,4 +34,4 @@ class RegularisedCoulomb(AbstractFrictionLaw):
     @classmethod
     def like_seed(cls, seed: BengisuAkay) -> Self:
         """The kinetic coefficient, and the slope 2 mu/v0 at rest: v_d = v0/2."""
-        return cls(mu=seed.mu_kinetic, v_d=0.5 * seed.v0)
+        return cls(mu=seed.mu_kinetic, v_d=by_numpy(lambda _, v0: 0.5 * v0, seed.v0))

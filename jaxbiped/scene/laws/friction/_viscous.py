@@ -3,7 +3,7 @@
 from typing import ClassVar, Self
 
 from jaxbiped._parameter import parameter
-from jaxbiped._types import Parameter, Scalar
+from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 
@@ -33,4 +33,4 @@ class Viscous(AbstractFrictionLaw):
     @classmethod
     def like_seed(cls, seed: BengisuAkay) -> Self:
         """mu_static F_N at the seed's v0, and without bound beyond."""
-        return cls(k=seed.mu_static / seed.v0)
+        return cls(k=by_numpy(lambda _, mu, v0: mu / v0, seed.mu_static, seed.v0))

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 
 import jax.numpy as jnp
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
@@ -56,8 +57,8 @@ class AbstractDampedLaw(AbstractNormalLaw):
         K, damper = matched_to_weight(
             mass=mass, penetration=penetration, damping_ratio=damping_ratio, g=g, **told
         )
-        weight = as_float(mass) * as_float(g)
-        return cls(K, cls.damping_coefficient(damper, as_float(penetration), weight), **n)
+        given = map(as_float, (penetration, mass, g))
+        return cls(K, _coefficient(cls, damper, *given), **n)
 
 
 class Standing(NamedTuple):
@@ -76,14 +77,12 @@ class Standing(NamedTuple):
     @property
     def penetration(self) -> Scalar:
         """How deep it stands [m]."""
-        return (self.mass * self.g / self.law.K) ** (1.0 / self.law.n)
+        return _rest(self.mass, self.g, self.law.K, self.law.n)
 
     @property
     def damping_ratio(self) -> Scalar:
         """Of small oscillations about that [–]."""
-        penetration = self.penetration
-        stiffness = self.law.n * self.mass * self.g / penetration
-        return 0.5 * self.law.c * penetration / jnp.sqrt(stiffness * self.mass)
+        return _damping(self.penetration, self.mass, self.g, self.law.c, self.law.n)
 
     def arguments(self) -> dict[str, Scalar]:
         """Of `from_weight`."""
@@ -125,6 +124,31 @@ def matched_to_weight(
     check_positive("g", g, "m/s^2")
     check_not_negative("damping_ratio", damping_ratio)
     check_at_least("n", n, "1", 1.0)
+    return _matched(mass, penetration, g, damping_ratio, n)
+
+
+@kept_alone
+def _coefficient(
+    law: type[AbstractDampedLaw], damper: Scalar, penetration: Scalar, mass: Scalar, g: Scalar
+) -> Scalar:
+    return law.damping_coefficient(damper, penetration, mass * g)
+
+
+@kept_alone
+def _rest(mass: Scalar, g: Scalar, K: Scalar, n: Scalar) -> Scalar:
+    return (mass * g / K) ** (1.0 / n)
+
+
+@kept_alone
+def _damping(penetration: Scalar, mass: Scalar, g: Scalar, c: Scalar, n: Scalar) -> Scalar:
+    stiffness = n * mass * g / penetration
+    return 0.5 * c * penetration / jnp.sqrt(stiffness * mass)
+
+
+@kept_alone
+def _matched(
+    mass: Scalar, penetration: Scalar, g: Scalar, damping_ratio: Scalar, n: Scalar
+) -> tuple[Scalar, Scalar]:
     weight = mass * g
     slope = n * weight / penetration
     return weight / penetration**n, 2.0 * damping_ratio * jnp.sqrt(slope * mass)

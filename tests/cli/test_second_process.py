@@ -1,0 +1,81 @@
+"""Commands in a second process: nothing is compiled that a first process kept.
+
+Counted are the compilations that JAX reports, those of single operations among them, and the
+modules that lanes give to LLVM.
+"""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from jaxbiped._disk_cache import CACHE_VARIABLE
+
+pytestmark = pytest.mark.slow
+
+COUNTED = """
+import atexit, json, sys
+import jax
+from jaxbiped.compiler.runtime import _machine_code
+told, module = [], _machine_code._module
+
+def note(event, _, **about):
+    if event.endswith("backend_compile_duration"):
+        told.append(about.get("fun_name", event))
+
+def compiled(*given):
+    told.append("lanes")
+    return module(*given)
+
+_machine_code._module = compiled
+jax.monitoring.register_event_duration_secs_listener(note)
+atexit.register(lambda: print("COMPILED", json.dumps(told), file=sys.stderr))
+from jaxbiped.cli import main
+main(sys.argv[1:])
+"""
+STARTS = ("--x", "theta_swing=-0.5:0.3:3", "--y", "omega_swing=-2:4:2")
+COMMANDS = {
+    "walk": ("walk", "--duration", "0.5", "--out", "OUT"),
+    "rigid walk": ("walk", "--duration", "1", "--model", "rigid", "--out", "OUT"),
+    "gait": ("gait", "--out", "OUT"),
+    "continue": ("continue", "--model", "rigid", "--max-points", "2", "--out", "OUT"),
+    "optimise": (
+        "optimise", "--model", "rigid", "--vary", "d", "--maximise", "speed",
+        "--iterations", "1", "--basin", "16", "--footsteps", "4",
+    ),
+    "fit": ("fit", "MEASURED", "--model", "rigid", "--vary", "d"),
+    "basin": ("basin", *STARTS, "--out", "OUT"),
+    "rigid basin": ("basin", "--model", "rigid", *STARTS),
+    "models": ("models",),
+    "constraints": (
+        "constraints", "--duration", "0.01", "--repeats", "1", "--integrators", "rodas4:1e-4",
+        "--methods", "standard", "--out", "OUT",
+    ),
+    "trade": ("trade", "--duration", "0.1", "--repeats", "1", "--out", "OUT"),
+    "extremes": ("extremes", "--quick"),
+    "doctor": ("doctor",),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_second_process_compiles_nothing(name, tmp_path):
+    measured = tmp_path / "measured.json"
+    measured.write_text(
+        json.dumps({"gaits": [{"period_s": [0.5, 1e-3], "step_length_m": [0.2, 1e-3]}]})
+    )
+    environment = os.environ | {CACHE_VARIABLE: str(tmp_path / "cache")}
+
+    def compiled(turn):
+        places = {"OUT": str(tmp_path / turn), "MEASURED": str(measured)}
+        words = [places.get(word, word) for word in COMMANDS[name]]
+        ran = subprocess.run(
+            [sys.executable, "-c", COUNTED, *words], capture_output=True, text=True, env=environment
+        )
+        told = [line for line in ran.stderr.splitlines() if line.startswith("COMPILED")]
+        assert told, ran.stderr
+        return json.loads(told[0].removeprefix("COMPILED "))
+
+    assert compiled("first")
+    assert compiled("second") == []
