@@ -14,12 +14,21 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def gaits():
-    return {engine: jb.find_gait(jb.seed_scene(), engine=engine) for engine in ("lanes", "xla")}
+def gait():
+    """The seed's, by lanes."""
+    return jb.find_gait(jb.seed_scene(), engine="lanes")
 
 
-def test_both_find_the_same_gait_and_the_same_derivatives(gaits):
-    ours, theirs = gaits["lanes"], gaits["xla"]
+@pytest.mark.parametrize(
+    "scene",
+    [
+        pytest.param(jb.ladder()["rigid"], id="rigid"),
+        pytest.param(jb.seed_scene(), id="seed", marks=pytest.mark.nightly),
+    ],
+)
+def test_both_find_the_same_gait_and_the_same_derivatives(scene):
+    """The seed's takes XLA more than a minute to compile."""
+    ours, theirs = (jb.find_gait(scene, engine=engine) for engine in ("lanes", "xla"))
     assert (ours.engine, theirs.engine) == ("lanes", "xla")
     assert ours.outcome == theirs.outcome == jb.gait.Search.FOUND
     for name in ("period", "step_length", "speed", "peak_normal", "spectral_radius"):
@@ -34,8 +43,8 @@ def test_both_find_the_same_gait_and_the_same_derivatives(gaits):
     np.testing.assert_allclose(a, b, rtol=5e-4, atol=1e-7)
 
 
-def test_the_radius_of_a_cycle_of_two_is_that_of_one_squared(gaits):
-    once, names = gaits["lanes"], ("K", "slope")
+def test_the_radius_of_a_cycle_of_two_is_that_of_one_squared(gait):
+    once, names = gait, ("K", "slope")
     twice = jb.find_gait(jb.seed_scene(), footsteps=2, parameters=names, engine="lanes")
     columns = jnp.array([once.parameters.index(name) for name in names])
     expected = 2.0 * once.elasticities.spectral_radius[columns]
@@ -50,17 +59,16 @@ def test_tight_is_tighter():
     assert float(gait.measures.period) == pytest.approx(0.4408349, abs=1e-7)
 
 
-def test_many_scenes_at_once_give_what_each_gives_alone(gaits):
+def test_many_scenes_at_once_give_what_each_gives_alone(gait):
     slopes = jnp.array([0.018, 0.02, 0.022])
 
     def period(slope):
-        gait = jb.find_gait(jb.seed_scene(slope=slope), engine="lanes", radius_sensitivities=False)
-        return gait.measures.period, gait.elasticities.period
+        one = jb.find_gait(jb.seed_scene(slope=slope), engine="lanes", radius_sensitivities=False)
+        return one.measures.period, one.elasticities.period
 
     together = jax.vmap(period)(slopes)
-    alone = gaits["lanes"]
-    np.testing.assert_allclose(together[0][1], alone.measures.period, rtol=1e-6)
-    np.testing.assert_allclose(together[1][1], alone.elasticities.period, rtol=5e-4, atol=1e-8)
+    np.testing.assert_allclose(together[0][1], gait.measures.period, rtol=1e-6)
+    np.testing.assert_allclose(together[1][1], gait.elasticities.period, rtol=5e-4, atol=1e-8)
     assert np.all(np.diff(together[0]) > 0.0)
 
 
