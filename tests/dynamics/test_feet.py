@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.dynamics._feet import Feet, Foot, landings, standing_foot, touches
 
 
 def test_foot_at_the_seed_start():
@@ -44,3 +45,38 @@ def test_standing_height():
     assert float(jb.dynamics.feet(scene, state).foot_2.penetration) == pytest.approx(
         1e-3, abs=1e-12
     )
+
+
+def _foot(x, penetration, admitted):
+    rest = dict.fromkeys(("z", "vx", "vz", "penetration_rate", "slip_speed"), np.float64(0.0))
+    return Foot(x=np.float64(x), penetration=np.float64(penetration), admitted=admitted,
+                bristle=None, **rest)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("penetration", "admitted", "expected"),
+    [
+        (1e-3, None, True),
+        (-1e-3, None, False),
+        (1e-3, np.True_, True),
+        (1e-3, np.False_, False),
+        (-1e-3, np.True_, False),
+        (0.0, None, False),
+    ],
+)
+def test_a_foot_touches_that_is_indented_and_admitted(penetration, admitted, expected):
+    assert bool(touches(_foot(0.0, penetration, admitted))) is expected
+
+
+def test_a_heel_strike_is_of_the_foot_ahead():
+    up, down = -1e-3, 1e-3
+    for ahead in (0, 1):
+        places = (0.2, 0.1) if ahead == 0 else (0.1, 0.2)
+        before = Feet(*[_foot(x, up, None) for x in places])
+        both = Feet(*[_foot(x, down, None) for x in places])
+        assert list(map(bool, landings(before, both))) == [ahead == 0, ahead == 1]
+        assert not any(map(bool, landings(both, both)))
+        assert not any(map(bool, landings(both, before)))
+        one = Feet(*[_foot(x, down if k == ahead else up, None) for k, x in enumerate(places)])
+        assert int(standing_foot(one)) == ahead + 1
+        assert int(standing_foot(both)) == int(standing_foot(before)) == 0
