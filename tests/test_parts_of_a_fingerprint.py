@@ -1,4 +1,4 @@
-"""Each part of a fingerprint: two things that differ in it alone have two of them."""
+"""Each part of a fingerprint, against things that differ in it alone."""
 
 import types
 

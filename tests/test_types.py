@@ -1,4 +1,4 @@
-"""Arrays from NumPy: what JAX's own operations give, and no program compiled for them."""
+"""Arrays from NumPy, against JAX's own operations; no program is compiled for them."""
 
 import jax
 import jax.numpy as jnp

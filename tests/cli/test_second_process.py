@@ -1,4 +1,4 @@
-"""Commands in a second process: nothing is compiled that a first process kept.
+"""Commands in a second process, against what JAX and LLVM count: nothing is compiled again.
 
 Counted are the compilations that JAX reports, those of single operations among them, and the
 modules that lanes give to LLVM.

@@ -1,4 +1,4 @@
-"""Switches of a foot, each written out a second time, with what jumps there."""
+"""Switches of a foot and what jumps there, against each written out a second time."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""Verdicts on results and checks that are written down: by how much they are off."""
+"""Verdicts, against results and checks that are written down: by how much they are off."""
 
 import numpy as np
 import pytest

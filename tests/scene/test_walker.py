@@ -1,4 +1,4 @@
-"""The walker's own numbers, and parameters by name in any order."""
+"""The walker's own numbers and parameters by name, against numbers written down."""
 
 import itertools
 

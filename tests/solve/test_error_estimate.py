@@ -1,4 +1,4 @@
-"""Refinement of tolerances, on errors that are a power of the tolerance, and the norm of errors."""
+"""Refinement of tolerances, against errors that are a power of the tolerance."""
 
 import warnings
 
