@@ -32,7 +32,7 @@ def recorded_steps(start: State, rows: np.ndarray, solver: AbstractRosenbrock) -
     infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
     groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
     # One transfer for all of them: each costs as much as several steps.
-    counts = np.asarray(len(rows) + 1), np.asarray(1)
+    counts = len(rows) + 1, 1  # of a weak type, as a number in diffrax's own would be
     parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0), counts
     times, groups, t, states, zero, (count, one) = jax.device_put(parts)
     dense = diffrax.DenseInterpolation(
