@@ -100,7 +100,9 @@ def trace_call(
     def compile_it() -> CompiledCall:
         made = CompiledCall(lowered.compile(), results[-1], calls)
         # Others, such as calls back that are known by their place in this process, cannot be kept.
-        if all(name == TARGET or name.startswith(_LAPACK) for name in targets):
+        # Nor can what JAX loaded from its own cache: kept again, it lacks its functions.
+        known = all(name == TARGET or name.startswith(_LAPACK) for name in targets)
+        if known and not jax.config.jax_compilation_cache_dir:  # type: ignore[attr-defined]
             uses_lapack = any(name.startswith(_LAPACK) for name in targets)
             _write(key, made, len(arrays), uses_lapack)
         return made

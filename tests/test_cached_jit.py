@@ -123,6 +123,19 @@ def test_without_a_cache_it_is_compiled_as_ever(cache, monkeypatch):
     assert not cache.exists()
 
 
+def test_beside_the_cache_of_jax_none_is_kept_twice(cache, tmp_path, monkeypatch):
+    """Kept again, what JAX loaded from its own would fail where it is run."""
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path / "jax"))
+    program = """
+from jaxbiped.solve._final_step import just_before_end
+print(float(just_before_end(2.0)) < 2.0)
+"""
+    for _ in range(3):
+        told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+        assert told.stdout == "True\n", told.stderr
+    assert not cache.exists() or not list(cache.iterdir())
+
+
 def test_its_shape_is_known_before_and_after(cache):
     before = just_before_end.result_shape(np.ones(3))
     just_before_end.begin(np.ones(3))()
