@@ -5,7 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import jaxbiped as jb
 from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of
+from jaxbiped.constraints._projection import correct_step
 from tests.linkages import (
     four_bar,
     four_bar_state,
@@ -62,3 +64,14 @@ def test_euler_parameters_have_the_same_energy():
     energy = 0.5 * masses @ np.array(state.v) ** 2
     other = 0.5 * euler_masses @ np.array(with_euler_parameters(state).v) ** 2
     assert other == pytest.approx(energy, rel=1e-14)
+
+
+def test_a_projected_step_is_on_its_constraints_with_its_rates():
+    linkage = jb.constraints.Linkage(
+        (jb.constraints.Body(1.0, 0.1),),
+        (jb.constraints.Joint((0.0, 0.5), (0.0, 0.0), 0, None),),
+    )
+    off = [np.float64(value) for value in (0.01, -0.48, 0.05)], [np.float64(1.0)] * 3
+    q, v = correct_step(linkage, jb.constraints.Index1(iterations=4), *off)
+    at = constraints_of(linkage, q, v)
+    np.testing.assert_allclose([*at.violation, *at.rate], 0.0, atol=1e-12)

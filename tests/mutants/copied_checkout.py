@@ -62,6 +62,8 @@ class CopiedCheckout:
         if run.exitcode in (0, 5):  # 5: every test there is slow
             return None
         said = output.read_text(errors="replace")
+        if run.exitcode == 4 and "while loading conftest" not in said:
+            raise RuntimeError(f"pytest did not take {' '.join(paths)}: {said[-300:]}")
         for line in said.splitlines():
             if line.startswith(("FAILED ", "ERROR ")):
                 return line.split(" ", 1)[1].split(" - ")[0]

@@ -269,3 +269,11 @@ def test_bad_arguments_are_named(make, words):
         make()
     assert str(caught.value).startswith(words[0] + " = ")
     assert all(word in str(caught.value) for word in words)
+
+
+def test_the_smooth_laws_force_rises_from_zero_by_a_ramp():
+    """x t³(10 − 15 t + 6 t²) with t = x/w: a quarter of a newton at half of one."""
+    law = jb.laws.SmoothRistowSchafer(K=1e6, c=0.0)
+    for force, ramped in ((0.5, 0.25), (0.25, 0.25 * 0.25**3 * (10 - 3.75 + 0.375)), (2.0, 2.0)):
+        depth = jnp.asarray((force / 1e6) ** (2.0 / 3.0))
+        assert float(law.force(depth, jnp.asarray(0.0))) == pytest.approx(ramped)
