@@ -10,7 +10,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._actuation import actuator_powers
+from jaxbiped.dynamics._actuation import actuator_powers, hip_torques
 from jaxbiped.dynamics._push_off import push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion
 from jaxbiped.optimise import _certificate
@@ -354,11 +354,13 @@ def test_motors_work_where_they_drive_and_not_where_they_brake():
     def told(state):
         hip = rolling_hip_motion(state)
         motors = actuator_powers(scene, hip, (None, None)).motors
-        return system.vector_field(0.0, system.begin(state), scene).motor_work, motors
+        work = system.vector_field(0.0, system.begin(state), scene).motor_work
+        return work, motors, hip_torques(scene, hip)
 
     signs = set()
     for rates in ((3.0, -1.0), (-3.0, 1.0)):
-        work, (power,) = told(jb.dynamics.RigidState(0.0, 0.1, -0.1, *rates))
+        work, (power,), torques = told(jb.dynamics.RigidState(0.0, 0.1, -0.1, *rates))
+        assert float(power) == pytest.approx(float(np.dot(torques, rates)))
         assert float(work) == max(float(power), 0.0)
         signs.add(bool(power > 0.0))
     assert signs == {True, False}
