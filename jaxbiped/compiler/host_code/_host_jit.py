@@ -5,8 +5,6 @@ import threading
 from collections.abc import Callable, Hashable
 from typing import Any, Generic, ParamSpec, TypeVar
 
-import jax
-
 from jaxbiped import _caches
 from jaxbiped._cached_jit import Arguments, arguments_of, cached_jit
 from jaxbiped._caches import Once, register_programs
@@ -104,5 +102,5 @@ def _as_given(arrays: list[Any]) -> list[Any]:
     return arrays
 
 
-_of_jax = jax.jit(_as_given)
+_of_jax = cached_jit(_as_given)
 """Makes all of them arrays of JAX, for which `jax.device_put` takes 20 µs each."""
