@@ -78,7 +78,7 @@ def judge(case: Case) -> Verdict:
     finite = bool(np.all(np.isfinite(end)))
     if not finite and not flag:
         return Verdict("silently_wrong", "not a number, and nothing says so", **known)
-    reached = float(walk.t[-1])
+    reached = float(np.asarray(walk.t)[-1])
     if reached <= _AT_ONCE * case.time or not finite:
         return Verdict("flagged", flag or f"it ended at its start: {walk.outcome}", **known)
     p, begin = check_numbers(scene), check_start(scene, start)

@@ -10,29 +10,49 @@ SCENE = jb.seed_scene()
 HOW = dict(parameters=("K",), engine="lanes")
 
 
+SLOPES = (0.0175, 0.018, 0.0185, 0.019, 0.0195, 0.02, 0.021, 0.022, 0.024, 0.026, 0.028, 0.03)
+
+
 @pytest.fixture(scope="module")
-def gait():
-    return jb.find_gait(SCENE, accuracy=1e-2, **HOW)
+def gaits():
+    """At each slope a gait to a hundredth, and one by another method and finer."""
+    found = []
+    for slope in SLOPES:
+        scene = jb.seed_scene(slope=slope)
+        gait = jb.find_gait(scene, accuracy=1e-2, **HOW)
+        finer = dict(accuracy="tight", solver="rodas4p", **HOW)
+        found.append((gait, jb.find_gait(scene, gait.measures.state, **finer)))
+    return found
 
 
-def test_the_bars_hold_what_a_finer_solve_by_another_method_changes(gait):
-    exact = jb.find_gait(SCENE, gait.measures.state, accuracy="tight", solver="rodas4p", **HOW)
-    error, bars = gait.error, gait.error.bars
-    assert error.met
-    assert error.relative <= 1e-2
-    for name in ("period", "step_length", "speed", "peak_normal"):
-        told, true, bar = (
-            getattr(each, name) for each in (gait.measures, exact.measures, bars["measures"])
-        )
-        assert abs(float(told) - float(true)) <= float(bar), name
-    change = np.abs(np.asarray(gait.multipliers) - np.asarray(exact.multipliers))
-    assert np.all(change <= bars["multipliers"] + np.asarray(exact.multiplier_errors))
-    for name in ("period", "spectral_radius"):
-        told, true, bar = (
-            np.asarray(getattr(each, name))
-            for each in (gait.sensitivities, exact.sensitivities, bars["sensitivities"])
-        )
-        assert np.all(np.abs(told - true) <= bar), name
+def test_the_bars_hold_what_a_finer_solve_by_another_method_changes(gaits):
+    for gait, exact in gaits:
+        error, bars = gait.error, gait.error.bars
+        assert error.met
+        assert error.relative <= 1e-2
+        for name in ("period", "step_length", "speed", "peak_normal"):
+            told, true, bar = (
+                getattr(each, name) for each in (gait.measures, exact.measures, bars["measures"])
+            )
+            assert abs(float(told) - float(true)) <= float(bar), name
+
+
+def test_bars_of_derivatives_hold_in_nearly_all_cases(gaits):
+    """Bars are promised for 95 scenes of 100."""
+    shares = []
+    for gait, exact in gaits:
+        bars = gait.error.bars
+        change = np.abs(np.asarray(gait.multipliers) - np.asarray(exact.multipliers))
+        shares.extend(change / (bars["multipliers"] + np.asarray(exact.multiplier_errors)))
+        for name in ("period", "spectral_radius"):
+            told, true, bar = (
+                np.asarray(getattr(each, name))
+                for each in (gait.sensitivities, exact.sensitivities, bars["sensitivities"])
+            )
+            shares.extend(np.abs(told - true) / bar)
+    assert len(shares) == 8 * len(SLOPES)
+    assert np.mean(np.asarray(shares) <= 1.0) >= 0.95
+    assert max(shares) <= 2.0
 
 
 def test_draft_tells_measures_to_a_hundredth_in_a_third_of_the_steps():
