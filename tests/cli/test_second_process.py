@@ -59,7 +59,17 @@ COMMANDS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", COMMANDS)
+NIGHTLY = ("optimise", "basin", "constraints", "trade", "extremes")
+"""Those that take longest."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.nightly] if name in NIGHTLY else [])
+        for name in COMMANDS
+    ],
+)
 def test_the_second_process_compiles_nothing(name, tmp_path):
     measured = tmp_path / "measured.json"
     measured.write_text(

@@ -59,6 +59,7 @@ def test_orbit_is_told_in_minimal_coordinates(gaits):
     assert np.isfinite(np.asarray(states.hip_x[0])[alive]).all()
 
 
+@pytest.mark.nightly
 def test_measures_differentiate_in_both_modes(gaits, monkeypatch):
     """By the leaves of what is modelled; the method's own have no part in the gait."""
     minimal, redundant = gaits

@@ -80,6 +80,7 @@ def test_a_rigid_walker_is_pushed_and_steps_down():
     assert found["floor_clearance_sensitivity"] == pytest.approx(stepped, rel=1e-5)
 
 
+@pytest.mark.nightly
 def test_a_compliant_walker_is_pushed_and_steps_down():
     """The step against SciPy's solve of the seed's equations."""
     scene = jb.seed_scene()

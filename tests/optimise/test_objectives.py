@@ -68,7 +68,15 @@ def evaluation(scene, names, guess=None, accuracy="balanced"):
     return evaluate(scene, gait, names, accuracy), gait.measures.state
 
 
-@pytest.mark.parametrize("which", ["rigid", "stribeck", "heavy hip", *DRIVEN])
+@pytest.mark.parametrize(
+    "which",
+    [
+        "rigid",
+        pytest.param("stribeck", marks=pytest.mark.nightly),
+        pytest.param("heavy hip", marks=pytest.mark.nightly),
+        *DRIVEN,
+    ],
+)
 def test_gradients_are_those_of_central_differences(which):
     """Against fourth-order differences of tightly solved gaits."""
     scene = SCENES[which]
