@@ -102,7 +102,8 @@ def trace_call(
         # Others, such as calls back that are known by their place in this process, cannot be kept.
         # Nor can what JAX loaded from its own cache: kept again, it lacks its functions.
         known = all(name == TARGET or name.startswith(_LAPACK) for name in targets)
-        if known and not jax.config.jax_compilation_cache_dir:  # type: ignore[attr-defined]
+        config: Any = jax.config
+        if known and not config.jax_compilation_cache_dir:
             uses_lapack = any(name.startswith(_LAPACK) for name in targets)
             _write(key, made, len(arrays), uses_lapack)
         return made
