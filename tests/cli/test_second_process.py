@@ -54,12 +54,11 @@ COMMANDS = {
         "--methods", "standard", "--out", "OUT",
     ),
     "trade": ("trade", "--duration", "0.1", "--repeats", "1", "--out", "OUT"),
-    "extremes": ("extremes", "--quick"),
     "doctor": ("doctor",),
 }  # fmt: skip
 
 
-NIGHTLY = ("optimise", "basin", "constraints", "trade", "extremes")
+NIGHTLY = ("optimise", "basin", "constraints", "trade")
 """Those that take longest."""
 
 
