@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
+from tests.unknown_to_lanes import ErrorFunction
 
 pytestmark = pytest.mark.slow
 
@@ -113,18 +114,6 @@ def test_lanes_are_refused_what_they_cannot_do():
         jb.find_gait(jb.seed_scene(), solver="kvaerno3", engine="lanes")
     with pytest.raises(jb.ArgumentError, match="choose one of auto, xla, lanes"):
         jb.find_gait(jb.seed_scene(), engine="fast")
-
-
-class ErrorFunction(jb.laws.AbstractFrictionLaw):
-    """A law that lanes cannot express."""
-
-    mu: float
-
-    def force(self, normal_force, slip_speed):
-        return -self.mu * normal_force * jax.scipy.special.erf(slip_speed / 1e-2)
-
-    def switches(self, slip_speed):
-        return ()
 
 
 def test_every_search_by_what_lanes_lack_is_refused_in_the_same_sentence():

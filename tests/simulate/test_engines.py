@@ -13,6 +13,7 @@ import jaxbiped as jb
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.simulate._recorded_steps import recorded_steps
 from tests.reference import reference_states
+from tests.unknown_to_lanes import ErrorFunction
 
 pytestmark = pytest.mark.slow
 
@@ -236,18 +237,6 @@ def test_lanes_compute_in_64_bits():
         _end(state, "lanes", soft)
     run = jb.Simulation.prepare(soft, state, duration=0.01, save="end")
     assert run.engine == "xla"
-
-
-class ErrorFunction(jb.laws.AbstractFrictionLaw):
-    """Of an operation that lanes do not have."""
-
-    mu: float
-
-    def force(self, normal_force, slip_speed):
-        return -self.mu * normal_force * jax.scipy.special.erf(slip_speed / 1e-2)
-
-    def switches(self, slip_speed):
-        return ()
 
 
 def test_auto_leaves_to_xla_what_lanes_cannot_express():
