@@ -17,17 +17,16 @@ from jaxbiped.simulate._recorded_steps import recorded_steps
 from jaxbiped.solve._adaptive_program import Solve, Solved
 from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._saved_outputs import Saved
-from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
-from jaxbiped.solve.controllers._footstep_limit import PATIENCE
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._differentiable_solve import (
+from jaxbiped.solve._solve_by_lanes import (
     Setting,
     lane_engine,
     request_of,
-    solve_and_save,
     solve_scene,
     solve_step_by_step,
 )
+from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
+from jaxbiped.solve.controllers._footstep_limit import PATIENCE
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 if TYPE_CHECKING:
     from jaxbiped.simulate._simulation import Simulation
@@ -44,15 +43,12 @@ def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
     if run.save_steps:
         ended, t, state, dense = _step_by_step(run, solve, setting)
     elif not setting.saved.within:
-        if run.extremes is None:
-            ended = solve_scene(solve, setting)
-        else:
-            ended, _ = solve_and_save(solve, setting)
+        ended, _ = solve_scene(solve, setting)
         t, state = single_time(ended.t, ended.state)
     else:
         times = None if run.times is None else np.asarray(run.times)
         room = 0 if run.section is None else run.max_arrivals
-        ended, recorded = solve_and_save(solve, setting, times=times, room=room)
+        ended, recorded = solve_scene(solve, setting, times=times, room=room)
         assert recorded is not None
         # As diffrax has it: infinite where the solve ended before.
         saved = arrivals_among(recorded.values, jnp.asarray(recorded.counts), run.state)

@@ -20,6 +20,7 @@ from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.controllers._extremes import Extremes
 from jaxbiped.solve.controllers._footstep_limit import PATIENCE, FootstepLimit
 from jaxbiped.solve.controllers._given_first_step import GivenFirstStep
+from jaxbiped.solve.controllers._located_ending import LocatedEnding
 from jaxbiped.solve.controllers._missed_contacts import MissedContacts
 from jaxbiped.solve.controllers._step_control import first_step
 from jaxbiped.solve.controllers._walk_control import walk_control
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 def by_xla(run: "Simulation") -> Trajectory:
     """Runs a request; see `simulate`. A trajectory saved step by step keeps its full length."""
     solver: diffrax.AbstractSolver[PyTree] = run.solver
+    adjoint = diffrax.RecursiveCheckpointAdjoint() if run.adjoint is None else run.adjoint
     weight: float = getattr(solver, "switch_weight", 1.0)
     controller: PyTree = walk_control(run.rtol, run.atol, run.units, switch_weight=weight)
     if run.dt is not None:
@@ -40,13 +42,15 @@ def by_xla(run: "Simulation") -> Trajectory:
         solver = with_root_tolerances(solver, run.rtol, run.atol)
     if run.footsteps is not None:
         controller = FootstepLimit(controller, run.footsteps)
+    if run.dt is None:
+        controller = LocatedEnding(controller, run.watch)
     if run.extremes is not None:
         controller = Extremes(controller, run.extremes)
     size = first_step(run.duration, run.units.time) if run.dt is None else run.dt
     events = ending_events(run.watch)
     zero = jnp.zeros_like(run.duration)
     if isinstance(run.scene, RedundantScene):
-        solver = with_projection(run.scene, solver, run.adjoint)
+        solver = with_projection(run.scene, solver, adjoint)
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(field_of(run.scene)),
         solver,
@@ -59,7 +63,7 @@ def by_xla(run: "Simulation") -> Trajectory:
         stepsize_controller=GivenFirstStep(controller, size),
         event=diffrax.Event(list(events.values())) if events else None,
         max_steps=run.max_solver_steps,
-        adjoint=run.adjoint,
+        adjoint=adjoint,
         throw=False,
     )
     control, lowest, highest = solution.controller_state, None, None

@@ -37,7 +37,7 @@ def choose_engine(
         obstacle = "steps of one size (dt) are diffrax's"
     if section is None:
         return engine_for(
-            engine, obstacle=obstacle, prefers_xla=traced or redundant, by_device=True
+            engine, obstacle=obstacle, prefers_xla=redundant, by_device=True
         )
     check_choice("engine", engine, ENGINES)
     if engine == "xla" or obstacle is not None:

@@ -29,6 +29,7 @@ from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._by_lanes import able_request, by_lanes, prepare_lanes
 from jaxbiped.simulate._by_xla import by_xla, trim
+from jaxbiped.simulate._derivatives import with_derivatives
 from jaxbiped.simulate._engine_choice import choose_engine
 from jaxbiped.simulate._saved_times import check_times
 from jaxbiped.simulate._start import check_steps, start_for
@@ -67,7 +68,7 @@ class Simulation(eqx.Module):
     units: Units
     dt: Scalar | None
     solver: diffrax.AbstractSolver[PyTree]
-    adjoint: diffrax.AbstractAdjoint
+    adjoint: diffrax.AbstractAdjoint | None
     footsteps: int | None = eqx.field(static=True)
     save_steps: bool = eqx.field(static=True)
     watch: tuple[str, ...] = eqx.field(static=True)
@@ -166,7 +167,7 @@ class Simulation(eqx.Module):
             units=jtu.tree_map(known, units),
             dt=None if dt is None else cast(dt),
             solver=method,
-            adjoint=diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint,
+            adjoint=adjoint,
             footsteps=None if footsteps is None else int(footsteps),
             save_steps=save_steps,
             watch=tuple(watch),
@@ -180,8 +181,7 @@ class Simulation(eqx.Module):
 
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
-        request = self.lane_request()
-        return trim(by_xla(self)) if request is None else by_lanes(self, request)
+        return with_derivatives(self, _run)
 
     def lane_request(self) -> Request | None:
         """What it asks of lanes or devices; None where XLA runs it."""
@@ -192,6 +192,11 @@ class Simulation(eqx.Module):
         if (request := self.lane_request()) is not None:
             return CompiledSimulation(prepare_lanes(self, request), self)
         return CompiledSimulation(by_xla.lower(self).compile(), self)
+
+
+def _run(run: Simulation) -> Trajectory:
+    request = run.lane_request()
+    return trim(by_xla(run)) if request is None else by_lanes(run, request)
 
 
 class CompiledSimulation:

@@ -27,6 +27,7 @@ from jaxbiped.solve._saved_outputs import LastStep, Saved
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._crossed_switches import weigh_crossed
 from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
+from jaxbiped.solve.controllers._located_ending import LocatedEnding
 from jaxbiped.solve.controllers._step_control import first_step
 from jaxbiped.solve.controllers._walk_control import walk_control
 from jaxbiped.solve.controllers._wrapped_control import StepControl
@@ -96,6 +97,7 @@ class AdaptiveSolve:
         watch: failures that end it.
         counting: whether footsteps are counted.
         saved: what is saved.
+        located: whether the last step ends at the event that ends the solve.
         fenced: whether XLA is to compile it, and not lanes (see `fenced`).
     """
 
@@ -106,10 +108,11 @@ class AdaptiveSolve:
         *,
         counting: bool,
         saved: Saved,
+        located: bool = False,
         fenced: bool = False,
     ) -> None:
         self.solver, self.counting, self.saved, self.fenced = solver, counting, saved, fenced
-        self.events = ending_events(watch)
+        self.events, self.located = ending_events(watch), watch if located else None
 
     def program(self) -> Program:
         """The program."""
@@ -158,7 +161,7 @@ class AdaptiveSolve:
         # One of them is enough for a step to be rejected.
         errors[0] = jnp.where(ended, jnp.inf, errors[0])
         error, order = jtu.tree_unflatten(structure, errors), self.solver.error_order(term)
-        keep, t, next_t, _, control, result = self._controller(solve).adapt_step_size(
+        keep, t, next_t, _, control, result = self._controller(solve, last).adapt_step_size(
             now.t, now.next_t, now.state, y1, solve.scene, error, order, now.control
         )
         t, next_t = clip_step(keep, t, next_t, solve.duration, solve.almost)
@@ -245,11 +248,11 @@ class AdaptiveSolve:
         low, high = now.extremes
         return chosen(jnp.minimum, low), chosen(jnp.maximum, high)
 
-    def _controller(self, solve: Solve) -> StepControl:
+    def _controller(self, solve: Solve, probe: PyTree = None) -> StepControl:
         control = walk_control(solve.rtol, solve.atol, solve.units)
-        if not self.counting:
-            return control
-        return FootstepLimit(control, solve.footsteps)
+        if self.counting:
+            control = FootstepLimit(control, solve.footsteps)
+        return control if self.located is None else LocatedEnding(control, self.located, probe)
 
 
 def _term(solve: Solve) -> "diffrax.ODETerm[PyTree]":

@@ -21,20 +21,24 @@ from jaxbiped.solve._fusion_barrier import fusion_barrier
 
 _FALL_ANGLE = 1.0
 """A hip lower than a leg at this angle [rad] could carry it has fallen."""
-_REST_RATE = 1e-4
+REST_RATE = 1e-4
 """Rate of a leg at rest, in units of √(g/l)."""
 _LOST_RATE = 0.1
 """Rate, in the same units, up to which a leg that turned back has just lost its ground."""
-_REST_ENERGY = 1e-10
+REST_ENERGY = 1e-10
 """Kinetic energy of a walker at rest, in units of its weight times l."""
-_STUMBLE_SPEED = 1e-3
+STUMBLE_SPEED = 1e-3
 """Speed at which a rear foot comes down, in units of √(g l), from which it counts as a stumble."""
+
+
+def fall_height(scene: Scene) -> Scalar:
+    """How high a leg at 1 rad could carry the hip [m]."""
+    return scene.walker.r + scene.walker.hip_to_foot * jnp.cos(_FALL_ANGLE)
 
 
 def has_fallen(scene: Scene, state: State) -> Scalar:
     """Whether the hip is lower than a leg at 1 rad could carry it (boolean)."""
-    walker = scene.walker
-    return state.hip_z < walker.r + walker.hip_to_foot * jnp.cos(_FALL_ANGLE)
+    return state.hip_z < fall_height(scene)
 
 
 @cached_jit  # for its trace cache
@@ -53,7 +57,7 @@ def is_barred(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
     unit = jnp.sqrt(scene.ground.g / scene.walker.l)
 
     def turning(foot: Foot, rate: Scalar) -> Scalar:
-        return (foot.penetration > 0.0) & (rate >= 0.0) & (rate < _REST_RATE * unit)
+        return (foot.penetration > 0.0) & (rate >= 0.0) & (rate < REST_RATE * unit)
 
     turning_1 = turning(foot_1, state.omega_1)
     turning_2 = turning(foot_2, state.omega_2)
@@ -83,12 +87,12 @@ def has_stopped(scene: Scene, state: State) -> Scalar:
     touch_1, touch_2 = touches(foot_1), touches(foot_2)
     if not isinstance(scene.clearance, StanceRotation):
         unit = scene.walker.total_mass * scene.ground.g * scene.walker.l
-        at_rest = energies(scene, state).kinetic < _REST_ENERGY * unit
+        at_rest = energies(scene, state).kinetic < REST_ENERGY * unit
         return (touch_1 | touch_2) & at_rest
     unit = jnp.sqrt(scene.ground.g / scene.walker.l)
 
     def at_rest_on(carries: Scalar, other: Scalar, rate: Scalar) -> Scalar:
-        return carries & ~other & (rate > -_REST_RATE * unit)
+        return carries & ~other & (rate > -REST_RATE * unit)
 
     def lost(foot: Foot, rate: Scalar) -> Scalar:
         return (foot.penetration > 0.0) & (rate >= 0.0) & (rate < _LOST_RATE * unit)
@@ -106,8 +110,8 @@ def has_stumbled(scene: Scene, state: State) -> Scalar:
 
     def trips(rear: Foot, front: Foot) -> Scalar:
         entering = rear.penetration_rate > jnp.maximum(front.penetration_rate, 0.0)
-        fast = rear.penetration_rate > _STUMBLE_SPEED * unit
-        return (rear.x < front.x) & entering & fast & (rear.slip_speed > _STUMBLE_SPEED * unit)
+        fast = rear.penetration_rate > STUMBLE_SPEED * unit
+        return (rear.x < front.x) & entering & fast & (rear.slip_speed > STUMBLE_SPEED * unit)
 
     both = touches(foot_1) & touches(foot_2)
     return both & (trips(foot_1, foot_2) | trips(foot_2, foot_1))

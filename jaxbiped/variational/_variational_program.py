@@ -134,6 +134,9 @@ class AdaptiveColumns:
         return after, over
 
     def finish(self, given: VariationalProblem, now: _Now) -> VariationalSolution:
+        if self.watch.section is None:
+            # A last step that ends past a jump of the field has its columns jump, too.
+            now = self._leapt(given, now)
         late = now.t >= given.max_time
         ended = jnp.where(late, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
         ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), ended)
@@ -159,7 +162,7 @@ class AdaptiveColumns:
             attempted=now.attempted,
             accepted=now.landed.accepted,
             jumps=now.landed.jumps,
-            missed=now.landed.saltation_pending,
+            missed=now.landed.saltation_pending & (self.watch.section is not None),
             grazes=now.landed.grazes,
             peak=peak,
             peak_columns=peak_columns,

@@ -5,7 +5,7 @@ import jax.tree_util as jtu
 
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import RealScalarLike, Scalar, Time
-from jaxbiped.compiler import LANES, AbstractEngine, Program, Recorded, Recording, Request
+from jaxbiped.compiler import LANES, XLA, AbstractEngine, Program, Recorded, Recording, Request
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._units import units_of
@@ -31,14 +31,14 @@ def solve_variational(
     max_solver_steps: int,
     carries_parameters: Scalar | bool = True,
     save_nodes: bool = False,
-    engine: AbstractEngine = LANES,
+    engine: AbstractEngine | None = LANES,
 ) -> tuple[VariationalSolution, Recording | Recorded | None]:
     """Solves from `y0` to the section, a failure or `max_time` [s].
 
     Of the columns the last p move one parameter each, by `sizes`, shape (p,), in the order of the
     active leaves; the columns before move none. Unless `carries_parameters`, the last p are not
     carried, and NaN in the end. Seeds are not looked at. Records are the time and the state at the
-    ends of the accepted steps.
+    ends of the accepted steps. Without an engine it is lanes where they can, else XLA.
     """
     m = y0.columns.shape[1] - len(args.active)
     inputs = VariationalProblem(
@@ -57,15 +57,16 @@ def solve_variational(
         almost=just_before_end(_number(max_time)),
         max_attempts=_number(max_solver_steps),
     )
-    found = engine.run(
-        Request(
-            _program(watch, solver, args.active, save_nodes),
-            inputs,
-            room=max_solver_steps if save_nodes else 0,
-            quick=max_solver_steps <= _QUICK,
-            keeps_records=save_nodes,
-        )
+    request = Request(
+        _program(watch, solver, args.active, save_nodes),
+        inputs,
+        room=max_solver_steps if save_nodes else 0,
+        quick=max_solver_steps <= _QUICK,
+        keeps_records=save_nodes,
     )
+    if engine is None:
+        engine = XLA if LANES.can(request) else LANES
+    found = engine.run(request)
     return found.outputs, found.recording
 
 

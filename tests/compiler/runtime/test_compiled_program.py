@@ -26,7 +26,7 @@ from jaxbiped.compiler.runtime._threads import default_threads
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._units import units_of
-from jaxbiped.variational._differentiable_solve import Setting, request_of
+from jaxbiped.solve._solve_by_lanes import Setting, request_of
 
 SCENE = jb.seed_scene()
 SEED = np.array([float(leaf) for leaf in jb.seed_state()])

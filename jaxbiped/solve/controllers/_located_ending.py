@@ -1,0 +1,90 @@
+"""Located ending: a step-size controller that ends a solve at the event, not a step past it."""
+
+from typing import Any
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._ending import Ending
+from jaxbiped._types import RealScalarLike, Scalar, Time
+from jaxbiped.solve._ending import ending_events
+from jaxbiped.solve._ending_surface import ending_surface
+from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
+
+_OVERSHOOT = 1e-9
+"""Part of the way to an event that the last step may go past it."""
+_MARGIN = 1e-12
+"""Time that it may do besides [s]: on which side it ends must be beyond doubt."""
+
+
+class LocatedEnding(AbstractWrappedControl):
+    """Wraps a controller; a step within which the solve ends is tried again, to just past that.
+
+    Where to, comes from the secant of the ending's surface, which a few attempts narrow. A step
+    whose ends do not lie on both sides of it stays as it is. The solve's `args` must be the scene.
+
+    Attributes:
+        controller: decides every step's size, and ends the solve after the last footstep.
+        watch: failures that end it.
+        probe: a state near the step's end at which failures are looked for first, where that costs
+            less. None: there is none.
+    """
+
+    controller: StepControl
+    watch: tuple[str, ...] = eqx.field(static=True)
+    probe: PyTree = None
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        """The first step's end and the controller's state, as diffrax asks."""
+        return self.controller.init(*request)
+
+    def adapt_step_size(
+        self,
+        t0: Time,
+        t1: Time,
+        y0: PyTree,
+        y1_candidate: PyTree,
+        args: PyTree,
+        y_error: PyTree,
+        error_order: RealScalarLike | None,
+        controller_state: Any,
+    ) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does, but for the last one."""
+        keep, next_t0, next_t1, jump, inner, result = self.controller.adapt_step_size(
+            t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state
+        )
+        start, span = jnp.asarray(t0), jnp.asarray(t1 - t0)
+        walked = jnp.asarray(result != diffrax.RESULTS.successful)
+        probe = y1_candidate if self.probe is None else self.probe
+        ends = keep & (walked | (self._failure(t1, probe, args) != int(Ending.WALKING)))
+
+        def part_before() -> Scalar:
+            code = self._failure(t1, y1_candidate, args)
+            before, after = (
+                ending_surface(code, args, y1_candidate, y) for y in (y0, y1_candidate)
+            )
+            crossed = (before < 0.0) & (after > 0.0)
+            crossed = crossed & (walked | (code != int(Ending.WALKING)))
+            return jnp.where(crossed, before / jnp.where(crossed, before - after, 1.0), 1.0)
+
+        way = span * jnp.where(ends, fusion_barrier(ends, part_before), 1.0)
+        again = ends & (span - way > jnp.maximum(_OVERSHOOT * way, 4.0 * _MARGIN))
+        target = start + way * (1.0 + 0.5 * _OVERSHOOT) + _MARGIN
+        again, target = jax.lax.stop_gradient((again & (target < start + span), target))
+        inner = jtu.tree_map(lambda a, b: jnp.where(again, a, b), controller_state, inner)
+        result = diffrax.RESULTS.where(again, diffrax.RESULTS.successful, result)
+        next_t0, next_t1 = jnp.where(again, t0, next_t0), jnp.where(again, target, next_t1)
+        return keep & ~again, next_t0, next_t1, jump, inner, result
+
+    def _failure(self, t: Time, y: PyTree, args: PyTree) -> Scalar:
+        """Code of the failure that has come to a state, that of "walking" where none has."""
+        code = jnp.asarray(int(Ending.WALKING))
+        for name, happens in ending_events(self.watch).items():
+            if name != Ending.SOLVER_FAILED:
+                code = jnp.where(happens(t, y, args), int(name), code)
+        return code

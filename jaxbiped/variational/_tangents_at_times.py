@@ -1,0 +1,88 @@
+"""Derivatives of a motion at given times, with respect to its start and to a scene's parameters."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.solve._accuracy import Precision
+from jaxbiped.solve._units import units_of
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._switch_locator import Watch
+from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._variational_solve import solve_variational
+
+_FLOOR = 1e-4
+"""Size below which a derivative's error is absolute, along a direction of its own size."""
+_MOST_ATTEMPTS = 1_000_000
+
+
+class TangentsAtTimes(NamedTuple):
+    """States at k times, and their derivatives in n directions.
+
+    Attributes:
+        state: leaves of shape (k,).
+        columns: of the c leaves, shape (k, n, c); NaN from where they are not determined.
+    """
+
+    state: PyTree
+    columns: Scalar
+
+
+def tangents_at_times(
+    watch: Watch,
+    solver: AbstractRosenbrock,
+    scene: PyTree,
+    state: PyTree,
+    *,
+    times: Scalar,
+    places: tuple[int, ...],
+    active: tuple[int, ...],
+    precision: Precision,
+) -> TangentsAtTimes:
+    """Follows a motion from one time to the next, with its derivatives.
+
+    Directions are those of the leaves of the state at `places`, then those of the `active` leaves
+    of the scene. Times increase; from one that is infinite on, everything stays as it was.
+    """
+    c, m, p = len(jtu.tree_leaves(state)), len(places), len(active)
+    start = np.zeros((c, m + p))
+    start[list(places), range(m)] = 1.0
+    leaves = jtu.tree_leaves(scene)
+    sizes = [jnp.where(leaves[i] == 0.0, 1.0, jnp.abs(leaves[i])) for i in active]
+    inverse = jtu.tree_leaves(units_of(scene, state).inverse)
+    floors = [*(jnp.asarray(_FLOOR * inverse[i]) for i in places), *(_FLOOR / s for s in sizes)]
+    seeded = Seeded(scene, jnp.zeros((p, m + p)), jnp.stack(floors), active)
+
+    def follow(
+        now: tuple[Scalar, Tangents, Scalar], time: Scalar
+    ) -> tuple[tuple[Scalar, Tangents, Scalar], TangentsAtTimes]:
+        since, at, lost = now
+        moves = jnp.isfinite(time) & (time > since)
+        found, _ = solve_variational(
+            watch,
+            solver,
+            at,
+            seeded,
+            jnp.ones(p),
+            precision=precision,
+            max_time=jnp.where(moves, time - since, 0.0),
+            max_solver_steps=_MOST_ATTEMPTS,
+            engine=None,
+        )
+        reached = Tangents(found.state, found.columns.T)
+        after = jtu.tree_map(lambda new, old: jnp.where(moves, new, old), reached, at)
+        lost = lost | (moves & found.undetermined)
+        columns = jnp.where(lost, jnp.nan, after.columns.T)
+        now = (jnp.where(moves, time, since), after, lost)
+        return now, TangentsAtTimes(after.state, columns)
+
+    first = (jnp.zeros_like(times[0]), Tangents(state, jnp.asarray(start)), jnp.asarray(False))
+    if len(times) == 1:
+        _, found = follow(first, times[0])
+        return jtu.tree_map(lambda leaf: leaf[None], found)
+    return jax.lax.scan(follow, first, times)[1]
