@@ -5,13 +5,14 @@ two counts. Since 0.12 `ClosedJaxpr` and `Jaxpr` are one class, and `eval_jaxpr`
 `call` and `closed_call`.
 """
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax._src.core import trace_state_clean
+from jax._src.core import eval_context, top_axis_env, trace_ctx, trace_state_clean
 from jax.extend.core import Jaxpr, JaxprEqn
 from jaxlib import lapack
 from jaxlib.mlir import ir
@@ -57,6 +58,18 @@ def scan_counts(params: dict[str, Any]) -> tuple[int, int]:
 def nothing_is_traced() -> bool:
     """Whether the caller is under no transformation of JAX."""
     return bool(trace_state_clean())
+
+
+@contextlib.contextmanager
+def untraced() -> Iterator[None]:
+    """Within, nothing is traced: for what depends on known numbers alone."""
+    axes = trace_ctx.axis_env
+    with eval_context():
+        trace_ctx.set_axis_env(top_axis_env)
+        try:
+            yield
+        finally:
+            trace_ctx.set_axis_env(axes)
 
 
 def load_lapack() -> None:

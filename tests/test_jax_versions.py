@@ -13,6 +13,9 @@ from tests.compiler.one_shot import evaluate
 from tests.import_graph import PACKAGE
 
 PRIVATE = {
+    ("_jax_versions.py", "jax._src.core.eval_context"),
+    ("_jax_versions.py", "jax._src.core.top_axis_env"),
+    ("_jax_versions.py", "jax._src.core.trace_ctx"),
     ("_jax_versions.py", "jax._src.core.trace_state_clean"),
     ("_jax_versions.py", "jaxlib.lapack"),
     ("_jax_versions.py", "jaxlib.mlir.ir"),

@@ -95,3 +95,11 @@ def test_numbers_in_a_row():
 def test_what_has_no_form_is_refused():
     with pytest.raises(UnwrittenError, match="erf"):
         write_host_program(lambda arrays: jax.lax.erf(arrays[0]), [X], None)
+
+
+def test_one_text_that_stands_for_different_shapes():
+    def function(a, b):
+        wide = jnp.broadcast_to(a, (1,)) / jnp.broadcast_to(b, (1,))
+        return a / b, jnp.stack([wide, jnp.array([a, b])[:1]], 1)
+
+    check_against_xla(function, 2.0, 3.0)

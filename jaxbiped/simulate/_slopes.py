@@ -1,0 +1,165 @@
+"""Slopes of a simulation: how the moments that it saved depend on its start and its scene."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar, select
+from jaxbiped.compiler import host_jit
+from jaxbiped.dynamics._minimal_motion import vector_field
+from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._state import exchange_legs
+from jaxbiped.dynamics._switches import switches
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import Precision
+from jaxbiped.solve._ending_surface import ending_surface
+from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._units import units_of
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._event_motion import follow_event
+from jaxbiped.variational._switch_locator import Watch
+from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._tangents_at_times import TangentsAtTimes, tangents_at_times
+
+_LOOSER = 10.0
+"""Tolerance of derivatives, in units of the state's."""
+_WATCH = Watch(field=vector_field, switches=switches)
+"""Derivatives are taken up to the times at which the plain solve saved."""
+
+
+class Slopes(NamedTuple):
+    """Derivatives at k moments: arrivals at a section, then what was saved.
+
+    Attributes:
+        time, state: in n directions, shapes (k, n) and (k, n, c).
+        clock: whether the moment is that of a clock, the duration or a time to save at, (k,).
+        rates: of the state there, shape (k, c).
+    """
+
+    time: Scalar
+    state: Scalar
+    clock: Scalar
+    rates: Scalar
+
+
+@host_jit()
+def slopes_of(
+    scene: Scene,
+    state: PyTree,
+    found: Trajectory,
+    *,
+    until: Scalar | None,
+    solver: AbstractRosenbrock,
+    section: AbstractSection | None,
+    rtol: Scalar,
+    places: tuple[int, ...],
+    active: tuple[int, ...],
+) -> Slopes:
+    """Derivatives of what was `found`, with respect to some leaves of the state and of the scene.
+
+    Args:
+        scene, state: what was simulated, and from where.
+        found: the result.
+        until: the duration, to which all moments but the last are events; None: the times to save
+            at were given.
+        solver: of the columns.
+        section: at which arrivals were saved.
+        rtol: relative tolerance of the solve.
+        places, active: of the leaves that are differentiated.
+    """
+    wide: tuple[Scene, PyTree, PyTree] = jtu.tree_map(_widened, (scene, state, found.state))
+    scene, state, saved = wide
+    t = _widened(found.t)
+    if found.arrivals is not None:
+        t = jnp.concatenate([_widened(found.arrivals.t), t])
+    by_clock = jnp.isfinite(t)
+    if until is not None:
+        last = jnp.arange(len(t)) == len(t) - 1
+        by_clock = last & (t >= until)
+    like = jtu.tree_map(lambda leaf: jnp.broadcast_to(leaf[-1], t.shape), saved)
+    at = TangentsAtTimes(like, jnp.zeros((len(t), 0, len(like))))
+    time = jnp.zeros((len(t), 0))
+    if places or active:
+        at = tangents_at_times(
+            _WATCH,
+            solver,
+            scene,
+            state,
+            times=t,
+            places=places,
+            active=active,
+            precision=Precision(rtol, _LOOSER * rtol),
+        )
+        time = jnp.zeros(at.columns.shape[:2])
+    columns = at.columns
+    if until is not None and (places or active):
+        end = jtu.tree_map(lambda leaf: leaf[-1], saved)
+        time, moving = _at_events(scene, at, end, found.ending, section, rtol, active)
+        time = jnp.where(by_clock[:, None], 0.0, time)
+        columns = jnp.where(by_clock[:, None, None], columns, moving)
+    rates = jnp.stack(jtu.tree_leaves(jax.vmap(lambda y: vector_field(0.0, y, scene))(at.state)), 1)
+    reached = jnp.isfinite(t)[:, None]
+    return Slopes(
+        time=jnp.where(reached, time, 0.0),
+        state=jnp.where(reached[..., None], columns, 0.0),
+        clock=by_clock.astype(t.dtype),
+        rates=rates,
+    )
+
+
+def _at_events(
+    scene: Scene,
+    at: TangentsAtTimes,
+    end: PyTree,
+    ending: Scalar,
+    section: AbstractSection | None,
+    rtol: Scalar,
+    active: tuple[int, ...],
+) -> tuple[Scalar, Scalar]:
+    """At arrivals at a section, but at last where the simulation ends."""
+    p, n = len(active), at.columns.shape[1]
+    seeds = jnp.concatenate([jnp.zeros((p, n - p)), jnp.eye(p)], axis=1)
+    seeded = Seeded(scene, seeds, jnp.zeros(n), active)
+    unit = units_of(scene, end).time
+
+    def follow(
+        surface: Callable[[PyTree, PyTree], Scalar], here: TangentsAtTimes
+    ) -> tuple[Scalar, Scalar]:
+        return follow_event(
+            surface,
+            lambda a, y: vector_field(0.0, y, a),
+            Tangents(here.state, here.columns.T),
+            seeded,
+            rtol=rtol,
+            unit=unit,
+        )
+
+    def arrive(here: TangentsAtTimes) -> tuple[Scalar, Scalar]:
+        assert section is not None
+        own, other = (section.value(scene, y) for y in (here.state, exchange_legs(here.state)))
+        exchanged = jnp.abs(other) < jnp.abs(own)
+
+        def surface(a: PyTree, y: PyTree) -> Scalar:
+            return section.value(a, select(exchanged, exchange_legs(y), y))
+
+        return follow(surface, here)
+
+    last = jtu.tree_map(lambda leaf: leaf[-1], at)
+    moments = [
+        jtu.tree_map(
+            lambda leaf: leaf[None],
+            follow(lambda a, y: ending_surface(ending, a, end, y), last),
+        )
+    ]
+    if section is not None:
+        moments.insert(0, jax.vmap(arrive)(jtu.tree_map(lambda leaf: leaf[:-1], at)))
+    time, state = jtu.tree_map(lambda *each: jnp.concatenate(each), *moments)
+    return time, state
+
+
+def _widened(leaf: Scalar) -> Scalar:
+    return jnp.asarray(leaf, jnp.float64)
