@@ -7,101 +7,84 @@ are, so a rule is given here.
 import contextlib
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import Any, NoReturn, TypeVar
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jax.custom_derivatives import SymbolicZero
-from jaxtyping import PyTree, PyTreeDef
+from jaxtyping import PyTree
 
-from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._checks import ArgumentError
 from jaxbiped._jax_versions import untraced
 from jaxbiped._types import Scalar
-from jaxbiped.simulate._slopes import Slopes, slopes_of
-from jaxbiped.solve._solvers import solver_named
+from jaxbiped.simulate._slopes import Slopes
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
-if TYPE_CHECKING:
-    from jaxbiped.simulate._simulation import Simulation
+_Run = TypeVar("_Run")
 
 
 def with_derivatives(
-    run: "Simulation", compute: Callable[["Simulation"], Trajectory]
-) -> Trajectory:
+    run: _Run,
+    compute: Callable[[_Run], Trajectory[Any]],
+    *,
+    moving: Callable[[_Run], tuple[PyTree, PyTree, PyTree]],
+    slopes: Callable[[_Run, Trajectory[Any], tuple[int, ...], tuple[int, ...]], Slopes],
+) -> Trajectory[Any]:
     """`compute(run)`, with derivatives of the times and states that are saved.
 
-    They come from tangent columns of exactly the leaves that are differentiated, in a solve of
-    their own whose steps end at switches; where an event sets the time, they include its motion.
-    Where a switch or the event is grazed, they are NaN. An adjoint of diffrax's that the user
-    chose is taken instead.
+    Args:
+        run: what is simulated.
+        compute: simulates it.
+        moving: what of it may be differentiated: the start, the scene, and the times at which a
+            clock ends or saves it.
+        slopes: derivatives of what was found with respect to some leaves of start and scene. It
+            raises `ArgumentError` for what has none.
     """
-    leaves, structure = jtu.tree_flatten(run)
-    if run.adjoint is not None or not _is_traced(leaves):
+    arrays, rest = eqx.partition(run, eqx.is_array)
+    leaves, structure = jtu.tree_flatten(arrays)
+    if not _is_traced(leaves):
         return compute(run)
-    return _differentiable(compute, structure)(*leaves)
 
+    def whole(leaves: Sequence[Any]) -> _Run:
+        found: _Run = eqx.combine(jtu.tree_unflatten(structure, leaves), rest)
+        return found
 
-@bounded_cache(PROGRAMS)
-def _differentiable(
-    compute: Callable[["Simulation"], Trajectory], structure: PyTreeDef
-) -> Callable[..., Trajectory]:
     @jax.custom_jvp
-    def function(*leaves: Scalar) -> Trajectory:
-        return compute(jtu.tree_unflatten(structure, leaves))
+    def function(*leaves: Scalar) -> Trajectory[Any]:
+        return compute(whole(leaves))
 
     def rule(
         primals: Sequence[Scalar], tangents: Sequence[Scalar | SymbolicZero]
-    ) -> tuple[Trajectory, Trajectory]:
-        run, dots = (jtu.tree_unflatten(structure, each) for each in (primals, tangents))
-        _check_differentiable(run)
-        state_dots, scene_dots = _moved(dots.state), _moved(dots.scene)
-        clock_dots = _moved(dots.duration if run.times is None else dots.times)
+    ) -> tuple[Trajectory[Any], Trajectory[Any]]:
+        dots = moving(jtu.tree_unflatten(structure, tangents))
+        state_dots, scene_dots, clock_dots = map(_moved, dots)
         # What is known is not traced along with the tangents: JAX compiles no small programs.
         known = not _is_traced(primals)
         with untraced() if known else contextlib.nullcontext():
-            found = compute(run) if known else function(*primals)
-            slopes = slopes_of(
-                run.scene,
-                run.state,
-                found,
-                until=run.duration if run.times is None else None,
-                solver=_rosenbrock(run),
-                section=run.section,
-                rtol=run.rtol,
-                places=tuple(state_dots),
-                active=tuple(scene_dots),
-            )
+            found = compute(whole(primals)) if known else function(*primals)
+            once = whole(primals if known else _once(primals))
+            at = slopes(once, found, tuple(state_dots), tuple(scene_dots))
         along = [*state_dots.values(), *scene_dots.values()]
-        t_dot, leaf_dots = _contract(slopes, along, *clock_dots.values())
-        return found, _tangent_of(found, t_dot, leaf_dots)
+        return found, _tangent_of(found, *_contract(at, along, *clock_dots.values()))
 
     function.defjvp(rule, symbolic_zeros=True)
-    return function
+    return function(*leaves)
 
 
-def _check_differentiable(run: "Simulation") -> None:
-    refused = {
-        'save = "steps"': (run.save_steps, 'ask for save="end", an array of times or a section'),
-        "extremes": (run.extremes is not None, "only times and states have derivatives"),
-        "scene = RedundantScene(…)": (
-            run.scene.redundant,
-            "the same walk in minimal coordinates, scene.minimal, has them",
-        ),
-    }
-    for argument, (is_so, instead) in refused.items():
-        if is_so:
-            raise ArgumentError(f"{argument} is not allowed under derivatives: {instead}.")
+@jax.custom_jvp
+def _once(leaves: Sequence[Scalar]) -> Sequence[Scalar]:
+    """The same, of which there are no derivatives."""
+    return leaves
 
 
-def _rosenbrock(run: "Simulation") -> AbstractRosenbrock:
-    """The method of the columns' steps: the walk's own, where it is one."""
-    solver = run.solver if isinstance(run.solver, AbstractRosenbrock) else solver_named("rodas4p")
-    assert isinstance(solver, AbstractRosenbrock)
-    return solver
+@_once.defjvp
+def _refuse(primals: object, tangents: object) -> NoReturn:
+    raise ArgumentError(
+        "Second derivatives of a simulation are not offered: take differences of first ones."
+    )
 
 
 @jax.jit

@@ -4,15 +4,25 @@ import dataclasses
 from typing import Any
 
 import equinox as eqx
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._types import Parameter, as_float
 from jaxbiped.compiler import Request
 from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.simulate._derivatives import with_derivatives
+from jaxbiped.simulate._rigid_slopes import rigid_slopes_of
+from jaxbiped.simulate._slopes import Slopes
 from jaxbiped.solve._engine import engine_named
 from jaxbiped.solve._rigid_program import rigid_program
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
+
+
+_ROOM = 256
+"""Heel strikes that there is room for where it is not known how many come."""
 
 
 class RigidSimulation(eqx.Module):
@@ -42,6 +52,10 @@ class RigidSimulation(eqx.Module):
         return dataclasses.replace(self, walk=self.walk._replace(**new), embedded=kept)
 
     def __call__(self) -> Trajectory[RigidState]:
+        """Solves it, differentiably."""
+        return with_derivatives(self, RigidSimulation.solved, moving=_moving, slopes=_slopes)
+
+    def solved(self) -> Trajectory[RigidState]:
         """Solves it."""
         state = self.walk.state
         program = rigid_program(self.max_arrivals > 0, self.waits, self.embedded)
@@ -59,3 +73,40 @@ class RigidSimulation(eqx.Module):
             arrivals=arrivals_among(rows, found.footsteps, state),
             engine=self.engine,
         )
+
+
+def _moving(run: RigidSimulation) -> tuple[PyTree, PyTree, PyTree]:
+    return run.walk.state, run.walk.scene, run.walk.duration
+
+
+def _slopes(
+    run: RigidSimulation,
+    found: Trajectory[RigidState],
+    places: tuple[int, ...],
+    active: tuple[int, ...],
+) -> Slopes:
+    assert found.arrivals is not None
+    count, kept = found.arrivals.total, run.max_arrivals
+    strikes = found.arrivals.t
+    known = [each for each in (count, run.walk.footsteps) if not isinstance(each, jax.core.Tracer)]
+    room = int(known[0]) if known and int(known[0]) else _ROOM
+    if room > kept:
+        walk: RigidSimulation = jax.lax.stop_gradient(dataclasses.replace(run, max_arrivals=room))
+        again = walk.solved().arrivals
+        assert again is not None
+        strikes = again.t
+    slopes = rigid_slopes_of(
+        run.walk.scene,
+        run.walk.state,
+        strikes,
+        count,
+        found.t[-1],
+        found.ending,
+        until=run.walk.duration,
+        rtol=run.walk.rtol,
+        places=places,
+        active=active,
+    )
+    # Of the strikes only those that are kept, then the end.
+    parts = (lambda leaf: jnp.concatenate([leaf[:kept], leaf[-1:]]))
+    return Slopes(*map(parts, slopes)) if len(strikes) > kept else slopes

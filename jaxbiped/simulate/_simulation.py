@@ -1,5 +1,6 @@
 """Checked request to simulate, which can be compiled and run at other tolerances."""
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -32,6 +33,7 @@ from jaxbiped.simulate._by_xla import by_xla, trim
 from jaxbiped.simulate._derivatives import with_derivatives
 from jaxbiped.simulate._engine_choice import choose_engine
 from jaxbiped.simulate._saved_times import check_times
+from jaxbiped.simulate._slopes import Slopes, slopes_of
 from jaxbiped.simulate._start import check_steps, start_for
 from jaxbiped.simulate._start_height import check_start_height
 from jaxbiped.solve._accuracy import check_precision, tolerances
@@ -41,6 +43,13 @@ from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import Units, si_units, units_of
 from jaxbiped.solve.controllers._footstep_limit import PATIENCE
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+
+
+_OF_STEPS = (
+    "adjoint = … differentiates the steps that were taken, which were chosen for the state alone: "
+    "through contact such derivatives may be wrong in every digit. Without it they are right."
+)
 
 
 class Simulation(eqx.Module):
@@ -181,7 +190,11 @@ class Simulation(eqx.Module):
 
     def __call__(self) -> Trajectory:
         """Compiles what is not compiled yet, and runs."""
-        return with_derivatives(self, _run)
+        if self.adjoint is not None:
+            if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(self)):
+                warnings.warn(_OF_STEPS, RuntimeWarning, stacklevel=3)
+            return _run(self)
+        return with_derivatives(self, _run, moving=_moving, slopes=_slopes)
 
     def lane_request(self) -> Request | None:
         """What it asks of lanes or devices; None where XLA runs it."""
@@ -197,6 +210,40 @@ class Simulation(eqx.Module):
 def _run(run: Simulation) -> Trajectory:
     request = run.lane_request()
     return trim(by_xla(run)) if request is None else by_lanes(run, request)
+
+
+def _moving(run: Simulation) -> tuple[PyTree, PyTree, PyTree]:
+    return run.state, run.scene, run.duration if run.times is None else run.times
+
+
+def _slopes(
+    run: Simulation, found: Trajectory, places: tuple[int, ...], active: tuple[int, ...]
+) -> Slopes:
+    refused = {
+        'save = "steps"': (run.save_steps, 'ask for save="end", an array of times or a section'),
+        "extremes": (run.extremes is not None, "only times and states have derivatives"),
+        "scene = RedundantScene(…)": (
+            run.scene.redundant,
+            "the same walk in minimal coordinates, scene.minimal, has them",
+        ),
+    }
+    for argument, (is_so, instead) in refused.items():
+        if is_so:
+            raise ArgumentError(f"{argument} is not allowed under derivatives: {instead}.")
+    # The columns take the walk's own method of steps, where that is one for them.
+    solver = run.solver if isinstance(run.solver, AbstractRosenbrock) else solver_named("rodas4p")
+    assert isinstance(solver, AbstractRosenbrock)
+    return slopes_of(
+        run.scene,
+        run.state,
+        found,
+        until=run.duration if run.times is None else None,
+        solver=solver,
+        section=run.section,
+        rtol=run.rtol,
+        places=places,
+        active=active,
+    )
 
 
 class CompiledSimulation:

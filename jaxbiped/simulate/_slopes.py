@@ -20,12 +20,16 @@ from jaxbiped.solve._ending_surface import ending_surface
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._event_motion import follow_event
+from jaxbiped.variational._event_motion import EventMotion, follow_event
 from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents
-from jaxbiped.variational._tangents_at_times import TangentsAtTimes, tangents_at_times
+from jaxbiped.variational._tangents_at_times import (
+    TangentsAtTimes,
+    seeded_directions,
+    tangents_at_times,
+)
 
-_LOOSER = 10.0
+LOOSER = 10.0
 """Tolerance of derivatives, in units of the state's."""
 _WATCH = Watch(field=vector_field, switches=switches)
 """Derivatives are taken up to the times at which the plain solve saved."""
@@ -92,15 +96,16 @@ def slopes_of(
             times=t,
             places=places,
             active=active,
-            precision=Precision(rtol, _LOOSER * rtol),
+            precision=Precision(rtol, LOOSER * rtol),
         )
         time = jnp.zeros(at.columns.shape[:2])
     columns = at.columns
     if until is not None and (places or active):
         end = jtu.tree_map(lambda leaf: leaf[-1], saved)
-        time, moving = _at_events(scene, at, end, found.ending, section, rtol, active)
-        time = jnp.where(by_clock[:, None], 0.0, time)
-        columns = jnp.where(by_clock[:, None, None], columns, moving)
+        _, seeded = seeded_directions(scene, state, places, active)
+        moves = _at_events(scene, at, end, found.ending, section, rtol, seeded)
+        time = jnp.where(by_clock[:, None], 0.0, moves.time)
+        columns = jnp.where(by_clock[:, None, None], columns, moves.state)
     rates = jnp.stack(jtu.tree_leaves(jax.vmap(lambda y: vector_field(0.0, y, scene))(at.state)), 1)
     reached = jnp.isfinite(t)[:, None]
     return Slopes(
@@ -118,17 +123,14 @@ def _at_events(
     ending: Scalar,
     section: AbstractSection | None,
     rtol: Scalar,
-    active: tuple[int, ...],
-) -> tuple[Scalar, Scalar]:
+    seeded: Seeded,
+) -> EventMotion:
     """At arrivals at a section, but at last where the simulation ends."""
-    p, n = len(active), at.columns.shape[1]
-    seeds = jnp.concatenate([jnp.zeros((p, n - p)), jnp.eye(p)], axis=1)
-    seeded = Seeded(scene, seeds, jnp.zeros(n), active)
     unit = units_of(scene, end).time
 
     def follow(
         surface: Callable[[PyTree, PyTree], Scalar], here: TangentsAtTimes
-    ) -> tuple[Scalar, Scalar]:
+    ) -> EventMotion:
         return follow_event(
             surface,
             lambda a, y: vector_field(0.0, y, a),
@@ -138,7 +140,7 @@ def _at_events(
             unit=unit,
         )
 
-    def arrive(here: TangentsAtTimes) -> tuple[Scalar, Scalar]:
+    def arrive(here: TangentsAtTimes) -> EventMotion:
         assert section is not None
         own, other = (section.value(scene, y) for y in (here.state, exchange_legs(here.state)))
         exchanged = jnp.abs(other) < jnp.abs(own)
@@ -157,8 +159,8 @@ def _at_events(
     ]
     if section is not None:
         moments.insert(0, jax.vmap(arrive)(jtu.tree_map(lambda leaf: leaf[:-1], at)))
-    time, state = jtu.tree_map(lambda *each: jnp.concatenate(each), *moments)
-    return time, state
+    found: EventMotion = jtu.tree_map(lambda *each: jnp.concatenate(each), *moments)
+    return found
 
 
 def _widened(leaf: Scalar) -> Scalar:

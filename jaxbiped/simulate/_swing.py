@@ -79,7 +79,14 @@ def swing(
     control = step_control(relative, absolute, rms_norm) if dt is None else None
     scene = jtu.tree_map(as_float, scene)
     chosen = diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint
-    return _solve(scene, state, times, method, control, dt, max_solver_steps, chosen)
+    try:
+        return _solve(scene, state, times, method, control, dt, max_solver_steps, chosen)
+    except TypeError as error:
+        if adjoint is not None or "forward-mode" not in str(error):
+            raise
+        raise ArgumentError(
+            "adjoint = None is not allowed in forward mode: choose diffrax.ForwardMode()."
+        ) from error
 
 
 @cached_jit

@@ -19,7 +19,7 @@ from jaxbiped.scene._clearance import StanceRotation
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 
-_FALL_ANGLE = 1.0
+FALL_ANGLE = 1.0
 """A hip lower than a leg at this angle [rad] could carry it has fallen."""
 REST_RATE = 1e-4
 """Rate of a leg at rest, in units of √(g/l)."""
@@ -33,7 +33,7 @@ STUMBLE_SPEED = 1e-3
 
 def fall_height(scene: Scene) -> Scalar:
     """How high a leg at 1 rad could carry the hip [m]."""
-    return scene.walker.r + scene.walker.hip_to_foot * jnp.cos(_FALL_ANGLE)
+    return scene.walker.r + scene.walker.hip_to_foot * jnp.cos(FALL_ANGLE)
 
 
 def has_fallen(scene: Scene, state: State) -> Scalar:
@@ -122,8 +122,8 @@ def rigid_ending(state: RigidState) -> Scalar:
 
     Its hip comes down as a compliant one's does: when the stance leg is 1 rad from upright.
     """
-    code = jnp.where(state.theta_2 < -_FALL_ANGLE, int(Ending.FELL_FORWARD), 0)
-    code = jnp.where(state.theta_2 > _FALL_ANGLE, int(Ending.FELL_BACK), code)
+    code = jnp.where(state.theta_2 < -FALL_ANGLE, int(Ending.FELL_FORWARD), 0)
+    code = jnp.where(state.theta_2 > FALL_ANGLE, int(Ending.FELL_BACK), code)
     return jnp.where(jnp.isfinite(sum(state)), code, int(Ending.SOLVER_FAILED))
 
 

@@ -1,6 +1,7 @@
 """Motion of an event: how the time at which a surface is reached depends on what moves the state."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +15,19 @@ _NEAR = 1e-3
 """Time from the event, in units of time, beyond which it is not known where that lies."""
 
 
+class EventMotion(NamedTuple):
+    """An event near a state, and how it moves in n directions.
+
+    Attributes:
+        delay: from the state to the event [s].
+        time, state: derivatives of its time, shape (n,), and of the state at it, (n, c).
+    """
+
+    delay: Scalar
+    time: Scalar
+    state: Scalar
+
+
 def follow_event(
     surface: Callable[[PyTree, PyTree], Scalar],
     field: Callable[[PyTree, PyTree], PyTree],
@@ -22,8 +36,8 @@ def follow_event(
     *,
     rtol: RealScalarLike,
     unit: RealScalarLike,
-) -> tuple[Scalar, Scalar]:
-    """Derivatives of an event's time and of the state at it, shapes (n,) and (n, c).
+) -> EventMotion:
+    """Derivatives of an event's time and of the state at it.
 
     By the implicit function theorem: where g(y(t, p), p) = 0, dt = −(g' dy + g_p dp)/ġ, and the
     state at the event moves by dy + f dt. NaN where the event is not near, or where it grazes: the
@@ -53,4 +67,5 @@ def follow_event(
     grazes = speed * speed <= 2.0 * jnp.abs(turning) * known_to
     is_near = jnp.abs(here) <= _NEAR * unit * jnp.abs(speed)
     time = jnp.where(grazes | ~is_near, jnp.nan, -along / speed)
-    return time, at.columns.T + time[:, None] * as_columns(velocity)[None]
+    state = at.columns.T + time[:, None] * as_columns(velocity)[None]
+    return EventMotion(-here / speed, time, state)

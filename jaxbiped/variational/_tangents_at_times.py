@@ -8,7 +8,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -49,6 +49,31 @@ def tangents_at_times(
     Directions are those of the leaves of the state at `places`, then those of the `active` leaves
     of the scene. Times increase; from one that is infinite on, everything stays as it was.
     """
+    start, seeded = seeded_directions(scene, state, places, active)
+
+    def follow(
+        now: tuple[Scalar, Tangents], time: Scalar
+    ) -> tuple[tuple[Scalar, Tangents], TangentsAtTimes]:
+        since, at = now
+        moves = jnp.isfinite(time) & (time > since)
+        lasts = jnp.where(moves, time - since, 0.0)
+        found = tangents_after(watch, solver, at, seeded, lasts, precision)
+        after = select(moves, found, at)
+        return (jnp.where(moves, time, since), after), TangentsAtTimes(
+            after.state, after.columns.T
+        )
+
+    first = (jnp.zeros_like(times[0]), Tangents(state, start))
+    if len(times) == 1:
+        _, found = follow(first, times[0])
+        return jtu.tree_map(lambda leaf: leaf[None], found)
+    return jax.lax.scan(follow, first, times)[1]
+
+
+def seeded_directions(
+    scene: PyTree, state: PyTree, places: tuple[int, ...], active: tuple[int, ...]
+) -> tuple[Scalar, Seeded]:
+    """Columns at the start, shape (c, n), and the scene with what moves it."""
     c, m, p = len(jtu.tree_leaves(state)), len(places), len(active)
     start = np.zeros((c, m + p))
     start[list(places), range(m)] = 1.0
@@ -56,33 +81,28 @@ def tangents_at_times(
     sizes = [jnp.where(leaves[i] == 0.0, 1.0, jnp.abs(leaves[i])) for i in active]
     inverse = jtu.tree_leaves(units_of(scene, state).inverse)
     floors = [*(jnp.asarray(_FLOOR * inverse[i]) for i in places), *(_FLOOR / s for s in sizes)]
-    seeded = Seeded(scene, jnp.zeros((p, m + p)), jnp.stack(floors), active)
+    seeds = jnp.concatenate([jnp.zeros((p, m)), jnp.eye(p)], axis=1)
+    return jnp.asarray(start), Seeded(scene, seeds, jnp.stack(floors) if floors else jnp.zeros(0), active)
 
-    def follow(
-        now: tuple[Scalar, Tangents, Scalar], time: Scalar
-    ) -> tuple[tuple[Scalar, Tangents, Scalar], TangentsAtTimes]:
-        since, at, lost = now
-        moves = jnp.isfinite(time) & (time > since)
-        found, _ = solve_variational(
-            watch,
-            solver,
-            at,
-            seeded,
-            jnp.ones(p),
-            precision=precision,
-            max_time=jnp.where(moves, time - since, 0.0),
-            max_solver_steps=_MOST_ATTEMPTS,
-            engine=None,
-        )
-        reached = Tangents(found.state, found.columns.T)
-        after = jtu.tree_map(lambda new, old: jnp.where(moves, new, old), reached, at)
-        lost = lost | (moves & found.undetermined)
-        columns = jnp.where(lost, jnp.nan, after.columns.T)
-        now = (jnp.where(moves, time, since), after, lost)
-        return now, TangentsAtTimes(after.state, columns)
 
-    first = (jnp.zeros_like(times[0]), Tangents(state, jnp.asarray(start)), jnp.asarray(False))
-    if len(times) == 1:
-        _, found = follow(first, times[0])
-        return jtu.tree_map(lambda leaf: leaf[None], found)
-    return jax.lax.scan(follow, first, times)[1]
+def tangents_after(
+    watch: Watch,
+    solver: AbstractRosenbrock,
+    at: Tangents,
+    seeded: Seeded,
+    time: Scalar,
+    precision: Precision,
+) -> Tangents:
+    """A state and its derivatives a fixed time [s] later; NaN where they are not determined."""
+    found, _ = solve_variational(
+        watch,
+        solver,
+        at,
+        seeded,
+        jnp.ones(len(seeded.active)),
+        precision=precision,
+        max_time=time,
+        max_solver_steps=_MOST_ATTEMPTS,
+        engine=None,
+    )
+    return Tangents(found.state, jnp.where(found.undetermined, jnp.nan, found.columns.T))
