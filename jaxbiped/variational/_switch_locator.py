@@ -27,6 +27,11 @@ _OVERSHOOT = 1e-4
 MARGIN = 1e-12
 """Time past a switch [s] that a step may always end, and aims at: the side must be beyond doubt."""
 _ROUNDING = 1e-12
+NEAR = 1e-9
+"""Longest step [s] that crosses a switch where the field itself is not smooth: longer ones end
+before it, for a step's last stage lies on the other side, where the Jacobian may be any size."""
+_BEFORE = 1e-3
+"""How far before, as a share of the way to it."""
 
 
 class Watch(eqx.Module):
@@ -63,6 +68,8 @@ class SwitchLocatorState(NamedTuple):
         grazes: number of steps in which a switch was grazed: no derivatives are determined then.
         saltation_pending: whether the last accepted step did: columns have yet to jump there.
         peak_saltation_pending: whether the step with the largest value did.
+        crossed_field: number of the switch where the field is not smooth that the last step passed,
+            counted from one; 0 where it passed none.
         arrived: whether the section was reached.
         code: that of the failure that ended the solve, 0 for none.
         peak: largest value of the watched quantity at the ends of steps; None where none is.
@@ -77,6 +84,7 @@ class SwitchLocatorState(NamedTuple):
     grazes: Scalar
     saltation_pending: Scalar
     peak_saltation_pending: Scalar
+    crossed_field: Scalar
     arrived: Scalar
     code: Scalar
     peak: PyTree
@@ -117,7 +125,7 @@ class SwitchLocator(AbstractWrappedControl):
         if self.watch.switches(plain_args(args), state):
             sizes = jax.lax.stop_gradient(jtu.tree_map(jnp.abs, state))
         counts = zero, zero, zero, zero
-        return first, SwitchLocatorState(inner, sizes, *counts, no, no, no, zero, peak, at_peak)
+        return first, SwitchLocatorState(inner, sizes, *counts, no, no, zero, no, zero, peak, at_peak)
 
     def adapt_step_size(
         self,
@@ -141,8 +149,10 @@ class SwitchLocator(AbstractWrappedControl):
         )
         before_switch, span = (t1 - t0) * part, t1 - t0
         far = span - before_switch > jnp.maximum(_OVERSHOOT * before_switch, 4.0 * MARGIN)
-        again = crossed.any & far
+        again = crossed.any & (far | (crossed.field & (span > 2.0 * NEAR)))
         target = t0 + before_switch * (1.0 + 0.5 * _OVERSHOOT) + MARGIN
+        approaches = crossed.field & (before_switch > NEAR)
+        target = jnp.where(approaches, t0 + before_switch * (1.0 - _BEFORE), target)
         target = jax.lax.stop_gradient(target)
         next_t1 = jnp.where(again, jnp.where(keep, target, jnp.minimum(next_t1, target)), next_t1)
         next_t0 = jnp.where(again, t0, next_t0)
@@ -198,7 +208,7 @@ class SwitchLocator(AbstractWrappedControl):
         if turns is not None:
             any_crossed = any_crossed | jnp.any(turns.touches)
 
-        def locate() -> Scalar:
+        def locate() -> tuple[Scalar, Scalar]:
             parts = []
             for state, found in ((before, at_start), (after, at_end)):
                 rate = watch.field(jnp.zeros_like(span), state, scene)
@@ -206,20 +216,28 @@ class SwitchLocator(AbstractWrappedControl):
                 _, slopes = jax.jvp(lambda y: [s.value for s in surfaces(y)], (state,), (rate,))
                 parts += [values, span * jnp.stack(slopes)]
             roots = StepCubic(parts[0], parts[2], parts[1], parts[3]).sign_change()
-            first = jnp.min(jnp.where(jnp.stack(crossed), roots, 1.0))
+            roots = jnp.where(jnp.stack(crossed), roots, 1.0)
+            first, which = jnp.min(roots), jnp.asarray(0)
+            for number, switch in enumerate(at_end[:count]):
+                if not switch.corner:
+                    is_first = crossed[number] & (roots[number] <= first)
+                    which = jnp.where(is_first, 1 + number, which)
             if turns is None:
-                return first
-            return jnp.minimum(first, jnp.min(jnp.where(turns.touches, turns.places, 1.0)))
+                return first, which
+            touch = jnp.min(jnp.where(turns.touches, turns.places, 1.0))
+            return jnp.minimum(first, touch), jnp.where(touch < first, 0, which)
 
-        part = jnp.ones_like(span)
+        part, which = jnp.ones_like(span), jnp.asarray(0)
         if crossed:
-            part = jnp.where(any_crossed, fusion_barrier(any_crossed, locate), part)
+            part, which = fusion_barrier(any_crossed, locate)
+            part, which = jnp.where(any_crossed, part, 1.0), jnp.where(any_crossed, which, 0)
         found = _Crossed(
             any_crossed,
             functools.reduce(jnp.logical_or, switching, none),
             functools.reduce(jnp.logical_or, jumps, none),
             arrives,
             none if turns is None else turns.graze,
+            which,
         )
         return found, part
 
@@ -259,6 +277,7 @@ class SwitchLocator(AbstractWrappedControl):
             grazes=old.grazes + jnp.where(keep & crossed.graze, 1, 0),
             saltation_pending=jnp.where(keep, crossed.jump, old.saltation_pending),
             peak_saltation_pending=peak_saltation_pending,
+            crossed_field=jnp.where(keep, crossed.which, 0),
             arrived=keep & crossed.section,
             code=code,
             peak=peak,
@@ -272,6 +291,12 @@ class _Crossed(NamedTuple):
     jump: Scalar
     section: Scalar
     graze: Scalar
+    which: Scalar
+
+    @property
+    def field(self) -> Scalar:
+        """Whether the first of the surfaces is a switch where the field itself is not smooth."""
+        return self.which > 0
 
 
 def _surfaces(watch: Watch, peak: PyTree, scene: PyTree, state: PyTree) -> list[Switch]:

@@ -14,28 +14,41 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._final_step import clip_step
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._column_step import Differentiated, column_step, differentiate_step
-from jaxbiped.variational._saltation import has_saltation, saltation_at
+from jaxbiped.variational._switch_meeting import has_field_switches, meeting_at
 from jaxbiped.variational._solve_to_section import onto_section, peak_of
-from jaxbiped.variational._switch_locator import SwitchLocator, SwitchLocatorState, Watch
+from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState, Watch
 from jaxbiped.variational._tangent_solver import SHARE
 from jaxbiped.variational._tangents import Seeded, Tangents, active_leaves, with_active
 from jaxbiped.variational._variational_types import VariationalProblem, VariationalSolution
 
 
 class _Now(NamedTuple):
+    """What is carried from attempt to attempt.
+
+    Columns w are derivatives at equal times since the last switch where the field is not smooth,
+    which is passed τ later: those at a fixed time are w − f τ. For the field may jump at a switch
+    or be infinitely steep behind it, but all motions meet it there.
+
+    Attributes:
+        columns, shifts: w and τ, of the directions of the state and of those of parameters.
+        peak_columns, peak_shifts: the same where the watched quantity was largest.
+    """
+
     t: Scalar
     next_t: Scalar
     state: PyTree
     columns: tuple[Scalar, ...]
+    shifts: tuple[Scalar, ...]
     landed: SwitchLocatorState
     peak_columns: tuple[Scalar, ...]
+    peak_shifts: tuple[Scalar, ...]
     attempted: Scalar
     kept: Scalar
     lost: Scalar
@@ -87,10 +100,12 @@ class AdaptiveColumns:
         columns = (given.by_state, given.by_parameter)
         count = jnp.zeros((), dtype=jnp.int64)
         landed = jtu.tree_map(jnp.asarray, landed)
-        return _Now(zero, next_t, given.state, columns, landed, columns, count, none, none)
+        shifts = tuple(jnp.zeros(part.shape[0]) for part in columns)
+        return _Now(
+            zero, next_t, given.state, columns, shifts, landed, columns, shifts, count, none, none
+        )
 
     def attempt(self, given: VariationalProblem, now: _Now) -> tuple[_Now, Scalar]:
-        now = self._leapt(given, now)
         times = (now.t, now.next_t)
         step = differentiate_step(
             self.solver.tableau,
@@ -115,10 +130,13 @@ class AdaptiveColumns:
         limit = given.max_time
         t, next_t = clip_step(keep, t, next_t, limit, given.almost)
         state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), step.end, now.state)
-        columns, peaks = now.columns, now.peak_columns
+        met, shifts = self._met(given, now, landed.crossed_field)
+        crosses = landed.crossed_field > 0
+        columns, peaks, peak_shifts = now.columns, now.peak_columns, now.peak_shifts
+        new_columns = [_select(crosses, a, b) for a, b in zip(met, new_columns, strict=True)]
         if self.watch.peak is None:
             columns = tuple(_select(keep, a, b) for a, b in zip(new_columns, columns, strict=True))
-            peaks = columns
+            peaks, peak_shifts = columns, shifts
         else:
             highest = keep & (landed.peak > now.landed.peak)
             both = [
@@ -126,22 +144,22 @@ class AdaptiveColumns:
                 for new, old, peak in zip(new_columns, columns, peaks, strict=True)
             ]
             columns, peaks = (tuple(part) for part in zip(*both, strict=True))
+            peak_shifts = select(highest, shifts, peak_shifts)
         attempted = now.attempted + 1
         lost = jnp.asarray(result == diffrax.RESULTS.dt_min_reached)
         over = (t >= limit) | jnp.asarray(result != diffrax.RESULTS.successful)
         over = over | (attempted.astype(limit.dtype) >= given.max_attempts)
-        after = _Now(t, next_t, state, columns, landed, peaks, attempted, keep, lost)
+        after = _Now(
+            t, next_t, state, columns, shifts, landed, peaks, peak_shifts, attempted, keep, lost
+        )
         return after, over
 
     def finish(self, given: VariationalProblem, now: _Now) -> VariationalSolution:
-        if self.watch.section is None:
-            # A last step that ends past a jump of the field has its columns jump, too.
-            now = self._leapt(given, now)
         late = now.t >= given.max_time
         ended = jnp.where(late, int(Ending.TIMED_OUT), int(Ending.OUT_OF_STEPS))
         ended = jnp.where(now.lost, int(Ending.SOLVER_FAILED), ended)
         ended = jnp.where(now.landed.code != 0, now.landed.code, ended)
-        by_state, by_parameter = now.columns
+        by_state, by_parameter = self._at_fixed_time(given, now.state, now.columns, now.shifts)
         by_parameter = jnp.where(given.carries_parameters > 0.0, by_parameter, jnp.nan)
         seeded, columns = self._seeded(given), jnp.concatenate([by_state, by_parameter]).T
         y, t = Tangents(now.state, columns), now.t
@@ -150,7 +168,9 @@ class AdaptiveColumns:
         if self.watch.section is not None:
             y, t, time_columns = onto_section(self.watch, y, t, seeded, _along_columns_in_turn)
         if self.watch.peak is not None:
-            highest = Tangents(now.landed.at_peak, jnp.concatenate(now.peak_columns).T)
+            at_peak = now.landed.at_peak
+            peaks = self._at_fixed_time(given, at_peak, now.peak_columns, now.peak_shifts)
+            highest = Tangents(at_peak, jnp.concatenate(peaks).T)
             peak, peak_columns = peak_of(self.watch, highest, seeded, _along_columns_in_turn)
             peak_columns = jnp.where(now.landed.peak_saltation_pending, jnp.nan, peak_columns)
         return VariationalSolution(
@@ -162,32 +182,48 @@ class AdaptiveColumns:
             attempted=now.attempted,
             accepted=now.landed.accepted,
             jumps=now.landed.jumps,
-            missed=now.landed.saltation_pending & (self.watch.section is not None),
             grazes=now.landed.grazes,
             peak=peak,
             peak_columns=peak_columns,
         )
 
-    def _leapt(self, given: VariationalProblem, now: _Now) -> _Now:
-        """The columns behind a jump of the field, where the last accepted step passed one."""
-        if not has_saltation(self.watch, now.state, given.args):
-            return now
-        saltation = saltation_at(
-            self.watch, now.state, self._seeded(given), now.landed.saltation_pending
-        )
+    def _met(
+        self, given: VariationalProblem, now: _Now, which: Scalar
+    ) -> tuple[list[Scalar], tuple[Scalar, ...]]:
+        """Columns and shifts where the motion, just before it, meets the switch of a number."""
+        if not has_field_switches(self.watch, now.state, given.args):
+            return list(now.columns), now.shifts
+        meeting = meeting_at(self.watch, now.state, self._seeded(given), which)
 
-        def step_column(column: Scalar, forcing: Scalar | float) -> Scalar:
-            return column + saltation.change * (jnp.sum(saltation.by_state * column) + forcing)
+        def meet(column: Scalar, shift: Scalar, forcing: Scalar | float) -> tuple[Scalar, Scalar]:
+            later = -(jnp.sum(meeting.by_state * column) + forcing)
+            return column + meeting.rates * later, shift + later
 
-        by_state, by_parameter = now.columns
-        if by_state.shape[0]:
-            by_state = jax.lax.map(lambda column: step_column(column, 0.0), by_state)
-        if by_parameter.shape[0]:
-            by_parameter = jax.lax.map(
-                lambda each: step_column(each[0], each[1] * each[2]),
-                (by_parameter, saltation.by_parameter, given.sizes),
+        columns, shifts = list(now.columns), list(now.shifts)
+        if columns[0].shape[0]:
+            columns[0], shifts[0] = jax.lax.map(
+                lambda each: meet(*each, 0.0), (columns[0], shifts[0])
             )
-        return now._replace(columns=(by_state, by_parameter))
+        if columns[1].shape[0]:
+            columns[1], shifts[1] = jax.lax.map(
+                lambda each: meet(each[0], each[1], each[2] * each[3]),
+                (columns[1], shifts[1], meeting.by_parameter, given.sizes),
+            )
+        return columns, tuple(shifts)
+
+    def _at_fixed_time(
+        self,
+        given: VariationalProblem,
+        state: PyTree,
+        columns: tuple[Scalar, ...],
+        shifts: tuple[Scalar, ...],
+    ) -> list[Scalar]:
+        rates = self.watch.field(jnp.zeros(()), state, given.args)
+        velocity = jnp.stack(jtu.tree_leaves(rates))
+        return [
+            jax.lax.map(lambda each: each[0] - velocity * each[1], pair) if pair[0].shape[0] else pair[0]
+            for pair in zip(columns, shifts, strict=True)
+        ]
 
     def _seeded(self, given: VariationalProblem) -> Seeded:
         m, p = given.by_state.shape[0], given.by_parameter.shape[0]
@@ -248,7 +284,8 @@ class AdaptiveColumns:
         worst = jnp.zeros(())
         for norm in norms:
             worst = jnp.maximum(worst, norm)
-        return found, jnp.sqrt(worst)
+        # The step that crosses a switch is too short for them to change.
+        return found, jnp.where(now.next_t - now.t > 2.0 * NEAR, jnp.sqrt(worst), 0.0)
 
     def _controller(self, given: VariationalProblem, columns_norm: Scalar) -> SwitchLocator:
         def norm(error: PyTree) -> Scalar:

@@ -45,7 +45,7 @@ class VariationalSolution(NamedTuple):
 
     Attributes:
         t, state, columns, time_columns: on the section.
-        code, attempted, jumps, missed, grazes, peak, peak_columns: see there.
+        code, attempted, jumps, grazes, peak, peak_columns: see there.
         accepted: number of steps accepted.
     """
 
@@ -57,7 +57,6 @@ class VariationalSolution(NamedTuple):
     attempted: Scalar
     accepted: Scalar
     jumps: Scalar
-    missed: Scalar
     grazes: Scalar
     peak: Scalar
     peak_columns: Scalar
@@ -65,4 +64,4 @@ class VariationalSolution(NamedTuple):
     @property
     def undetermined(self) -> Scalar:
         """Whether the columns are not the derivatives of the motion (boolean)."""
-        return self.missed | (self.grazes > 0)
+        return self.grazes > 0

@@ -1,0 +1,60 @@
+"""Meeting of motions at a switch: derivatives at the moment at which each of them passes it."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.variational._switch_locator import Watch
+from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
+
+
+class SwitchMeeting(NamedTuple):
+    """How much later displaced motions meet a switch g = 0, and how fast they go there.
+
+    A motion displaced by dy meets it later by τ = −(by_state · dy + by_parameter · dp), where it is
+    displaced by dy + rates τ.
+
+    Attributes:
+        by_state, by_parameter: g'/ġ, shape (c,), and g_p/ġ, shape (p,).
+        rates: of the state just before, shape (c,).
+    """
+
+    by_state: Scalar
+    by_parameter: Scalar
+    rates: Scalar
+
+
+def has_field_switches(watch: Watch, state: PyTree, args: PyTree) -> bool:
+    """Whether the field is not smooth anywhere; known before anything runs."""
+    return any(not switch.corner for switch in watch.switches(args, state))
+
+
+def meeting_at(watch: Watch, state: PyTree, args: Seeded, which: Scalar) -> SwitchMeeting:
+    """At a state just before the switch of this number, counted from one; zeros for 0."""
+    leaves, structure = jtu.tree_flatten(state)
+    q = active_leaves(args)
+
+    def value(y: list[Scalar], p: list[Scalar]) -> Scalar:
+        found = watch.switches(with_active(args, p), jtu.tree_unflatten(structure, y))
+        picked = jnp.zeros(())
+        for number, switch in enumerate(found):
+            if not switch.corner:
+                picked = jnp.where(which == 1 + number, switch.value, picked)
+        return picked
+
+    def compute() -> SwitchMeeting:
+        rates = jnp.stack(jtu.tree_leaves(watch.field(jnp.zeros(()), state, args.args)))
+        by_state, by_parameter = jax.grad(value, argnums=(0, 1))(leaves, q)
+        normal = jnp.stack(by_state)
+        rate = jnp.sum(normal * rates)
+        inverse = 1.0 / jnp.where(rate == 0.0, jnp.finfo(rate.dtype).tiny, rate)
+        along = jnp.stack(by_parameter) if q else jnp.zeros(0, rate.dtype)
+        return SwitchMeeting(normal * inverse, along * inverse, rates)
+
+    found = fusion_barrier(which > 0, compute)
+    return jtu.tree_map(lambda leaf: jnp.where(which > 0, leaf, 0.0), found)
