@@ -8,7 +8,6 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
 
@@ -35,7 +34,7 @@ def has_field_switches(watch: Watch, state: PyTree, args: PyTree) -> bool:
 
 
 def meeting_at(watch: Watch, state: PyTree, args: Seeded, which: Scalar) -> SwitchMeeting:
-    """At a state just before the switch of this number, counted from one; zeros for 0."""
+    """At a state just before the switch of this number, counted from one."""
     leaves, structure = jtu.tree_flatten(state)
     q = active_leaves(args)
 
@@ -47,14 +46,10 @@ def meeting_at(watch: Watch, state: PyTree, args: Seeded, which: Scalar) -> Swit
                 picked = jnp.where(which == 1 + number, switch.value, picked)
         return picked
 
-    def compute() -> SwitchMeeting:
-        rates = jnp.stack(jtu.tree_leaves(watch.field(jnp.zeros(()), state, args.args)))
-        by_state, by_parameter = jax.grad(value, argnums=(0, 1))(leaves, q)
-        normal = jnp.stack(by_state)
-        rate = jnp.sum(normal * rates)
-        inverse = 1.0 / jnp.where(rate == 0.0, jnp.finfo(rate.dtype).tiny, rate)
-        along = jnp.stack(by_parameter) if q else jnp.zeros(0, rate.dtype)
-        return SwitchMeeting(normal * inverse, along * inverse, rates)
-
-    found = fusion_barrier(which > 0, compute)
-    return jtu.tree_map(lambda leaf: jnp.where(which > 0, leaf, 0.0), found)
+    rates = jnp.stack(jtu.tree_leaves(watch.field(jnp.zeros(()), state, args.args)))
+    by_state, by_parameter = jax.grad(value, argnums=(0, 1))(leaves, q)
+    normal = jnp.stack(by_state)
+    rate = jnp.sum(normal * rates)
+    inverse = 1.0 / jnp.where(rate == 0.0, jnp.finfo(rate.dtype).tiny, rate)
+    along = jnp.stack(by_parameter) if q else jnp.zeros(0, rate.dtype)
+    return SwitchMeeting(normal * inverse, along * inverse, rates)

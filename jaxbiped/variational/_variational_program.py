@@ -130,10 +130,8 @@ class AdaptiveColumns:
         limit = given.max_time
         t, next_t = clip_step(keep, t, next_t, limit, given.almost)
         state = jtu.tree_map(lambda a, b: jnp.where(keep, a, b), step.end, now.state)
-        met, shifts = self._met(given, now, landed.crossed_field)
-        crosses = landed.crossed_field > 0
         columns, peaks, peak_shifts = now.columns, now.peak_columns, now.peak_shifts
-        new_columns = [_select(crosses, a, b) for a, b in zip(met, new_columns, strict=True)]
+        new_columns, shifts = self._met(given, now, landed.crossed_field, new_columns)
         if self.watch.peak is None:
             columns = tuple(_select(keep, a, b) for a, b in zip(new_columns, columns, strict=True))
             peaks, peak_shifts = columns, shifts
@@ -188,28 +186,29 @@ class AdaptiveColumns:
         )
 
     def _met(
-        self, given: VariationalProblem, now: _Now, which: Scalar
+        self, given: VariationalProblem, now: _Now, which: Scalar, stepped: list[Scalar]
     ) -> tuple[list[Scalar], tuple[Scalar, ...]]:
-        """Columns and shifts where the motion, just before it, meets the switch of a number."""
+        """Columns and shifts after a step, which may have met the switch of a number."""
         if not has_field_switches(self.watch, now.state, given.args):
-            return list(now.columns), now.shifts
-        meeting = meeting_at(self.watch, now.state, self._seeded(given), which)
+            return stepped, now.shifts
 
-        def meet(column: Scalar, shift: Scalar, forcing: Scalar | float) -> tuple[Scalar, Scalar]:
-            later = -(jnp.sum(meeting.by_state * column) + forcing)
-            return column + meeting.rates * later, shift + later
+        def met() -> tuple[list[Scalar], tuple[Scalar, ...]]:
+            meeting = meeting_at(self.watch, now.state, self._seeded(given), which)
 
-        columns, shifts = list(now.columns), list(now.shifts)
-        if columns[0].shape[0]:
-            columns[0], shifts[0] = jax.lax.map(
-                lambda each: meet(*each, 0.0), (columns[0], shifts[0])
-            )
-        if columns[1].shape[0]:
-            columns[1], shifts[1] = jax.lax.map(
-                lambda each: meet(each[0], each[1], each[2] * each[3]),
-                (columns[1], shifts[1], meeting.by_parameter, given.sizes),
-            )
-        return columns, tuple(shifts)
+            def meet(column: Scalar, shift: Scalar, forcing: Scalar) -> tuple[Scalar, Scalar]:
+                later = -(jnp.sum(meeting.by_state * column) + forcing)
+                return column + meeting.rates * later, shift + later
+
+            forcings = jnp.zeros(len(stepped[0])), meeting.by_parameter * given.sizes
+            parts = zip(now.columns, now.shifts, forcings, strict=True)
+            both = [_along_rows(meet, *part) for part in parts]
+            columns, shifts = zip(*both, strict=True)
+            return list(columns), shifts
+
+        found: tuple[list[Scalar], tuple[Scalar, ...]] = jax.lax.cond(
+            which > 0, met, lambda: (stepped, now.shifts)
+        )
+        return found
 
     def _at_fixed_time(
         self,
@@ -220,10 +219,11 @@ class AdaptiveColumns:
     ) -> list[Scalar]:
         rates = self.watch.field(jnp.zeros(()), state, given.args)
         velocity = jnp.stack(jtu.tree_leaves(rates))
-        return [
-            jax.lax.map(lambda each: each[0] - velocity * each[1], pair) if pair[0].shape[0] else pair[0]
-            for pair in zip(columns, shifts, strict=True)
-        ]
+
+        def fix(column: Scalar, shift: Scalar) -> Scalar:
+            return column - velocity * shift
+
+        return [_along_rows(fix, *pair) for pair in zip(columns, shifts, strict=True)]
 
     def _seeded(self, given: VariationalProblem) -> Seeded:
         m, p = given.by_state.shape[0], given.by_parameter.shape[0]
@@ -293,6 +293,13 @@ class AdaptiveColumns:
 
         control = step_control(given.rtol, 1e-2 * given.rtol, norm, given.units)
         return SwitchLocator(control, self.watch)
+
+
+def _along_rows(function: Callable[..., PyTree], rows: Scalar, *more: Scalar) -> PyTree:
+    """A function of rows, one after the other; without any it is as many as it has results."""
+    if not rows.shape[0]:
+        return (rows, *more[:1]) if len(more) > 1 else rows
+    return jax.lax.map(lambda each: function(*each), (rows, *more))
 
 
 def _select(keep: Scalar, new: Scalar, old: Scalar) -> Scalar:
