@@ -36,9 +36,7 @@ def choose_engine(
     if dt is not None:
         obstacle = "steps of one size (dt) are diffrax's"
     if section is None:
-        return engine_for(
-            engine, obstacle=obstacle, prefers_xla=redundant, by_device=True
-        )
+        return engine_for(engine, obstacle=obstacle, prefers_xla=redundant, by_device=True)
     check_choice("engine", engine, ENGINES)
     if engine == "xla" or obstacle is not None:
         why = f"here {obstacle}" if obstacle is not None else 'engine = "xla" was chosen'

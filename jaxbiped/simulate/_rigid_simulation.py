@@ -20,7 +20,6 @@ from jaxbiped.solve._rigid_program import rigid_program
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 
-
 _ROOM = 256
 """Heel strikes that there is room for where it is not known how many come."""
 
@@ -108,5 +107,5 @@ def _slopes(
         active=active,
     )
     # Of the strikes only those that are kept, then the end.
-    parts = (lambda leaf: jnp.concatenate([leaf[:kept], leaf[-1:]]))
+    parts = lambda leaf: jnp.concatenate([leaf[:kept], leaf[-1:]])
     return Slopes(*map(parts, slopes)) if len(strikes) > kept else slopes

@@ -20,7 +20,7 @@ from jaxbiped.solve._ending import FALL_ANGLE
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.variational._event_motion import EventMotion, follow_event
 from jaxbiped.variational._switch_locator import Watch
-from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
+from jaxbiped.variational._tangents import Tangents, along_columns, as_columns
 from jaxbiped.variational._tangents_at_times import seeded_directions, tangents_after
 
 _WATCH = Watch(field=rolling_field, switches=lambda args, y: ())
@@ -111,9 +111,7 @@ def rigid_slopes_of(
     return Slopes(
         time=jnp.append(jnp.where(reached[:, None], each.time, 0.0), time[None], 0),
         state=jnp.append(
-            jnp.where(
-                reached[:, None, None], jnp.swapaxes(each.after.columns, 1, 2), 0.0
-            ),
+            jnp.where(reached[:, None, None], jnp.swapaxes(each.after.columns, 1, 2), 0.0),
             columns[None],
             0,
         ),

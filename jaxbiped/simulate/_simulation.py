@@ -45,7 +45,6 @@ from jaxbiped.solve._units import Units, si_units, units_of
 from jaxbiped.solve.controllers._footstep_limit import PATIENCE
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
-
 _OF_STEPS = (
     "adjoint = … differentiates the steps that were taken, which were chosen for the state alone: "
     "through contact such derivatives may be wrong in every digit. Without it they are right."

@@ -128,9 +128,7 @@ def _at_events(
     """At arrivals at a section, but at last where the simulation ends."""
     unit = units_of(scene, end).time
 
-    def follow(
-        surface: Callable[[PyTree, PyTree], Scalar], here: TangentsAtTimes
-    ) -> EventMotion:
+    def follow(surface: Callable[[PyTree, PyTree], Scalar], here: TangentsAtTimes) -> EventMotion:
         return follow_event(
             surface,
             lambda a, y: vector_field(0.0, y, a),

@@ -83,9 +83,7 @@ def _turning(scene: Scene, both: tuple[Foot, Foot], state: PyTree) -> Scalar:
     return jnp.maximum(first, second)
 
 
-def _rest(
-    scene: Scene, both: tuple[Foot, Foot], state: PyTree, held: list[Scalar]
-) -> Scalar:
+def _rest(scene: Scene, both: tuple[Foot, Foot], state: PyTree, held: list[Scalar]) -> Scalar:
     """Above zero where the leg that stands alone is at rest, or all the walker is."""
     if not isinstance(scene.clearance, StanceRotation):
         unit = scene.walker.total_mass * scene.ground.g * scene.walker.l

@@ -125,7 +125,9 @@ class SwitchLocator(AbstractWrappedControl):
         if self.watch.switches(plain_args(args), state):
             sizes = jax.lax.stop_gradient(jtu.tree_map(jnp.abs, state))
         counts = zero, zero, zero, zero
-        return first, SwitchLocatorState(inner, sizes, *counts, no, no, zero, no, zero, peak, at_peak)
+        return first, SwitchLocatorState(
+            inner, sizes, *counts, no, no, zero, no, zero, peak, at_peak
+        )
 
     def adapt_step_size(
         self,

@@ -59,9 +59,7 @@ def tangents_at_times(
         lasts = jnp.where(moves, time - since, 0.0)
         found = tangents_after(watch, solver, at, seeded, lasts, precision)
         after = select(moves, found, at)
-        return (jnp.where(moves, time, since), after), TangentsAtTimes(
-            after.state, after.columns.T
-        )
+        return (jnp.where(moves, time, since), after), TangentsAtTimes(after.state, after.columns.T)
 
     first = (jnp.zeros_like(times[0]), Tangents(state, start))
     if len(times) == 1:
@@ -82,7 +80,9 @@ def seeded_directions(
     inverse = jtu.tree_leaves(units_of(scene, state).inverse)
     floors = [*(jnp.asarray(_FLOOR * inverse[i]) for i in places), *(_FLOOR / s for s in sizes)]
     seeds = jnp.concatenate([jnp.zeros((p, m)), jnp.eye(p)], axis=1)
-    return jnp.asarray(start), Seeded(scene, seeds, jnp.stack(floors) if floors else jnp.zeros(0), active)
+    return jnp.asarray(start), Seeded(
+        scene, seeds, jnp.stack(floors) if floors else jnp.zeros(0), active
+    )
 
 
 def tangents_after(

@@ -21,9 +21,9 @@ from jaxbiped.solve._final_step import clip_step
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._column_step import Differentiated, column_step, differentiate_step
-from jaxbiped.variational._switch_meeting import has_field_switches, meeting_at
 from jaxbiped.variational._solve_to_section import onto_section, peak_of
 from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState, Watch
+from jaxbiped.variational._switch_meeting import has_field_switches, meeting_at
 from jaxbiped.variational._tangent_solver import SHARE
 from jaxbiped.variational._tangents import Seeded, Tangents, active_leaves, with_active
 from jaxbiped.variational._variational_types import VariationalProblem, VariationalSolution

@@ -25,8 +25,8 @@ from jaxbiped.compiler.runtime._program import Program
 from jaxbiped.compiler.runtime._threads import default_threads
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._final_step import just_before_end
-from jaxbiped.solve._units import units_of
 from jaxbiped.solve._solve_by_lanes import Setting, request_of
+from jaxbiped.solve._units import units_of
 
 SCENE = jb.seed_scene()
 SEED = np.array([float(leaf) for leaf in jb.seed_state()])
