@@ -106,6 +106,7 @@ def _slopes(
         places=places,
         active=active,
     )
+    if len(strikes) == kept:
+        return slopes
     # Of the strikes only those that are kept, then the end.
-    parts = lambda leaf: jnp.concatenate([leaf[:kept], leaf[-1:]])
-    return Slopes(*map(parts, slopes)) if len(strikes) > kept else slopes
+    return Slopes(*(jnp.concatenate([leaf[:kept], leaf[-1:]]) for leaf in slopes))

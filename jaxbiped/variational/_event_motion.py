@@ -1,4 +1,4 @@
-"""Motion of an event: how the time at which a surface is reached depends on what moves the state."""
+"""Motion of an event: how the time at which a surface is reached depends on the state."""
 
 from collections.abc import Callable
 from typing import NamedTuple

@@ -205,7 +205,7 @@ def test_auto_takes_lanes_where_it_can():
     def traced(speed):
         state = jb.seed_state()._replace(hip_vx=speed)
         run = jb.Simulation.prepare(jb.seed_scene(), state, duration=1.0, save="end")
-        assert run.engine == "xla"
+        assert run.engine == "lanes"
         return speed
 
     jax.vmap(traced)(jnp.ones(2))

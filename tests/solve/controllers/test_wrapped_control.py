@@ -10,6 +10,7 @@ from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._crossed_switches import CrossedSwitches
 from jaxbiped.solve.controllers._extremes import Extremes
 from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
+from jaxbiped.solve.controllers._located_ending import LocatedEnding
 from jaxbiped.solve.controllers._shallow_contact import ShallowContact
 from jaxbiped.solve.controllers._step_control import InUnits
 from jaxbiped.solve.controllers._touchdown_ahead import TouchdownAhead
@@ -21,6 +22,7 @@ WRAPPERS = {
     Extremes: (lambda args, y: y,),
     FootstepLimit: (3,),
     InUnits: (1.0,),
+    LocatedEnding: (("fall",),),
     CrossedSwitches: (10.0,),
     ShallowContact: (),
     SwitchLocator: (None,),

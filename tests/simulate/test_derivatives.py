@@ -1,0 +1,214 @@
+"""Derivatives of simulations, against central differences at tight, in every mode."""
+
+from functools import partial
+
+import diffrax
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+
+pytestmark = pytest.mark.slow
+
+LEAVES = {
+    "K": lambda scene: scene.normal.K,
+    "c": lambda scene: scene.normal.c,
+    "slope": lambda scene: scene.ground.slope,
+    "l": lambda scene: scene.walker.l,
+}
+
+
+def _final(logs, omega=0.0, *, duration=0.8, **options):
+    """The final state as a function of the logarithms of some parameters and of a leg's rate."""
+    scene = jb.seed_scene()
+    for name, log in logs.items():
+        value = LEAVES[name](scene) * jnp.exp(log)
+        scene = eqx.tree_at(LEAVES[name], scene, value)
+    seed = jb.seed_state()
+    state = seed._replace(omega_1=seed.omega_1 + omega)
+    options = {"accuracy": "tight", "engine": "lanes", "save": "end", **options}
+    return jnp.stack(jb.simulate(scene, state, duration=duration, **options).final)
+
+
+ZEROS = {name: jnp.asarray(0.0) for name in LEAVES}
+
+
+def test_forward_mode_against_central_differences():
+    by_log = jax.jacfwd(_final)(ZEROS)
+    for name in LEAVES:
+        h = 3e-5
+        # Tighter by far: their errors are divided by h.
+        exact = dict(rtol=1e-12, atol=1e-14)
+        ends = [np.array(_final({name: jnp.asarray(s * h)}, **exact)) for s in (1.0, -1.0)]
+        difference = (ends[0] - ends[1]) / (2.0 * h)
+        scale = np.max(np.abs(difference))
+        np.testing.assert_allclose(by_log[name], difference, atol=1e-4 * scale)
+
+
+def test_derivatives_by_the_start_against_central_differences():
+    by_rate = jax.jacfwd(lambda omega: _final({}, omega))(jnp.asarray(0.0))
+    h = 1e-6
+    ends = [np.array(_final({}, jnp.asarray(s * h))) for s in (1.0, -1.0)]
+    difference = (ends[0] - ends[1]) / (2.0 * h)
+    np.testing.assert_allclose(by_rate, difference, atol=1e-3 * np.max(np.abs(difference)))
+
+
+def test_reverse_mode_is_forward_modes_transpose():
+    forward = jax.jacfwd(_final)(ZEROS)
+    reverse = jax.jacrev(_final)(ZEROS)
+    for name in LEAVES:
+        np.testing.assert_allclose(reverse[name], forward[name], rtol=1e-12)
+
+
+def test_a_looser_solve_has_derivatives_within_its_own_tolerance():
+    tight, loose = (
+        jax.jacfwd(lambda log, a=accuracy: _final({"K": log}, accuracy=a))(jnp.asarray(0.0))
+        for accuracy in ("tight", "balanced")
+    )
+    np.testing.assert_allclose(loose, tight, atol=1e-3 * float(jnp.max(jnp.abs(tight))))
+
+
+def test_derivative_by_the_duration_is_the_rate():
+    last, by_time = jax.jvp(
+        lambda time: _final({}, duration=time), (jnp.asarray(0.8),), (jnp.asarray(1.0),)
+    )
+    rates = jb.dynamics.vector_field(0.0, jb.State(*last), jb.seed_scene())
+    np.testing.assert_allclose(by_time, jnp.stack(rates), rtol=1e-12)
+
+
+def test_gradients_under_vmap_and_jit():
+    def gradient(log):
+        return jax.grad(lambda log: _final({"K": log}, accuracy="balanced")[0])(log)
+
+    logs = jnp.linspace(0.0, 0.1, 3)
+    together = jax.jit(jax.vmap(gradient))(logs)
+    np.testing.assert_allclose(together, [gradient(log) for log in logs], rtol=1e-12)
+
+
+RATE = float(jb.seed_state().omega_1)
+STEEP = jb.seed_scene(slope=0.06)
+HELD = eqx.tree_at(lambda scene: scene.clearance, jb.seed_scene(), jb.laws.AlwaysTouching())
+STOPS = jb.seed_state()._replace(omega_2=-1.3137, theta_1=-0.4124, hip_vx=0.3559)
+TRIPS = jb.seed_state()._replace(omega_2=-0.8266, theta_1=-0.2752, hip_vx=0.1941)
+SEED, START, TIMES = jb.seed_scene(), jb.seed_state(), jnp.array([0.2, 0.9])
+ENDS = {
+    "duration": (SEED, START, RATE, dict(duration=0.9)),
+    "footsteps": (SEED, START, RATE, dict(footsteps=2)),
+    "fell forward": (STEEP, START, RATE, dict(duration=9.0)),
+    "stopped": (SEED, STOPS, 0.5139, dict(duration=9.0)),
+    "stumbled": (HELD, TRIPS, -1.7282, dict(duration=9.0)),
+    "arrivals": (SEED, START, RATE, dict(duration=0.9, save=jb.HeelStrike())),
+    "times": (SEED, START, RATE, dict(duration=0.9, save=TIMES)),
+        jb.seed_scene(),
+        jb.seed_state(),
+        RATE,
+        dict(duration=0.9, save=jnp.array([0.2, 0.9])),
+    ),
+}
+
+
+def _moments(name, rate, accuracy="balanced"):
+    """When and where a simulation ended, or arrived twice, by the rate of the swing leg."""
+    scene, start, _, how = ENDS[name]
+    state = start._replace(omega_1=rate)
+    walk = jb.simulate(scene, state, accuracy=accuracy, **({"save": "end"} | how))
+    t, states = walk.t, walk.state
+    if walk.arrivals is not None:
+        t, states = walk.arrivals.t[:2], jax.tree.map(lambda leaf: leaf[:2], walk.arrivals.state)
+    return jnp.concatenate([t, states.hip_x, states.theta_1, states.omega_1])
+
+
+@pytest.mark.parametrize("name", ENDS)
+def test_derivatives_follow_what_ends_or_saves_a_simulation(name):
+    rate, h = jnp.asarray(ENDS[name][2]), 1e-5
+    walk = partial(_moments, name)
+    ends = [np.asarray(walk(rate + s * h, "tight")) for s in (1.0, -1.0)]
+    right = (ends[0] - ends[1]) / (2.0 * h)
+    forward, reverse = jax.jacfwd(walk)(rate), jax.jacrev(walk)(rate)
+    np.testing.assert_allclose(forward, right, atol=1e-4 * np.max(np.abs(right)))
+    np.testing.assert_allclose(reverse, forward, rtol=1e-12)
+    if name not in ("duration", "times"):
+        assert abs(float(right[0])) > 1e-3
+
+
+@pytest.mark.parametrize("how", [dict(footsteps=3), dict(duration=1.1, max_arrivals=3)])
+def test_derivatives_of_a_rigid_walk(how):
+    scene, start = jb.ladder()["rigid"], jb.dynamics.rigid_state(jb.seed_state())
+
+    def walk(slope, accuracy="balanced"):
+        moved = jb.with_parameters(scene, {"slope": slope})
+        found = jb.rigid_walk(moved, start, accuracy=accuracy, **how)
+        arrivals = [*found.arrivals.t[:2], *found.arrivals.state.omega_1[:2]]
+        return jnp.stack(
+            [*found.t, *found.final[:4], *arrivals[: 4 * bool(how.get("max_arrivals"))]]
+        )
+
+    slope, h = jnp.asarray(0.02), 1e-5
+    right = (np.asarray(walk(slope + h, "tight")) - np.asarray(walk(slope - h, "tight"))) / (
+        2.0 * h
+    )
+    forward, reverse = jax.jit(jax.jacfwd(walk))(slope), jax.jacrev(walk)(slope)
+    np.testing.assert_allclose(forward, right, atol=1e-5 * np.max(np.abs(right)))
+    np.testing.assert_allclose(reverse, forward, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "draft"), [("kelvin-voigt", 2e-3), ("tsuji", 2e-4)])
+def test_laws_that_jump_or_are_infinitely_steep_at_touchdown(name, draft):
+    law = jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
+    scene = eqx.tree_at(lambda scene: scene.normal, jb.seed_scene(), law)
+
+    def end(rate, accuracy):
+        state = jb.seed_state()._replace(omega_2=rate)
+        walk = jb.simulate(scene, state, duration=0.6, save="end", accuracy=accuracy)
+        return jnp.stack([walk.final.hip_x, walk.final.theta_1, walk.final.omega_1])
+
+    rate, h = jb.seed_state().omega_2, 1e-4
+    right = (np.asarray(end(rate + h, "tight")) - np.asarray(end(rate - h, "tight"))) / (2.0 * h)
+    for accuracy, error in (("draft", draft), ("balanced", draft / 4.0)):
+        told = jax.jacfwd(lambda rate, accuracy=accuracy: end(rate, accuracy))(rate)
+        np.testing.assert_allclose(told, right, atol=error * np.max(np.abs(right)))
+
+
+def test_derivatives_do_not_depend_on_the_engine():
+    scene = jb.seed_scene()
+
+    def end(slope, engine):
+        moved = jb.with_parameters(scene, {"slope": slope})
+        how = dict(save=jnp.array([0.05, 0.1]), accuracy="draft", engine=engine)
+        return jb.simulate(moved, jb.seed_state(), duration=0.1, **how).state.omega_1
+
+    lanes, xla = (jax.jacfwd(lambda a, e=e: end(a, e))(jnp.asarray(0.02)) for e in ("lanes", "xla"))
+    np.testing.assert_allclose(xla, lanes, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("differentiate", "how", "said"),
+    [
+        (jax.grad, dict(save="steps", engine="xla"), 'save = "steps" is not allowed under deriv'),
+        (jax.grad, dict(extremes=lambda scene, y: y.hip_z), "extremes is not allowed under deriv"),
+        (jax.hessian, {}, "Second derivatives of a simulation are not offered"),
+    ],
+)
+def test_what_has_no_derivatives_says_so(differentiate, how, said):
+    def end(rate):
+        state = jb.seed_state()._replace(omega_1=rate)
+        walk = jb.simulate(jb.seed_scene(), state, duration=0.05, **({"save": "end"} | how))
+        return walk.final.theta_1
+
+    with pytest.raises(jb.ArgumentError, match=said):
+        differentiate(end)(jnp.asarray(RATE))
+
+
+def test_the_adjoint_of_steps_warns():
+    def end(rate):
+        state = jb.seed_state()._replace(omega_1=rate)
+        how = dict(solver="euler", dt=1e-4, watch=(), save="end")
+        return jb.simulate(
+            jb.seed_scene(d=0.1), state, duration=2e-4, adjoint=diffrax.ForwardMode(), **how
+        ).final.theta_1
+
+    with pytest.warns(RuntimeWarning, match="differentiates the steps that were taken"):
+        jax.jvp(end, (jnp.asarray(RATE),), (jnp.asarray(1.0),))
