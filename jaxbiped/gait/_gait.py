@@ -77,7 +77,7 @@ class Gait(eqx.Module):
         sensitivities: derivatives of the measures with respect to each parameter, leaves of shape
             (p,). By lanes NaN where the search never came near a gait: until then derivatives are
             taken with respect to the state alone.
-        sensitivity_errors: their estimated errors: what a ten times looser solve changes.
+        sensitivity_errors: their estimated errors, from what a ten times looser solve changes.
         elasticities: d log |measure| / d log parameter, leaves of shape (p,); zero for a parameter
             that is zero, NaN for a measure that is.
         evaluations: evaluations of the return map that the search took.
@@ -202,9 +202,9 @@ def summarise_gait(
     )
     measures = known(measures)._replace(state=orbit.state)
     slopes = _by_parameter(orbit, measures, orbit.slopes, orbit.radius_slopes)
-    errors = jtu.tree_map(
-        jnp.abs, _by_parameter(orbit, measures, orbit.slope_errors, orbit.radius_errors)
-    )
+    # Errors of length and period add up in the speed's, whatever their signs.
+    backwards = measures._replace(speed=-measures.speed)
+    errors = _by_parameter(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
     return Gait(
         ending=found.ending,
         walk_ending=found.code,
@@ -243,7 +243,7 @@ def _measure_errors(measures: Measures, orbit: Orbit) -> Measures:
     fine, coarse = (_at_fixed_point(each, orbit) for each in (orbit.found.last, orbit.found.coarse))
 
     def change(told: Scalar, fine: Scalar, coarse: Scalar) -> Scalar:
-        return jnp.abs(told - fine) + jnp.abs(fine - coarse)
+        return 2.0 * (jnp.abs(told - fine) + jnp.abs(fine - coarse))
 
     errors = jtu.tree_map(change, measures, fine, coarse)
     return errors._replace(spectral_radius=orbit.stability.errors[0])

@@ -17,6 +17,15 @@ from jaxbiped.linalg._small_matrices import eigensystem, solve
 
 CLOSENESS = 1e-3
 """Distance of a multiplier from the unit circle that is flagged as a bifurcation."""
+_RADIUS_FLOOR = 2e-8
+"""Error of the spectral radius's derivatives that no tolerance takes away, in units of the
+parameter's size: of the switches' crossings, which second derivatives magnify."""
+
+
+_SHARE = 0.5
+"""Of what a looser solve changes, that a first derivative may be wrong by."""
+_POOLED = 0.1
+"""Of what it changes on the whole, that every derivative is wrong by at least."""
 
 
 class Slopes(NamedTuple):
@@ -81,7 +90,7 @@ def orbit_of(
     slopes, looser = (slopes_of(each) for each in (last, coarse))
     # Where the force itself jumped on the section, columns lack the jump's own correction.
     slopes = jax.tree.map(lambda leaf: jnp.where(last.missed > 0, jnp.nan, leaf), slopes)
-    errors = jax.tree.map(lambda a, b: jnp.abs(a - b), slopes, looser)
+    errors = _slope_errors(last, slopes, looser)
     _, sizes = seed_directions(args, active, m)
     radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
     if radius and active:
@@ -90,7 +99,10 @@ def orbit_of(
         radius_slopes, looser_slopes = each_of(
             lambda each: _radius_slopes(spec, args, active, guess, each)
         )(found.both)
-        radius_errors = jnp.abs(radius_slopes - looser_slopes)
+        change = jnp.abs(radius_slopes - looser_slopes)
+        share = jnp.sqrt(jnp.sum(change * change) / jnp.sum(radius_slopes * radius_slopes))
+        pooled = _POOLED * share * jnp.abs(radius_slopes)
+        radius_errors = jnp.maximum(jnp.maximum(change, pooled), _RADIUS_FLOOR)
     return Orbit(found, state, stability, slopes, errors, radius_slopes, radius_errors, sizes)
 
 
@@ -113,6 +125,34 @@ def slopes_of(last: LinearisedReturn) -> Slopes:
         return rows[..., m:] + rows[..., :m] @ recurring
 
     return Slopes(recurring, total(last.period_row), total(last.advance_rows), total(last.peak_row))
+
+
+def _slope_errors(last: LinearisedReturn, slopes: Slopes, looser: Slopes) -> Slopes:
+    """What a looser solve changes, and no less than what it changes on the whole.
+
+    Where a single derivative is hardly changed that is chance: terms that make it up are as
+    uncertain as others'. So the changes of a measure are pooled, each relative to the sum of its
+    terms without their signs.
+    """
+    m = last.recurring.shape[0]
+    by_state, by_parameter = (jnp.abs(part) for part in jnp.split(last.jacobian, [m], axis=1))
+    inverse = jnp.abs(solve(jnp.eye(m) - last.jacobian[:, :m], jnp.eye(m)))
+    recurring = inverse @ by_parameter
+
+    def total(rows: Scalar) -> Scalar:
+        return jnp.abs(rows[..., m:]) + jnp.abs(rows[..., :m]) @ recurring
+
+    sizes = Slopes(
+        recurring, total(last.period_row), total(last.advance_rows), total(last.peak_row)
+    )
+
+    def error(slope: Scalar, other: Scalar, size: Scalar) -> Scalar:
+        change = jnp.abs(slope - other)
+        share = change / jnp.where(size == 0.0, 1.0, size)
+        pooled = jnp.sqrt(jnp.mean(share * share, axis=-1, keepdims=True))
+        return _SHARE * jnp.maximum(change, _POOLED * pooled * size)
+
+    return jax.tree.map(error, slopes, looser, sizes)
 
 
 def _radius_slopes(
