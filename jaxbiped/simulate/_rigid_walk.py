@@ -42,8 +42,8 @@ def rigid_walk(
     """Walks a rigid walker for a number of footsteps, a time, or whichever ends first.
 
     Explicit steps of eighth order (Dormand and Prince) under error control, each footstep ended by
-    Newton's method on the heel strike. A fall is noticed at the end of a step. Works under `jit`
-    and `vmap`; for derivatives use `return_map`.
+    Newton's method on the heel strike. A fall is noticed at the end of a step. Works under `jit`,
+    `vmap` and first derivatives, which follow the strikes and the end.
 
     Args:
         scene: the walker.

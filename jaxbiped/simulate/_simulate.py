@@ -42,6 +42,9 @@ def simulate(
     holds up the others. Under any of these a trajectory saved step by step keeps its full length
     of `max_solver_steps + 1`, filled with infinities: save only the end of large batches.
 
+    First derivatives of times and states, in both modes and by every engine, follow the event that
+    ends or saves the motion; NaN where it is grazed. There are none of `save="steps"`.
+
     Args:
         scene: what to simulate; a `RedundantScene` for coordinates of each leg.
         state: start, a `State`; where friction has bristles also a `BristleState`, for their
@@ -79,9 +82,9 @@ def simulate(
             over the ends of all steps are wanted.
         watch: which failures end the solve: any of "fall", "stop", "stumble".
         max_solver_steps: cap on the solver's attempted steps.
-        adjoint: how to differentiate; diffrax's default (reverse mode) unless given. Forward mode
-            needs `diffrax.ForwardMode()`. Where a method projects after each step, only adjoints
-            that see the steps are allowed.
+        adjoint: one of diffrax's, to differentiate the steps that were taken instead of the motion,
+            with a `RuntimeWarning`: through contact such derivatives may be wrong in every digit.
+            Where a method projects after each step, only adjoints that see the steps are allowed.
         engine: "xla", "lanes", "cuda" or "auto" (see `ENGINES`). Results of "xla" agree with the
             others' to within the tolerance, not bit by bit, nor are their steps the same: rounding
             decides on them.

@@ -12,8 +12,7 @@ ENGINES = ("auto", "xla", "lanes", "cuda")
   differentiation.
 - lanes: the same method compiled to vector code for this machine's CPU: many times faster.
 - cuda: what lanes run, on this machine's CUDA devices: for walks and labels by the million.
-- auto: lanes where JAX computes on a CPU and they can do what is asked, else xla. `simulate` keeps
-  to xla inside `jit`, `vmap` and derivatives, for it is not known what will be asked of it there.
+- auto: lanes where JAX computes on a CPU and they can do what is asked, else xla.
   Batches of labels that keep a CUDA device busy, where there is one, are its own.
 """
 _BY_NAME = {"xla": XLA, "lanes": LANES, "cuda": CUDA}
