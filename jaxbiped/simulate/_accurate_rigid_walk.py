@@ -7,9 +7,9 @@ import dataclasses
 
 import jax
 import jax.tree_util as jtu
+import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._ending import Ending
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.simulate._accurate_walk import Witness, judge_walk
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
@@ -26,15 +26,10 @@ _FINEST = 1e-13
 """Finest relative tolerance: rolling is smooth and never stiff."""
 _LOOSEST = 1e-3
 """Loosest tolerance to begin with."""
-_FALLS = (Ending.FELL_FORWARD, Ending.FELL_BACK)
-_MOST_ON = 64
-"""Steps by which a fall is followed to the time at which another solve noticed it."""
 
 
 def accurate_rigid_walk(run: RigidSimulation, wanted: float) -> Trajectory[RigidState]:
     """The walk whose estimated relative error is at most `wanted`, or as small as can be had.
-
-    A fall is noticed at the end of a step; its bars are those of the state at that very time.
 
     Raises:
         ArgumentError: under `jit`, `vmap` or differentiation.
@@ -49,28 +44,12 @@ def accurate_rigid_walk(run: RigidSimulation, wanted: float) -> Trajectory[Rigid
         walk = run.with_inputs(rtol=tolerance)()
         looser = run.with_inputs(rtol=LOOSER * tolerance)
         other = run.with_inputs(rtol=_EMBEDDED * tolerance, embedded=True)
-        witnesses = tuple(Witness(_as_long(each, walk), 1.0) for each in (looser, other))
-        return walk, judge_walk(run.walk.scene, walk, witnesses)
+        witnesses = tuple(Witness(each(), 1.0) for each in (looser, other))
+        bars, relative, obstacle = judge_walk(run.walk.scene, walk, witnesses)
+        # Whether a foot that grazes the ground strikes is for a finer tolerance to tell.
+        return walk, (bars, np.inf if int(walk.grazes) else relative, obstacle)
 
     first = min(_FIRST * wanted, _LOOSEST)
     dtype = run.walk.rtol.dtype
     walk, error = refine(attempt, wanted, first=first, dtype=dtype, finest=_FINEST)
     return dataclasses.replace(walk, error=error)
-
-
-def _as_long(witness: RigidSimulation, walk: Trajectory[RigidState]) -> Trajectory[RigidState]:
-    """Another solve; of a walk that fell, up to the time at which it did."""
-    if walk.outcome not in _FALLS:
-        return witness()
-    end = float(walk.t[-1])
-    told = witness.with_inputs(duration=end)()
-    for _ in range(_MOST_ON):
-        left = end - float(told.t[-1])
-        if told.outcome not in _FALLS or left <= 0.0:
-            break
-        # It lies below what counts as fallen: each solve from there ends after one step.
-        on = dataclasses.replace(
-            witness, walk=witness.walk._replace(state=told.final), max_arrivals=0
-        ).with_inputs(duration=left)()
-        told = dataclasses.replace(told, t=end - left + on.t, state=on.state, ending=on.ending)
-    return told

@@ -70,6 +70,7 @@ class RigidSimulation(eqx.Module):
             accepted=found.accepted,
             rejected=found.rejected,
             arrivals=arrivals_among(rows, found.footsteps, state),
+            grazes=found.grazes,
             engine=self.engine,
         )
 

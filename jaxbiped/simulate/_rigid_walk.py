@@ -41,9 +41,11 @@ def rigid_walk(
 ) -> Trajectory[RigidState]:
     """Walks a rigid walker for a number of footsteps, a time, or whichever ends first.
 
-    Explicit steps of eighth order (Dormand and Prince) under error control, each footstep ended by
-    Newton's method on the heel strike. A fall is noticed at the end of a step. Works under `jit`,
-    `vmap` and first derivatives, which follow the strikes and the end.
+    Explicit steps of eighth order (Dormand and Prince) under error control. Heel strikes and falls
+    are the roots of each step's interpolant, two within one step included, and Newton's method
+    lands on them. A foot that comes to the ground, or misses it, by less than the tolerance tells
+    does not strike; `grazes` counts these. Works under `jit`, `vmap` and first derivatives, which
+    follow the strikes and the end.
 
     Args:
         scene: the walker.

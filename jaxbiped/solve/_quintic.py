@@ -1,6 +1,11 @@
-"""Quintic Hermite interpolation through both ends of a step."""
+"""Quintic Hermite interpolation through both ends of a step, in Bernstein's form.
+
+Its control values bound it, and it changes sign at most as often as they do (Descartes' rule), by
+an even number less if less often.
+"""
 
 import functools
+import itertools
 import operator
 from typing import NamedTuple
 
@@ -13,52 +18,76 @@ _NEWTON = 3
 
 
 class Quintic(NamedTuple):
-    """Hermite's quintic of the opening over a step, by its coefficients."""
+    """Hermite's quintic of a quantity over a step.
 
-    coefficients: tuple[Scalar, ...]
+    Attributes:
+        control: its six control values, the first and the last one those at both ends.
+    """
+
+    control: tuple[Scalar, ...]
 
     @staticmethod
     def of(step: Scalar, old: tuple[Scalar, ...], new: tuple[Scalar, ...]) -> "Quintic":
         """From values, rates and second derivatives at both ends."""
-        rise = new[0] - old[0]
-        p, q = step * old[1], step * new[1]
-        a, b = 0.5 * step * step * old[2], 0.5 * step * step * new[2]
+        p, q = 0.2 * step * old[1], 0.2 * step * new[1]
+        square = 0.05 * step * step
         return Quintic(
             (
                 old[0],
-                p,
-                a,
-                10.0 * rise - 6.0 * p - 4.0 * q - 3.0 * a + b,
-                -15.0 * rise + 8.0 * p + 7.0 * q + 3.0 * a - 2.0 * b,
-                6.0 * rise - 3.0 * (p + q) - a + b,
+                old[0] + p,
+                old[0] + 2.0 * p + square * old[2],
+                new[0] - 2.0 * q + square * new[2],
+                new[0] - q,
+                new[0],
             )
         )
 
-    def value(self, x: Scalar) -> Scalar:
-        """At a share `x` of the step."""
-        return self._value_and_slope(x)[0]
+    def plus(self, other: "Quintic", factor: float = 1.0) -> "Quintic":
+        """The sum with another one, times a factor."""
+        pairs = zip(self.control, other.control, strict=True)
+        return Quintic(tuple(a + factor * b for a, b in pairs))
+
+    def sign_changes(self, shift: Scalar, *, from_second: Scalar) -> Scalar:
+        """How often the control values change sign, all but both ends' higher by `shift`.
+
+        `from_second`: whether the first one counts as having the second one's sign.
+        """
+        first, *inner, last = self.control
+        above = [first > 0.0, *[value + shift > 0.0 for value in inner], last > 0.0]
+        above[0] = jnp.where(from_second, self.control[1] > 0.0, above[0])
+        changes = [jnp.where(a != b, 1, 0) for a, b in itertools.pairwise(above)]
+        return functools.reduce(operator.add, changes)
+
+    def derivatives(self, x: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+        """Value, slope and curvature at a share `x` of the step."""
+        coefficients = self._coefficients()
+        value, slope, half = coefficients[-1], jnp.zeros_like(x), jnp.zeros_like(x)
+        for coefficient in coefficients[-2::-1]:
+            half = half * x + slope
+            slope = slope * x + value
+            value = value * x + coefficient
+        return value, slope, 2.0 * half
 
     def root(self) -> Scalar:
-        """The share of the step at which it falls through zero, roughly.
+        """The share of the step at which it falls through zero, roughly, where it does so once.
 
-        Where Newton's method leaves the part that is known to hold it, that is halved: beside the
-        strike the curve may have a root behind it, at which the legs opened.
+        Where Newton's method leaves the part that is known to hold it, that is halved.
         """
-        end = functools.reduce(operator.add, self.coefficients)
-        rise = end - self.coefficients[0]
-        x = -self.coefficients[0] / jnp.where(rise == 0.0, 1.0, rise)
+        rise = self.control[-1] - self.control[0]
+        x = -self.control[0] / jnp.where(rise == 0.0, 1.0, rise)
         low, high = jnp.zeros_like(x), jnp.ones_like(x)
         for _ in range(_NEWTON):
-            value, slope = self._value_and_slope(x)
+            value, slope, _ = self.derivatives(x)
             low, high = jnp.where(value > 0.0, x, low), jnp.where(value > 0.0, high, x)
             newton = x - value / jnp.where(slope == 0.0, 1.0, slope)
             inside = (slope < 0.0) & (newton >= low) & (newton <= high)
             x = jnp.where(inside, newton, 0.5 * (low + high))
         return x
 
-    def _value_and_slope(self, x: Scalar) -> tuple[Scalar, Scalar]:
-        value, slope = self.coefficients[-1], jnp.zeros_like(self.coefficients[-1])
-        for coefficient in self.coefficients[-2::-1]:
-            slope = slope * x + value
-            value = value * x + coefficient
-        return value, slope
+    def _coefficients(self) -> tuple[Scalar, ...]:
+        """Of the powers of the share of the step, the lowest first."""
+        row, found = list(self.control), [self.control[0]]
+        for binomial in (5.0, 10.0, 10.0, 5.0, 1.0):
+            row = [b - a for a, b in itertools.pairwise(row)]
+            found.append(binomial * row[0])
+        return tuple(found)

@@ -28,6 +28,7 @@ class RigidSolved(NamedTuple):
     footsteps: Scalar
     accepted: Scalar
     rejected: Scalar
+    grazes: Scalar
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
@@ -42,7 +43,7 @@ def rigid_program(records: bool, waits: bool, embedded: bool = False) -> Program
 
     def finish(walk: RigidWalk, now: RigidProgress) -> RigidSolved:
         code = ending_of(walk, now, jnp.asarray(waits))
-        counts = (now.footsteps, now.accepted, now.rejected)
+        counts = (now.footsteps, now.accepted, now.rejected, now.grazes)
         return RigidSolved(now.t, state_with_hip(walk, now), code, *counts)
 
     attempt = functools.partial(attempt_step, embedded=embedded)

@@ -11,23 +11,21 @@ from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.solve._ending import rigid_ending
-from jaxbiped.solve._quintic import Quintic
-from jaxbiped.solve._rolling_step import ORDER, Rates, accelerations, advance, rolling_step
+from jaxbiped.solve._rigid_events import events_within, opening, uprightness
+from jaxbiped.solve._rolling_step import Rates, accelerations, advance, rolling_step
 
 _SAFETY, _MOST_SHRINK, _MOST_GROWTH = 0.8, 0.2, 5.0
 _FIRST_STEP = 0.03
 """First step, in units of √(l/g)."""
 _ROUNDING = 1e-14
 """Shortest step, as a share of the time."""
-_CLOSED = 1e-12
-"""Sum of the leg angles [rad] up to which the feet have not opened since the last strike."""
 _NEAR = 0.1
-"""Sum of the leg angles from which one Euler step leads onto a strike, in units of √rtol: the
-square of what is left is far below the tolerance."""
+"""Distance from a surface [rad] from which one Euler step leads onto it, in units of √rtol, where
+its rate changes little by then: the square of what is left is far below the tolerance."""
 _STRETCH = 1.15
 """By how much a step may be longer than chosen to end where a strike is due."""
 _MOST_LANDINGS = 12
-"""Newton steps onto a heel strike, after which it counts as missed."""
+"""Newton steps onto a heel strike or a fall, after which it counts as missed."""
 
 
 class RigidWalk(NamedTuple):
@@ -56,13 +54,15 @@ class RigidProgress(NamedTuple):
         t, state: so far; hip_x is where the hip is, was or would be with the stance leg upright,
             which changes at strikes alone. `state_with_hip` gives the hip's own.
         rates: angular accelerations of both legs there [rad/s²].
-        step: to attempt next [s]; negative while a heel strike is landed on from beyond.
+        step: to attempt next [s]; negative while a heel strike or a fall is landed on from beyond.
         pace: the last free step, with which the next footstep begins.
         strike, period: time of the last heel strike, and since the one before it [s].
         due: when the next one is expected [s]; infinite while footsteps differ in their periods.
-        landing: number of Newton steps onto a heel strike, 0 in free motion.
+        landing: number of Newton steps onto a heel strike or a fall, 0 in free motion.
+        falling: whether that is a fall.
         struck: whether the last attempt ended by a heel strike.
         footsteps: how many so far.
+        grazes: steps so far of which the tolerance does not tell whether the foot came down.
         accepted, rejected: attempted steps so far, by what became of them.
         code: of the `Ending` that came, 0 for none.
     """
@@ -76,8 +76,10 @@ class RigidProgress(NamedTuple):
     period: Scalar
     due: Scalar
     landing: Scalar
+    falling: Scalar
     struck: Scalar
     footsteps: Scalar
+    grazes: Scalar
     accepted: Scalar
     rejected: Scalar
     code: Scalar
@@ -105,8 +107,10 @@ def initial_progress(walk: RigidWalk) -> RigidProgress:
         period=never,
         due=never,
         landing=none,
+        falling=no,
         struck=no,
         footsteps=none,
+        grazes=none,
         accepted=none,
         rejected=none,
         code=none,
@@ -126,22 +130,24 @@ def _rolled_distance(walk: RigidWalk, angle: Scalar) -> Scalar:
 
 
 def attempt_step(
-    walk: RigidWalk, now: RigidProgress, *, embedded: bool = False
+    walk: RigidWalk, now: RigidProgress, *, embedded: bool = False, lands_on_falls: bool = True
 ) -> tuple[RigidProgress, Scalar]:
     """One attempted step further, and whether the walk is over (boolean).
 
-    `embedded`: whether it goes on with the embedded solution; see `rolling_step`.
+    `embedded`: whether it goes on with the embedded solution; see `rolling_step`. A fall that is
+    not landed on, which saves a step, has its time by interpolation, and no accurate state.
     """
     trial, error, roughly = rolling_step(
         walk.scene, now.state, now.rates, now.step, walk.rtol, embedded=embedded
     )
-    strike = _strike(walk, trial, roughly)
-    free, kept = _after_free_step(walk, now, trial, error, roughly, strike)
+    onto = _euler_step(walk, now, trial, roughly)
+    free, kept = _after_free_step(walk, now, trial, error, roughly, onto, lands_on_falls)
     landing = now.landing > 0
-    after = select(landing, _landing(walk, now, trial, strike), free)
-    after = select(after.struck, _after_strike(walk, after, strike), after)
+    after = select(landing, _landing(now, trial, onto), free)
+    strike = _strike(walk, onto)
+    after = select(after.struck, _after_strike(walk, after, onto, strike), after)
     # The last stage is the first one of the next step, after an impact from the new state.
-    rates = accelerations(walk.scene, select(after.struck, strike.state, trial))
+    rates = accelerations(walk.scene, select(after.struck, strike, trial))
     accepted = landing | kept
     rates = select(accepted, rates, now.rates)
     one = jnp.where(accepted, 1, 0)
@@ -163,13 +169,13 @@ def ending_of(walk: RigidWalk, now: RigidProgress, waits: Scalar) -> Scalar:
     return jnp.where(late, int(Ending.TIMED_OUT), now.code)
 
 
-class _Strike(NamedTuple):
-    """The heel strike that a trial step ends beside, if it does.
+class _Onto(NamedTuple):
+    """From a trial onto a heel strike, or a fall where one is landed on.
 
     Attributes:
-        near: whether one Euler step leads onto it.
-        rest: from the trial to the strike [s], which may lie behind.
-        state: after it.
+        near: whether one Euler step leads there.
+        rest: its length [s], which may lie behind.
+        state: there.
     """
 
     near: Scalar
@@ -177,28 +183,37 @@ class _Strike(NamedTuple):
     state: RigidState
 
 
-def _strike(walk: RigidWalk, trial: RigidState, rates: Rates) -> _Strike:
+def _euler_step(walk: RigidWalk, now: RigidProgress, trial: RigidState, rates: Rates) -> _Onto:
     """`rates` are those of the trial, roughly."""
-    opening, rate = _opening(trial)
-    rest = -opening / jnp.where(rate == 0.0, 1.0, rate)
-    nearer = advance(trial, rest, [1.0], [rates])
-    # The hip stays where it is, over another leg.
-    rolled = _rolled_distance(walk, nearer.theta_1) - _rolled_distance(walk, nearer.theta_2)
-    after = impact(walk.scene, nearer).state._replace(hip_x=nearer.hip_x + rolled)
-    near = (jnp.abs(opening) <= _NEAR * jnp.sqrt(walk.rtol)) & (rate < 0.0)
-    return _Strike(near, rest, after)
+    fall = uprightness(trial, rates, jnp.sign(trial.theta_2))
+    surface = select(now.falling, fall, opening(trial, rates))
+    rest = -surface.value / jnp.where(surface.rate == 0.0, 1.0, surface.rate)
+    near = jnp.abs(surface.value) <= _NEAR * jnp.sqrt(walk.rtol)
+    near = near & (surface.rate < 0.0)
+    near = near & (jnp.abs(surface.curvature) * rest * rest <= 0.4 * _NEAR * walk.rtol)
+    return _Onto(near, rest, advance(trial, rest, [1.0], [rates]))
 
 
-def _after_strike(walk: RigidWalk, trial: RigidProgress, strike: _Strike) -> RigidProgress:
+def _strike(walk: RigidWalk, onto: _Onto) -> RigidState:
+    """The state after a heel strike: the hip stays where it is, over another leg."""
+    at = onto.state
+    rolled = _rolled_distance(walk, at.theta_1) - _rolled_distance(walk, at.theta_2)
+    return impact(walk.scene, at).state._replace(hip_x=at.hip_x + rolled)
+
+
+def _after_strike(
+    walk: RigidWalk, trial: RigidProgress, onto: _Onto, state: RigidState
+) -> RigidProgress:
     """After the strike beside a trial. Where footsteps last alike, the next one is known."""
-    t = trial.t + strike.rest
+    t = trial.t + onto.rest
     period = t - trial.strike
-    change_of_rest = jnp.abs(period - trial.period) * jnp.abs(_opening(trial.state)[1])
+    rate = trial.state.omega_1 + trial.state.omega_2
+    change_of_rest = jnp.abs(period - trial.period) * jnp.abs(rate)
     steady = change_of_rest <= 2.0 * _NEAR * jnp.sqrt(walk.rtol)
     due = jnp.where(steady, t + period, jnp.inf)
     return trial._replace(
         t=t,
-        state=strike.state,
+        state=state,
         step=_step(walk, t, trial.pace, due, period),
         strike=t,
         period=period,
@@ -221,61 +236,62 @@ def _after_free_step(
     trial: RigidState,
     error: Scalar,
     rates: Rates,
-    strike: _Strike,
+    onto: _Onto,
+    lands_on_falls: bool,
 ) -> tuple[RigidProgress, Scalar]:
-    """After a step in single support: whether a heel strike lies beside it or behind it.
+    """After a step in single support: whether a heel strike or a fall lies in it or beside it.
 
     Also whether the step is kept. `rates` are those of the trial, roughly.
     """
-    old, old_rate = _opening(now.state)
-    new, new_rate = _opening(trial)
-    opening_curve = Quintic.of(
-        now.step, (old, old_rate, now.rates[0] + now.rates[1]), (new, new_rate, rates[2] + rates[3])
+    # As the step to which the error is a unit: its eighth root, for the order is 8.
+    length = jnp.sqrt(jnp.sqrt(jnp.sqrt(jnp.maximum(error, 1e-10))))
+    happens = events_within(
+        now.step,
+        (now.state, now.rates),
+        (trial, rates),
+        rtol=walk.rtol,
+        length=length,
+        begins_on_section=(now.footsteps > 0) & (now.t <= now.strike),
     )
-    passed = trial.theta_1 > trial.theta_2
-    ahead = passed & (new <= 0.0)
-    # A step so long that the legs open and close within it is tried again at half the length.
-    turn = old_rate / jnp.where(old_rate == new_rate, 1.0, old_rate - new_rate)
-    bulges = (old_rate > 0.0) & (new_rate < 0.0)
-    bulges = bulges & (opening_curve.value(turn) > 0.0)
-    skips = ahead & (old <= _CLOSED) & bulges
-    keep = (error <= 1.0) & ~skips
+    fallen = rigid_ending(now.state)
+    keep = (error <= 1.0) & ~happens.unclear & (fallen == 0)
     t = jnp.where(keep, now.t + now.step, now.t)
-    struck = keep & passed & strike.near & (old > _CLOSED) & (t + strike.rest <= walk.duration)
-    closes = keep & ahead & (old > _CLOSED) & ~struck
-    factor = _SAFETY * jnp.maximum(error, 1e-10) ** (-1.0 / ORDER)
-    pace = now.step * jnp.clip(factor, _MOST_SHRINK, _MOST_GROWTH)
-    pace = jnp.where(skips, 0.5 * now.step, pace)
-    back = now.step * (opening_curve.root() - 1.0)
-    code = jnp.where(keep & ~closes & ~struck, rigid_ending(trial), 0)
+    beside = onto.near & (trial.theta_1 > trial.theta_2) & (t + onto.rest <= walk.duration)
+    struck = keep & beside & happens.above & ~happens.grazes & ~happens.falls
+    lands = keep & (happens.strikes | (happens.falls & lands_on_falls)) & ~struck
+    pace = now.step * jnp.clip(_SAFETY / length, _MOST_SHRINK, _MOST_GROWTH)
+    # A step that is too long to tell what happens within it is tried again at half the length.
+    pace = jnp.where(happens.unclear & (error <= 1.0), 0.5 * now.step, pace)
+    back = now.step * (happens.place - 1.0)
     lost = ~jnp.isfinite(pace) | (pace <= _ROUNDING * t)
+    if not lands_on_falls:
+        fallen = jnp.where(keep, rigid_ending(trial), fallen)
+        t = jnp.where(keep & happens.falls, t + back, t)
     after = now._replace(
         t=t,
         state=select(keep, trial, now.state),
-        step=jnp.where(closes, back, _step(walk, t, pace, now.due, now.period)),
+        step=jnp.where(lands, back, _step(walk, t, pace, now.due, now.period)),
         pace=pace,
-        landing=jnp.where(closes, 1, 0),
+        landing=jnp.where(lands, 1, 0),
+        falling=lands & happens.falls,
         struck=struck,
-        code=jnp.where(lost, int(Ending.SOLVER_FAILED), code).astype(now.code.dtype),
+        grazes=now.grazes + jnp.where(keep & happens.grazes, 1, 0),
+        code=jnp.where(lost, int(Ending.SOLVER_FAILED), fallen).astype(now.code.dtype),
     )
     return after, keep
 
 
-def _landing(
-    walk: RigidWalk, now: RigidProgress, trial: RigidState, strike: _Strike
-) -> RigidProgress:
-    """After a step back towards a heel strike: Newton's method goes on, or the foot strikes."""
-    missed = ~strike.near & (now.landing >= _MOST_LANDINGS)
+def _landing(now: RigidProgress, trial: RigidState, onto: _Onto) -> RigidProgress:
+    """After a step back towards an event: Newton's method goes on, or it has come."""
+    missed = ~onto.near & (now.landing >= _MOST_LANDINGS)
+    falls = now.falling & onto.near
+    code = jnp.where(trial.theta_2 < 0.0, int(Ending.FELL_FORWARD), int(Ending.FELL_BACK))
+    code = jnp.where(falls, code, jnp.where(missed, int(Ending.SOLVER_FAILED), now.code))
     return now._replace(
-        t=now.t + now.step,
-        state=trial,
-        step=strike.rest,
+        t=now.t + now.step + jnp.where(falls, onto.rest, 0.0),
+        state=select(falls, onto.state, trial),
+        step=onto.rest,
         landing=now.landing + 1,
-        struck=strike.near,
-        code=jnp.where(missed, int(Ending.SOLVER_FAILED), now.code),
+        struck=onto.near & ~now.falling,
+        code=code,
     )
-
-
-def _opening(state: RigidState) -> tuple[Scalar, Scalar]:
-    """Sum of the leg angles and its rate: above zero while the swing foot ahead is off ground."""
-    return state.theta_1 + state.theta_2, state.omega_1 + state.omega_2

@@ -65,6 +65,8 @@ class Trajectory(eqx.Module, Generic[SomeState]):
             accuracy was asked for by a number.
         missed_contacts: how many contacts of a foot lie between two steps of one size, which
             stepped over them; None where no `dt` was given.
+        grazes: how many times the swing foot of a rigid walker met the ground, or missed it, by
+            less than the tolerance tells: it did not count as a heel strike. None of other models.
         engine: what computed it, "xla", "lanes" or "cuda".
     """
 
@@ -81,6 +83,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     violation: Float[Array, "..."] | None = None
     error: ErrorEstimate | None = None
     missed_contacts: Int[Array, "..."] | None = None
+    grazes: Int[Array, "..."] | None = None
     engine: str = eqx.field(static=True, default="xla")
 
     def __repr__(self) -> str:

@@ -217,7 +217,9 @@ class RigidLabelling(AbstractLabellingLoop):
         return Progress(initial_progress(walk), trace, zero, None)
 
     def attempt(self, start: Start, now: Progress) -> tuple[Progress, Scalar]:
-        after, over = attempt_step(start.solve, now.solve, embedded=self.embedded)
+        after, over = attempt_step(
+            start.solve, now.solve, embedded=self.embedded, lands_on_falls=False
+        )
 
         def on_section() -> ArrivalHistory:
             return after_arrival(

@@ -1,0 +1,132 @@
+"""Heel strikes and falls of the rigid walker, against own equations solved in small steps."""
+
+import jax
+import numpy as np
+import pytest
+
+import jaxbiped as jb
+from tests.rigid_walkers import rigid_seed
+from tests.rolling_truth import walks
+
+SEED = jb.seed_scene().walker
+SPRING = jb.actuation.HipSpring(k=3.0)
+PUSH = jb.actuation.PushOff(impulse=0.15)
+WALKERS = {
+    "seed": (SEED, 0.02, None, {}),
+    "gentle slope": (SEED, 0.003, None, {}),
+    "hip": (jb.Walker(m=0.5, J=0.003, l=1.0, d=0.4, r=0.1, hip_mass=5.0), 0.03, None, {}),
+    "point feet": (jb.Walker(m=5.0, J=0.0, l=1.0, d=0.5, r=0.0, hip_mass=10.0), 0.05, None, {}),
+    "large feet": (jb.Walker(m=1.0, J=0.01, l=0.4, d=0.3, r=0.35), 0.01, None, {}),
+    "spring": (SEED, 0.02, SPRING, {"torque": lambda y: 3.0 * (y[1] - y[0])}),
+    "push-off": (SEED, 0.0, PUSH, {"push_off": 0.15}),
+}  # fmt: skip
+FOOTSTEPS = 3
+
+
+def _scene(name):
+    walker, slope, actuator, _ = WALKERS[name]
+    actuation = None if actuator is None else (actuator,)
+    return jb.RigidScene(walker=walker, ground=jb.Ground(slope=slope), actuation=actuation)
+
+
+def _starts(scene, count, seed=0):
+    """Anywhere: legs that swing forward or back, fast or slowly, on either side of the other."""
+    random = np.random.default_rng(seed)
+    pace = np.sqrt(float(scene.ground.g) / float(scene.walker.l))
+    uniform = lambda most: random.uniform(-most, most, count)
+    angles = uniform(0.8), uniform(0.6)
+    return jb.dynamics.RigidState(
+        np.zeros(count), *angles, pace * uniform(1.2), pace * uniform(0.6)
+    )
+
+
+def _walker_of(scene, duration):
+    def walk(state, rtol):
+        return jb.rigid_walk(
+            scene, state, footsteps=FOOTSTEPS, duration=duration, max_arrivals=FOOTSTEPS,
+            rtol=rtol, engine="lanes",
+        )  # fmt: skip
+
+    return jax.jit(jax.vmap(walk, in_axes=(0, None)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", WALKERS)
+def test_strikes_and_falls_are_those_of_small_steps(name):
+    scene = _scene(name)
+    unit = float(np.sqrt(scene.walker.l / scene.ground.g))
+    starts, end = _starts(scene, 200), 8.0 * unit
+    true = walks(scene, starts, FOOTSTEPS, duration=8.0, **WALKERS[name][3])
+    walk_of = _walker_of(scene, end)
+    expected = np.where(true.strikes < end, true.strikes, np.inf)
+    for rtol in (1e-4, 1e-6, 1e-11):
+        walk = walk_of(starts, rtol)
+        times = np.asarray(walk.arrivals.t)
+        graze = np.asarray(walk.grazes) > 0
+        assert np.all((times[:, 1:] > times[:, :-1]) | np.isinf(times[:, 1:]))
+        assert np.mean(graze) <= 100.0 * rtol
+        both = np.isfinite(times) & np.isfinite(expected)
+        same = np.isfinite(times) == np.isfinite(expected)
+        assert np.all(same | graze[:, None])
+        off = np.abs(np.where(both, times, 0.0) - np.where(both, expected, 0.0)) / unit
+        assert np.all((off <= 100.0 * rtol + 1e-9) | graze[:, None])
+        assert np.sum(np.any(off > 100.0 * rtol + 1e-9, axis=1) | ~same.all(axis=1)) <= 1
+        # Falls, of those whose strikes are settled.
+        fell = (true.falls < end) & ~graze
+        codes = np.asarray(walk.ending)
+        np.testing.assert_array_equal(codes[~graze] > 0, fell[~graze])
+        np.testing.assert_array_equal(codes[fell] == 1, true.last[fell, 1] < 0.0)
+        late = np.abs(np.asarray(walk.t)[fell, -1] - true.falls[fell]) / unit
+        assert np.max(late) <= 1000.0 * rtol + 1e-9
+
+
+# Swing leg's angle and rate: it swings back fast, and is behind again where a step ends.
+BACK = [(0.7936, -3.9896), (0.5787, -2.2768), (0.4209, -1.8128)]
+
+
+@pytest.mark.parametrize(("angle", "rate"), BACK)
+def test_a_leg_that_swings_back_has_struck_first(angle, rate):
+    scene = rigid_seed()
+    start = jb.dynamics.RigidState(0.0, angle, 0.23985298, rate, -1.64274848)
+    true = walks(scene, start, 1)
+    assert np.isfinite(true.strikes[0, 0])
+    for wanted in (1e-4, 1e-6):
+        walk = jb.rigid_walk(scene, start, footsteps=3, max_arrivals=3, accuracy=wanted)
+        error = abs(float(walk.arrivals.t[0]) - true.strikes[0, 0])
+        assert walk.error.met
+        assert error <= float(walk.error.bars["arrivals"].t[0]) + 1e-12
+
+
+def test_a_leg_that_is_behind_at_the_root_has_not_struck():
+    start = jb.dynamics.RigidState(0.0, 0.0587, 0.23985298, -1.0143, -1.64274848)
+    assert np.isinf(walks(rigid_seed(), start, 1).strikes[0, 0])
+    for rtol in (1e-4, 1e-6, 1e-11):
+        walk = jb.rigid_walk(rigid_seed(), start, footsteps=1, rtol=rtol)
+        assert walk.outcome is jb.Ending.FELL_FORWARD
+        assert int(walk.arrivals.total) == 0
+
+
+def test_a_walker_that_rocks_beyond_1_rad_has_fallen_within_the_step():
+    """On large feet it would come back, and strike later."""
+    scene = _scene("large feet")
+    start = jb.dynamics.RigidState(0.0, -0.233, 0.1772, -5.4597, -1.1438)
+    true = walks(scene, start, 1)
+    for rtol in (1e-4, 1e-6):
+        walk = jb.rigid_walk(scene, start, footsteps=2, rtol=rtol)
+        assert walk.outcome is jb.Ending.FELL_BACK
+        assert float(walk.t[-1]) == pytest.approx(true.falls[0], abs=100.0 * rtol)
+
+
+def test_a_foot_that_grazes_the_ground_is_told():
+    """Between starts that strike and starts that are behind by then, found by small steps."""
+    scene, low, high = rigid_seed(), -2.5, -1.5
+    states = lambda rates: jb.dynamics.RigidState(0.0, 0.4209, 0.23985298, rates, -1.64274848)
+    for _ in range(4):
+        rates = np.linspace(low, high, 17)
+        strikes = np.isfinite(walks(scene, states(rates), 1, duration=1.0).strikes[:, 0])
+        last = int(np.flatnonzero(strikes != strikes[0])[0])
+        low, high = rates[last - 1], rates[last]
+    between = float(0.5 * (low + high))
+    assert int(jb.rigid_walk(scene, states(between), footsteps=1, rtol=1e-4).grazes) > 0
+    for rate in (low - 0.1, high + 0.1):
+        assert int(jb.rigid_walk(scene, states(rate), footsteps=1, rtol=1e-4).grazes) == 0
