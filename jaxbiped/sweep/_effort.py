@@ -16,8 +16,11 @@ from jaxbiped.solve._error_estimate import check_wanted
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
-_GAP, _GAP_SHARE = 1e-4, 30.0
-"""Gap between states that repeat each other, at least; and in units of the tolerance."""
+_GAP = 1e-4
+"""Gap between states that repeat each other, at least."""
+_GAP_SHARE = {True: 30.0, False: 3.0}
+"""The same in units of the tolerance, compliant or not: rolling errs by less, and slow transients
+past an unstable gait move by as little as a wider gap."""
 _FIRST = 3e-3
 """First tolerance as a share of the accuracy wanted, at most that of "draft": of 100,000 labels of
 the seed's slice 37 were wrong and not in doubt at 1e-5 by Rodas4, and 11 at 1e-6."""
@@ -32,7 +35,7 @@ class Effort(NamedTuple):
         rtol: relative tolerance; the absolute one is a hundredth of it in the scene's units.
         footsteps: after which a start that is not certain is given up.
         max_attempts: cap on the solver's attempted steps.
-        gap: see `after_arrival`.
+        gap: see `after_arrival`; `gap_share`: in units of the tolerance.
         solver: of the compliant walker.
         engine: "lanes", "cuda" or "xla".
         may_move: whether large batches go from lanes to a CUDA device where there is one.
@@ -44,6 +47,7 @@ class Effort(NamedTuple):
     footsteps: int
     max_attempts: int
     gap: float
+    gap_share: float
     solver: AbstractRosenbrock
     engine: str
     wanted: float | None = None
@@ -62,7 +66,7 @@ class Effort(NamedTuple):
 
     def at_tolerance(self, rtol: float) -> "Effort":
         """The same at another tolerance."""
-        return self._replace(rtol=float(rtol), gap=_gap(float(rtol)))
+        return self._replace(rtol=float(rtol), gap=_gap(float(rtol), self.gap_share))
 
 
 def effort_of(
@@ -104,7 +108,8 @@ def effort_of(
         rtol=float(tolerance),
         footsteps=int(footsteps),
         max_attempts=int(max_solver_steps),
-        gap=_gap(float(tolerance)),
+        gap=_gap(float(tolerance), _GAP_SHARE[scene.compliant]),
+        gap_share=_GAP_SHARE[scene.compliant],
         solver=method,
         engine=engine_for(engine, obstacle=None, by_device=True),
         may_move=engine == "auto",
@@ -126,5 +131,5 @@ def _share_wanted(accuracy: str | float, rtol: float | None) -> float | None:
     return float(accuracy)
 
 
-def _gap(rtol: float) -> float:
-    return max(_GAP, _GAP_SHARE * rtol)
+def _gap(rtol: float, share: float) -> float:
+    return max(_GAP, share * rtol)

@@ -64,7 +64,7 @@ def follow_starts(
     waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
     # Labels by a number may doubt what grazes.
-    counted = scene.compliant and effort.wanted is not None
+    counted = effort.wanted is not None
     if not count:
         return _empty_outcome(len(states) - 1, grazes=counted)
     embedded = effort.embedded and not scene.compliant
@@ -91,7 +91,7 @@ def _program(
     embedded: bool,
     grazes: bool,
 ) -> Program:
-    loop: AbstractLabellingLoop = RigidLabelling(cycles, embedded=embedded)
+    loop: AbstractLabellingLoop = RigidLabelling(cycles, embedded=embedded, grazes=grazes)
     if compliant:
         loop = CompliantLabelling(solver, cycles, fenced=fenced, grazes=grazes)
     return Program(loop.begin, loop.attempt, loop.finish)

@@ -55,7 +55,7 @@ class Start(NamedTuple):
 class Outcome(NamedTuple, Generic[_Number]):
     """What became of one start; see `Labelled`. `final` is the last state on the section.
 
-    `grazes` counts steps in which a foot grazed the ground, where that is asked for.
+    `grazes` counts steps in which a foot grazed the ground, if that is asked for.
     """
 
     label: _Number
@@ -205,10 +205,11 @@ class RigidLabelling(AbstractLabellingLoop):
     Attributes:
         cycles: footsteps in a cycle of each known gait.
         embedded: see `rolling_step`.
+        grazes: whether heel strikes that graze are told.
     """
 
-    def __init__(self, cycles: tuple[int, ...], *, embedded: bool) -> None:
-        self.cycles, self.embedded = cycles, embedded
+    def __init__(self, cycles: tuple[int, ...], *, embedded: bool, grazes: bool = False) -> None:
+        self.cycles, self.embedded, self.grazes = cycles, embedded, grazes
 
     def begin(self, start: Start) -> Progress:
         walk: RigidWalk = start.solve
@@ -242,7 +243,7 @@ class RigidLabelling(AbstractLabellingLoop):
             time=walked.t,
             distance=state_with_hip(start.solve, walked).hip_x - start.solve.state.hip_x,
             attempted=walked.accepted + walked.rejected,
-        )
+        )._replace(grazes=walked.grazes if self.grazes else None)
 
 
 def _outcome(
