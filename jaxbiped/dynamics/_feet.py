@@ -1,16 +1,20 @@
 """Feet: where they are, how they move, and which of them touch the ground."""
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import jax.numpy as jnp
 
 from jaxbiped._cached_jit import kept_alone
-from jaxbiped._types import Scalar
+from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._actuation import preload
 from jaxbiped.dynamics._redundant_state import CompliantState, Leg, legs_of
+from jaxbiped.dynamics._state import SomeState, exchange_legs
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._redundant_scene import CompliantScene
 from jaxbiped.scene._stepped_ground import drop_under
+
+_JUST_TOUCHING = 1e-6
+"""Depth or height of a foot that counts as at the surface, in units of the leg's length."""
 
 
 class Foot(NamedTuple):
@@ -132,6 +136,18 @@ def standing_foot(both: Feet) -> Scalar:
     """The foot that alone touches: 1 or 2, or 0 where none or both do."""
     touch_1, touch_2 = touches(both.foot_1), touches(both.foot_2)
     return jnp.where(touch_1 & ~touch_2, 1, jnp.where(touch_2 & ~touch_1, 2, 0))
+
+
+@kept_alone
+def with_leg_2_standing(scene: CompliantScene, state: SomeState) -> SomeState:
+    """The same motion in the names that sections are looked at in: leg 2 stands.
+
+    Where leg 1 stands alone the names are exchanged, but for a state at leg 2's heel strike, whose
+    foot just touches: it carries from there on.
+    """
+    both = feet(scene, cast(CompliantState, state))
+    strikes = jnp.abs(both.foot_2.penetration) <= _JUST_TOUCHING * scene.walker.l
+    return select((standing_foot(both) == 1) & ~strikes, exchange_legs(state), state)
 
 
 def standing_height(

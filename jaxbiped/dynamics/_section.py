@@ -2,6 +2,7 @@
 
 import abc
 from collections.abc import Callable
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -13,7 +14,19 @@ from jaxbiped.dynamics._rigid_state import RigidState
 
 
 class AbstractSection(eqx.Module):
-    """A surface that the orbit crosses: a function of the state rises through zero."""
+    """A surface that the orbit crosses: a function of the state rises through zero.
+
+    It is looked at with the legs' names as they are and exchanged, so that no arrival depends on
+    which leg is called 1.
+
+    Attributes:
+        alternates: whether each arrival is another leg's than the one before, the first one another
+            than that which stands alone at the start.
+        leg_2_stands: whether leg 2 stands after an arrival, which names the legs.
+    """
+
+    alternates: ClassVar[bool] = False
+    leg_2_stands: ClassVar[bool] = False
 
     @abc.abstractmethod
     def value(self, args: PyTree, y: PyTree) -> Scalar:
@@ -27,6 +40,8 @@ class AbstractSection(eqx.Module):
 class MidStance(AbstractSection):
     """The leg that stands, leg 2, passes the slope's normal on its way back, and carries."""
 
+    leg_2_stands: ClassVar[bool] = True
+
     def value(self, args: PyTree, y: PyTree) -> Scalar:
         return -y.theta_2
 
@@ -38,6 +53,9 @@ class MidStance(AbstractSection):
 
 class HeelStrike(AbstractSection):
     """The foot ahead comes down; by then its leg is called leg 2, the new stance leg."""
+
+    alternates: ClassVar[bool] = True
+    leg_2_stands: ClassVar[bool] = True
 
     def value(self, args: PyTree, y: PyTree) -> Scalar:
         if isinstance(y, RigidState):

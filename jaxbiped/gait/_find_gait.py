@@ -42,7 +42,7 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
 from jaxbiped.solve._error_estimate import check_wanted
-from jaxbiped.variational._hybrid_system import section_of
+from jaxbiped.variational._hybrid_system import section_of, with_leg_names_of
 
 if TYPE_CHECKING:
     import optax
@@ -139,7 +139,8 @@ def find_gait(
     check_choice("method", method, ("newton", "optax"))
     check_count("footsteps", footsteps)
     check_unbatched("scene", scene)
-    start = _check_start(scene, default_guess(scene) if guess is None else guess)
+    section = section_of(scene, section)
+    start = _check_start(scene, section, default_guess(scene) if guess is None else guess)
     check_unbatched("guess", start, "one state")
     most = (40 if method == "newton" else 400) if max_evaluations is None else max_evaluations
     check_count("max_evaluations", most)
@@ -149,7 +150,6 @@ def find_gait(
     names, active = select_parameters(modelled, parameters)
     precision = precision_of(accuracy, scene) if isinstance(accuracy, str) else accuracy
     method_of_steps = orbit_solver(solver, rigid=not scene.compliant)
-    section = section_of(scene, section)
     runs_on = orbit_engine(
         engine,
         solver=method_of_steps,
@@ -226,12 +226,12 @@ def _search_on(
     return found, origin_of(staged, modelled, start)
 
 
-def _check_start(scene: AbstractScene, start: PyTree) -> WalkerState:
+def _check_start(scene: AbstractScene, section: AbstractSection, start: PyTree) -> WalkerState:
     if not scene.compliant:
         return check_state(start, RigidState, "guess")
     if scene.redundant:
-        return minimal_state(scene, consistent_state(cast(RedundantScene, scene), start).state)
-    return state_for(cast(Scene, scene), start, "guess")
+        start = minimal_state(scene, consistent_state(cast(RedundantScene, scene), start).state)
+    return with_leg_names_of(section, scene.minimal, state_for(scene.minimal, start, "guess"))
 
 
 @bounded_cache(1)  # the same object each time, so that nothing is compiled again

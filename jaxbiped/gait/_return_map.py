@@ -27,6 +27,7 @@ from jaxbiped.variational._hybrid_system import (
     RedundantWalking,
     section_of,
     system_of,
+    with_leg_names_of,
 )
 
 
@@ -65,8 +66,8 @@ def return_map(
 
     Args:
         args: the scene, or the parameters of another `system`.
-        state: start, on the section or not; for a redundant scene a minimal state too, which then
-            comes back as one.
+        state: start, on the section or not, either leg standing; for a redundant scene a minimal
+            state too, which then comes back as one.
         section: `MidStance()` unless given, `HeelStrike()` for a rigid walker.
         footsteps: how many arrivals to follow.
         gradient: `Forward()` (the default) or `Reverse()`.
@@ -97,6 +98,8 @@ def return_map(
     if enters:
         state = redundant_state(args, state)
     section = section_of(args, section)
+    if system is None:
+        state = with_leg_names_of(section, args, state)
     check_holds_none(gradient, system, section)
     method = orbit_solver(solver, rigid=is_rigid(args))
     by = orbit_engine(

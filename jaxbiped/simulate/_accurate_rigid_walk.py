@@ -46,6 +46,7 @@ def accurate_rigid_walk(run: RigidSimulation, wanted: float) -> Trajectory[Rigid
         other = run.with_inputs(rtol=_EMBEDDED * tolerance, embedded=True)
         witnesses = tuple(Witness(each(), 1.0) for each in (looser, other))
         bars, relative, obstacle = judge_walk(run.walk.scene, walk, witnesses)
+        assert walk.grazes is not None
         # Whether a foot that grazes the ground strikes is for a finer tolerance to tell.
         return walk, (bars, np.inf if int(walk.grazes) else relative, obstacle)
 

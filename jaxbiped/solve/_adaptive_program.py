@@ -138,7 +138,9 @@ class AdaptiveSolve:
             self.solver.error_order(term),
         )
         count = jnp.zeros((), dtype=jnp.int64)
-        last = self.saved.first(solve.state, self.solver) if self.saved.within else None
+        last = (
+            self.saved.first(solve.scene, solve.state, self.solver) if self.saved.within else None
+        )
         extremes = None
         if self.saved.extremes is not None:
             values = _numbers(self.saved.extremes(solve.scene, solve.state))
@@ -173,10 +175,11 @@ class AdaptiveSolve:
                 solve.scene,
                 last,
                 began=(now.t, now.state),
-                ended=state,
+                ended=(t, state),
                 keep=keep,
                 moving=now.accepted > 0,
                 dense=dense,
+                solver=self.solver,
             )
         after = _Now(
             t=t,

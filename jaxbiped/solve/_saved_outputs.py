@@ -9,26 +9,46 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
+from jaxbiped.dynamics._feet import feet, standing_foot
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._step_cubic import StepCubic
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, RosenbrockInterpolation
 
 _BISECTIONS = 50
 
 
+class Rise(NamedTuple):
+    """Where a section's value rises through zero within a step.
+
+    Attributes:
+        happens: whether it does, and it is an arrival.
+        since, until: times before and after [s].
+    """
+
+    happens: Scalar
+    since: Scalar
+    until: Scalar
+
+
 class LastStep(NamedTuple):
     """The last attempt: when it began, its dense output, and whether it is of note.
 
-    It is where it was accepted, or where there is a section, where it ended past an arrival there.
-    `changed` is whether the legs' names are exchanged for the next arrival.
+    It is where it was accepted, or where there is a section, where there is an arrival within it.
+
+    Attributes:
+        foot: that of the last arrival, in the names of the arrival foot 2; at the start the one
+            that stands alone, 0 for none. None without a section, as is `rise`.
+        rise: where the arrival lies.
     """
 
     noted: Scalar
-    changed: Scalar
     t: Scalar
     state: State
     coefficients: tuple[State, ...]
+    foot: Scalar | None = None
+    rise: Rise | None = None
 
 
 class Saved(NamedTuple):
@@ -52,12 +72,15 @@ class Saved(NamedTuple):
         """Whether anything is saved from within the steps."""
         return self.steps or self.times or self.section is not None
 
-    def first(self, state: State, solver: AbstractRosenbrock) -> LastStep:
+    def first(self, scene: Scene, state: State, solver: AbstractRosenbrock) -> LastStep:
         """What is known before the first attempt."""
         zero, none = jnp.zeros_like(state[0]), jnp.asarray(False)
         nothing = jtu.tree_map(jnp.zeros_like, state)
-        rows = len(solver.tableau.dense)
-        return LastStep(none, jnp.asarray(True), zero, nothing, tuple([nothing] * rows))
+        rows = tuple([nothing] * len(solver.tableau.dense))
+        if self.section is None:
+            return LastStep(none, zero, nothing, rows)
+        stands = jnp.asarray(standing_foot(feet(scene, state)))
+        return LastStep(none, zero, nothing, rows, stands, Rise(none, zero, zero))
 
     def following(
         self,
@@ -65,25 +88,36 @@ class Saved(NamedTuple):
         last: LastStep,
         *,
         began: tuple[Scalar, State],
-        ended: State,
+        ended: tuple[Scalar, State],
         keep: Scalar,
         moving: Scalar,
         dense: tuple[State, ...],
+        solver: AbstractRosenbrock,
     ) -> LastStep:
         """What is known after an attempt.
 
         `keep` is whether it was accepted, and `moving` whether any was before.
         """
         t, start = began
-        changed, noted = last.changed, keep
-        if self.section is not None:
-            before, after = (_with_leg_names(changed, y) for y in (start, ended))
-            rises = self.section.value(scene, before) < 0.0
-            rises = rises & (self.section.value(scene, after) >= 0.0)
-            # The first step of a solve never counts, so it may start on its section.
-            noted = keep & moving & rises & self.section.counts(scene, after)
-            changed = changed ^ noted
-        return LastStep(noted, changed, t, start, dense)
+        if self.section is None:
+            return LastStep(keep, t, start, dense)
+        assert last.foot is not None
+        course = solver.interpolation_cls(
+            t0=t, t1=ended[0], y0=start, y1=ended[1], coefficients=dense
+        )
+        # The first step of a solve never counts, so it may start on its section.
+        counts = keep & moving
+        rises = []
+        for number in (1, 2):
+            rise = _rise(self.section, scene, course, exchanged=number == 1)
+            other = (last.foot != number) | (not self.section.alternates)
+            rises.append(rise._replace(happens=rise.happens & counts & other))
+        first, second = rises
+        by_first = first.happens & ~(second.happens & (second.until < first.until))
+        rise = select(by_first, first, second)
+        arrived = jnp.where(by_first, 1, 2).astype(last.foot.dtype)
+        foot = jnp.where(rise.happens, arrived, last.foot)
+        return LastStep(rise.happens, t, start, dense, foot, rise)
 
     def record(
         self,
@@ -114,20 +148,43 @@ class Saved(NamedTuple):
     ) -> list[Scalar]:
         section = self.section
         assert section is not None
-
-        # The names that the arrival went by: they have been exchanged since.
-        def value(state: State) -> Scalar:
-            return section.value(scene, _with_leg_names(~last.changed, state))
+        assert last.rise is not None
+        exchanged = jnp.asarray(last.foot == 1)
 
         def halve(_: Scalar, ends: tuple[Scalar, Scalar]) -> tuple[Scalar, Scalar]:
             middle = 0.5 * (ends[0] + ends[1])
-            before = value(dense.evaluate(middle)) < 0.0
+            state = dense.evaluate(middle)
+            before = section.value(scene, select(exchanged, exchange_legs(state), state)) < 0.0
             return jnp.where(before, middle, ends[0]), jnp.where(before, ends[1], middle)
 
-        time = jax.lax.fori_loop(0, _BISECTIONS, halve, (dense.t0, dense.t1))[1]
+        time = jax.lax.fori_loop(0, _BISECTIONS, halve, last.rise[1:])[1]
         return [time, *dense.evaluate(time)]
 
 
-def _with_leg_names(changed: Scalar, state: State) -> State:
-    """The state with its legs' names exchanged, where they are."""
-    return select(changed, exchange_legs(state), state)
+def _rise(
+    section: AbstractSection, scene: Scene, course: RosenbrockInterpolation, *, exchanged: bool
+) -> Rise:
+    """Where a section's value rises within a step, also if it falls again or fell before."""
+
+    def at(time: Scalar) -> State:
+        state = course.evaluate(time)
+        return exchange_legs(state) if exchanged else state
+
+    def value(time: Scalar) -> Scalar:
+        return section.value(scene, at(time))
+
+    t0, t1 = jnp.asarray(course.t0), jnp.asarray(course.t1)
+    (old, old_rate), (new, new_rate) = (
+        jax.jvp(value, (end,), (jnp.ones_like(end),)) for end in (t0, t1)
+    )
+    span = t1 - t0
+    cubic = StepCubic(old, new, span * old_rate, span * new_rate)
+    turn = t0 + span * cubic.turning_point()
+    below = old < 0.0
+    returns = (below == (new < 0.0)) & cubic.turns()
+    no = jnp.zeros_like(returns)
+    crosses = jax.lax.cond(returns, lambda: (value(turn) < 0.0) != below, lambda: no)
+    until = jnp.where(crosses & below, turn, t1)
+    rises = crosses | (below & (new >= 0.0))
+    happens = jax.lax.cond(rises, lambda: jnp.asarray(section.counts(scene, at(until))), lambda: no)
+    return Rise(happens, jnp.where(crosses & ~below, turn, t0), until)

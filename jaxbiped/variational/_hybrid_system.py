@@ -4,7 +4,7 @@ The walker is only one of them: solves and searches ask this interface, so a use
 """
 
 import abc
-from typing import ClassVar
+from typing import ClassVar, cast
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -12,6 +12,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, Time
+from jaxbiped.dynamics._feet import with_leg_2_standing
 from jaxbiped.dynamics._forces import foot_forces
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
@@ -23,7 +24,7 @@ from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.dynamics._switches import Switch, switches
 from jaxbiped.scene._abstract_scene import AbstractScene, is_rigid
-from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._redundant_scene import CompliantScene, RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._ending import WATCHES, ending_events, rigid_ending
@@ -140,6 +141,13 @@ def section_of(scene: object, section: AbstractSection | None) -> AbstractSectio
             "the impact, at HeelStrike()."
         )
     return HeelStrike()
+
+
+def with_leg_names_of(section: AbstractSection, scene: AbstractScene, state: PyTree) -> PyTree:
+    """The same motion with the legs' names as the section has them; see `with_leg_2_standing`."""
+    if is_rigid(scene) or not section.leg_2_stands:
+        return state
+    return with_leg_2_standing(cast(CompliantScene, scene), state)
 
 
 class Rolling(AbstractSystem):
