@@ -171,7 +171,7 @@ def find_gait(
         residual=_RESIDUAL_SHARE * precision.rtol,
         patience=np.asarray(int(most)),
     )
-    searching = (spec, scene, active, start, precision, how)
+    searching = (spec, scene, start, precision, how)
     describing = (names, active, radius_sensitivities)
     by = FoundBy.GUESS if guess is not None else FoundBy.START
     origin = single_stage_origin(modelled, start, by)
@@ -181,14 +181,14 @@ def find_gait(
             found, origin = search_along(*searching, origin)
         else:
             found = walks_only(search(*searching))
-        return summarise_gait(spec, scene, start, found, *describing, origin)
+        return summarise_gait(spec, scene, start, precision, found, *describing, origin)
     _compile_once(searching, describing, origin)
     found = _search(*searching)
     if not staged:
         found = walks_only(found)
     elif not _is_stable(found):
         found, origin = _search_on(searching, modelled, found, engine)
-    gait = summarise_gait(spec, scene, start, found, *describing, origin)
+    gait = summarise_gait(spec, scene, start, precision, found, *describing, origin)
     warn_of_grazing(gait)
     return gait
 
@@ -202,7 +202,7 @@ def _search_on(
     searching: SearchArguments, modelled: Scene | RigidScene, first: Found, engine: str
 ) -> tuple[Found, Origin]:
     """The stages of a search beyond the first."""
-    spec, scene, active, start, precision, how = searching
+    spec, scene, start, precision, how = searching
     solver = orbit_solver(None, rigid=not modelled.compliant)
     section = section_of(modelled, None)
     if scene.redundant:
@@ -219,7 +219,7 @@ def _search_on(
 
     def search_from(spec: ReturnMapSpec, scene: PyTree, start: PyTree, patience: int) -> Found:
         hasty = dataclasses.replace(how, patience=np.asarray(min(patience, how.max_evaluations)))
-        return _search(spec, scene, active, start, precision, hasty)
+        return _search(spec, scene, start, precision, hasty)
 
     staged = search_in_stages(search_from, spec, scout, scene, modelled, first)
     found = walks_only(first) if staged.best is None else staged.best.found
@@ -255,14 +255,16 @@ def _compilation_of(kind: tuple[object, ...]) -> Once[None]:
 
 def _compile(searching: SearchArguments, describing: Described, origin: Origin) -> None:
     """Compiles both programs, and what lanes run for them, at the same time."""
-    spec, scene, _, start, *_ = searching
+    spec, scene, start, precision, _ = searching
     told = stage("compiling the search (first time for this kind of scene)")
     with told, ThreadPoolExecutor() as meanwhile:
         with deferred_checks() as programs:
             # What takes lanes longest begins first.
             ready = [meanwhile.submit(_search.begin(*searching))]
             no_result = _empty_arrays(_search.result_shape(*searching))
-            finish = summarise_gait.begin(spec, scene, start, no_result, *describing, origin)
+            finish = summarise_gait.begin(
+                spec, scene, start, precision, no_result, *describing, origin
+            )
             ready.append(meanwhile.submit(finish))
         try:
             for program in programs:

@@ -98,16 +98,13 @@ class Found(NamedTuple):
 Run = Callable[[Scalar, Scalar, Scalar], LinearisedReturn]
 """The return from recurring components, as exactly as a stage wants, or none where idle."""
 
-SearchArguments: TypeAlias = tuple[
-    ReturnMapSpec, PyTree, tuple[int, ...], PyTree, Precision, Method
-]
+SearchArguments: TypeAlias = tuple[ReturnMapSpec, PyTree, PyTree, Precision, Method]
 """Those of `search`, for a scene and a guess."""
 
 
 def search(
     spec: ReturnMapSpec,
     args: PyTree,
-    active: tuple[int, ...],
     guess: PyTree,
     precision: Precision,
     method: Method,
@@ -115,11 +112,12 @@ def search(
 ) -> Found:
     """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely.
 
-    Not at all where not `wanted`.
+    Not at all where not `wanted`. It knows no parameters: which gait is found does not depend on
+    what is asked of it (see `with_parameter_columns`).
     """
     first = recurring_components(spec.system, guess)
     off = jnp.abs(spec.section.value(args, guess))
-    run = _runner(spec, args, active, guess, precision)
+    run = _runner(spec, args, guess, precision)
     shape: LinearisedReturn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
     empty_return = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
     begin = initial_progress(first, off, method, empty_return)
@@ -158,16 +156,10 @@ def _with_soundness(spec: ReturnMapSpec, args: PyTree, guess: PyTree, end: Progr
     return is_sound(args, state, jnp.sum(last.advance), last.period)
 
 
-def _runner(
-    spec: ReturnMapSpec,
-    args: PyTree,
-    active: tuple[int, ...],
-    guess: PyTree,
-    precision: Precision,
-) -> Run:
-    """Returns, with derivatives with respect to the state and, near a gait, the parameters."""
-    seeds, _ = seed_directions(args, active, len(recurring_components(spec.system, guess)))
-    coarse = Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
+def _runner(spec: ReturnMapSpec, args: PyTree, guess: PyTree, precision: Precision) -> Run:
+    """Returns, with derivatives with respect to the state."""
+    seeds, _ = seed_directions(args, (), len(recurring_components(spec.system, guess)))
+    coarse = looser(precision)
 
     def run(trial: Scalar, stage: Scalar, idle: Scalar) -> LinearisedReturn:
         wanted = Precision(
@@ -176,11 +168,14 @@ def _runner(
                 for a, b, c in zip(precision, coarse, ROUGH, strict=True)
             )
         )
-        start = state_with(spec.system, guess, trial)
-        near = stage >= Stage.COARSE
-        return linearised_return(spec, seeds, start, wanted, idle, carries_parameters=near)
+        return linearised_return(spec, seeds, state_with(spec.system, guess, trial), wanted, idle)
 
     return run
+
+
+def looser(precision: Precision) -> Precision:
+    """The precision of the witness of a return's error."""
+    return Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
 
 
 def _iterate(run: Run, begin: Progress, method: Method) -> Progress:

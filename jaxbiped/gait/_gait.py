@@ -16,7 +16,7 @@ from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._fixed_point_search import Found, Search
-from jaxbiped.gait._orbit import Orbit, Slopes, orbit_of
+from jaxbiped.gait._orbit import Orbit, Slopes, orbit_of, with_parameter_columns
 from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
@@ -24,6 +24,7 @@ from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameters import parameter_quantities
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._error_estimate import ErrorEstimate
 
 _NOTHING = 1e-9
@@ -75,8 +76,7 @@ class Gait(eqx.Module):
         unit_multiplier_error: distance from 1 of the multiplier that must be exactly 1.
         bifurcation: code of a `Bifurcation`: whether a multiplier lies on the unit circle.
         sensitivities: derivatives of the measures with respect to each parameter, leaves of shape
-            (p,). By lanes NaN where the search never came near a gait: until then derivatives are
-            taken with respect to the state alone.
+            (p,); NaN where the search did not converge.
         sensitivity_errors: their estimated errors, from what a ten times looser solve changes.
         elasticities: d log |measure| / d log parameter, leaves of shape (p,); zero for a parameter
             that is zero, NaN for a measure that is.
@@ -176,6 +176,7 @@ def summarise_gait(
     spec: ReturnMapSpec,
     scene: AbstractScene,
     start: WalkerState,
+    precision: Precision,
     found: Found,
     names: tuple[str, ...],
     active: tuple[int, ...],
@@ -183,6 +184,7 @@ def summarise_gait(
     origin: Origin,
 ) -> Gait:
     """The gait that a search from `start` found, with its stability and its derivatives."""
+    found = with_parameter_columns(spec, scene, active, start, precision, found)
     orbit = orbit_of(spec, scene, active, start, found, radius=radius)
     stability = orbit.stability
     last, m = found.last, found.recurring.shape[0]

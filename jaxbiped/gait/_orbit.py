@@ -1,19 +1,25 @@
 """Periodic orbit: its stability and its sensitivities."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._fixed_point_search import Found
-from jaxbiped.gait._poincare_map import LinearisedReturn, seed_directions, state_with
+from jaxbiped.gait._fixed_point_search import Found, Search, looser
+from jaxbiped.gait._poincare_map import (
+    LinearisedReturn,
+    linearised_return,
+    seed_directions,
+    state_with,
+)
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.gait._stability import Stability, stability_of
 from jaxbiped.linalg._small_matrices import eigensystem, solve
+from jaxbiped.solve._accuracy import Precision
 
 CLOSENESS = 1e-3
 """Distance of a multiplier from the unit circle that is flagged as a bifurcation."""
@@ -67,6 +73,49 @@ class Orbit(NamedTuple):
     sizes: Scalar
 
 
+def with_parameter_columns(
+    spec: ReturnMapSpec,
+    args: PyTree,
+    active: tuple[int, ...],
+    guess: PyTree,
+    precision: Precision,
+    found: Found,
+) -> Found:
+    """What a search found, with derivatives with respect to parameters as well.
+
+    The gait's own values and derivatives stay those of the search. Of parameters nothing is claimed
+    (NaN) where it did not converge.
+    """
+    if not active:
+        return found
+    m = found.recurring.shape[0]
+    seeds, _ = seed_directions(args, active, m)
+    start = state_with(spec.system, guess, found.recurring)
+    idle = found.ending == int(Search.NO_RETURN)
+    lost = idle | (found.ending == int(Search.NOT_CONVERGED))
+
+    def once(precision: Precision) -> LinearisedReturn:
+        return linearised_return(spec, seeds, start, precision, idle)
+
+    pairs = jax.tree.map(
+        lambda *pair: jnp.stack(list(map(jnp.asarray, pair))), precision, looser(precision)
+    )
+    new, own = _each_of(spec, once)(pairs), found.both
+    names = ("jacobian", "monodromy", "period_row", "advance_rows", "peak_row")
+    rows = {
+        name: jnp.concatenate(
+            [getattr(own, name)[..., :m], jnp.where(lost, jnp.nan, getattr(new, name)[..., m:])],
+            axis=-1,
+        )
+        for name in names
+    }
+    counts = {
+        name: jnp.maximum(getattr(own, name), getattr(new, name))
+        for name in ("jumps", "missed", "grazes")
+    }
+    return found._replace(both=own._replace(nodes=new.nodes, **rows, **counts))
+
+
 def orbit_of(
     spec: ReturnMapSpec,
     args: PyTree,
@@ -94,10 +143,8 @@ def orbit_of(
     _, sizes = seed_directions(args, active, m)
     radius_slopes = radius_errors = jnp.full(len(active), jnp.nan)
     if radius and active:
-        # Lanes take both at once; XLA would compute in lockstep.
-        each_of = jax.vmap if spec.engine == "lanes" else _map_over_rows
-        radius_slopes, looser_slopes = each_of(
-            lambda each: _radius_slopes(spec, args, active, guess, each)
+        radius_slopes, looser_slopes = _each_of(
+            spec, lambda each: _radius_slopes(spec, args, active, guess, each)
         )(found.both)
         change = jnp.abs(radius_slopes - looser_slopes)
         share = jnp.sqrt(jnp.sum(change * change) / jnp.sum(radius_slopes * radius_slopes))
@@ -177,10 +224,11 @@ def _radius_slopes(
     return jnp.where(last.jumps > 0, jnp.nan, slopes)
 
 
-def _map_over_rows(
-    function: Callable[[LinearisedReturn], Scalar],
-) -> Callable[[LinearisedReturn], Scalar]:
-    return lambda returns: jax.lax.map(function, returns)
+def _each_of(spec: ReturnMapSpec, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """The function of each row: lanes take both at once; XLA would compute in lockstep."""
+    return (
+        jax.vmap(function) if spec.engine == "lanes" else lambda rows: jax.lax.map(function, rows)
+    )
 
 
 def _leading_eigenvectors(jacobian: Scalar) -> tuple[Scalar, Scalar]:

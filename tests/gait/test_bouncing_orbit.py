@@ -13,7 +13,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._fixed_point_search import search
 from jaxbiped.gait._newton import Method
-from jaxbiped.gait._orbit import orbit_of
+from jaxbiped.gait._orbit import orbit_of, with_parameter_columns
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import precision_of
 
@@ -95,7 +95,9 @@ def test_an_orbit_with_its_multiplier_and_all_derivatives():
 
     @jax.jit
     def run(args):
-        found = search(spec, args, active, guess, precision_of("tight"), Method(None, 40, 1e-10))
+        tight = precision_of("tight")
+        found = search(spec, args, guess, tight, Method(None, 40, 1e-10))
+        found = with_parameter_columns(spec, args, active, guess, tight, found)
         return orbit_of(spec, args, active, guess, found, radius=True)
 
     found = run(jax.tree.map(jnp.asarray, SPRING))

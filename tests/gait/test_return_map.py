@@ -15,7 +15,7 @@ import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._fixed_point_search import search
 from jaxbiped.gait._newton import Method
-from jaxbiped.gait._orbit import orbit_of
+from jaxbiped.gait._orbit import orbit_of, with_parameter_columns
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import ACCURACIES, precision_of
 
@@ -177,7 +177,9 @@ def test_every_solver_carries_derivatives(solver, engine):
 
 
 def _orbit(spec, args, guess):
-    found = search(spec, args, (0,), guess, precision_of("tight"), Method(None, 40, 1e-10))
+    tight = precision_of("tight")
+    found = search(spec, args, guess, tight, Method(None, 40, 1e-10))
+    found = with_parameter_columns(spec, args, (0,), guess, tight, found)
     return orbit_of(spec, args, (0,), guess, found, radius=True)
 
 
