@@ -2,6 +2,8 @@
 
 import warnings
 
+import numpy as np
+
 from jaxbiped._ending import Ending
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
@@ -26,6 +28,9 @@ def explain_search(scene: AbstractScene, gait: Gait) -> str:
     if gait.outcome is not Search.FOUND:
         return f"no gait found: {_search_sentence(gait)}{_branch(scene, gait)}"
     text = f"found by {gait.found_by}"
+    asked, least = np.shape(gait.orbit[0])[0], int(gait.cycle_footsteps)
+    if least < asked:
+        text += f"; it closes after {least} of the {asked} footsteps, and no longer cycle was seen"
     if gait.others:
         seen = ", ".join(
             f"{each.period:.6g} s (spectral radius {each.spectral_radius:.4g})"

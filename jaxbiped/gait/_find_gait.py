@@ -34,7 +34,7 @@ from jaxbiped.gait._origin import FoundBy, Origin, single_stage_origin
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes, walking_spec
 from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._solver import orbit_solver
-from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
+from jaxbiped.gait._staged_search import is_whole, origin_of, search_in_stages, spectral_radius
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
@@ -85,7 +85,8 @@ def find_gait(
             the seed scene's gait to this one; Newton's method from scattered starts. The gait is
             then the stable one, or where none was seen the one of smallest spectral radius. Under
             `jit` and `vmap` there are two stages, the first and the continuation.
-        footsteps: how many a cycle has.
+        footsteps: how many a cycle has. Without a guess the search goes on where what it finds
+            repeats itself after fewer; where there is no other `cycle_footsteps` says how many.
         section: where the cycle begins, `MidStance()` unless given. A rigid walker's cycles begin
             just after its impact, at `HeelStrike()`.
         parameters: names of the parameters to differentiate with respect to (see
@@ -186,7 +187,7 @@ def find_gait(
     found = _search(*searching)
     if not staged:
         found = walks_only(found)
-    elif not _is_stable(found):
+    elif not (_is_stable(found) and is_whole(found, spec, float(precision.rtol))):
         found, origin = _search_on(searching, modelled, found, engine)
     gait = summarise_gait(spec, scene, start, precision, found, *describing, origin)
     warn_of_grazing(gait)
@@ -208,20 +209,15 @@ def _search_on(
     if scene.redundant:
         engine = "auto"
     scout_engine = orbit_engine(engine, solver=solver, section=section, leaves=(modelled, start))
-    scout = walking_spec(
-        modelled,
-        section,
-        solver,
-        scout_engine,
-        steps=1,
-        most=ACCURACIES["balanced"].max_solver_steps,
-    )
+    most = ACCURACIES["balanced"].max_solver_steps
+    scout = walking_spec(modelled, section, solver, scout_engine, steps=1, most=most)
 
     def search_from(spec: ReturnMapSpec, scene: PyTree, start: PyTree, patience: int) -> Found:
         hasty = dataclasses.replace(how, patience=np.asarray(min(patience, how.max_evaluations)))
         return _search(spec, scene, start, precision, hasty)
 
-    staged = search_in_stages(search_from, spec, scout, scene, modelled, first)
+    rtol = float(precision.rtol)
+    staged = search_in_stages(search_from, spec, scout, scene, modelled, first, rtol)
     found = walks_only(first) if staged.best is None else staged.best.found
     return found, origin_of(staged, modelled, start)
 
@@ -262,9 +258,8 @@ def _compile(searching: SearchArguments, describing: Described, origin: Origin) 
             # What takes lanes longest begins first.
             ready = [meanwhile.submit(_search.begin(*searching))]
             no_result = _empty_arrays(_search.result_shape(*searching))
-            finish = summarise_gait.begin(
-                spec, scene, start, precision, no_result, *describing, origin
-            )
+            given = (spec, scene, start, precision, no_result, *describing, origin)
+            finish = summarise_gait.begin(*given)
             ready.append(meanwhile.submit(finish))
         try:
             for program in programs:

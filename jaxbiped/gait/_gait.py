@@ -16,6 +16,7 @@ from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._fixed_point_search import Found, Search
+from jaxbiped.gait._minimal_cycle import crossings_of, minimal_cycle
 from jaxbiped.gait._orbit import Orbit, Slopes, orbit_of, with_parameter_columns
 from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
 from jaxbiped.gait._poincare_map import LinearisedReturn
@@ -86,6 +87,8 @@ class Gait(eqx.Module):
         grazes: how often the cycle touches a switch, as a foot the ground, or misses it, by less
             than the tolerance resolves. Derivatives differ on both sides: multipliers are then
             those of one side and their errors infinite, and sensitivities NaN.
+        cycle_footsteps: the least number of footsteps after which the orbit closes: a divisor of
+            the number that was asked for.
         sound: whether the orbit is a walk: no foot deep underground, a step downhill,
             and more than a fraction of a swing between crossings (boolean).
         origin: how the search came to it, which other gaits it saw, and where the seed's gait
@@ -117,6 +120,7 @@ class Gait(eqx.Module):
     history: Scalar
     solver_steps: Scalar
     grazes: Scalar
+    cycle_footsteps: Scalar
     sound: Scalar
     origin: Origin
     orbit: tuple[Scalar, PyTree]
@@ -206,12 +210,13 @@ def summarise_gait(
     slopes = _by_parameter(orbit, measures, orbit.slopes, orbit.radius_slopes)
     # Errors of length and period add up in the speed's, whatever their signs.
     backwards = measures._replace(speed=-measures.speed)
-    errors = _by_parameter(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
+    slope_errors = _by_parameter(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
+    errors = _measure_errors(measures, orbit)
     return Gait(
         ending=found.ending,
         walk_ending=found.code,
         measures=measures,
-        measure_errors=known(_measure_errors(measures, orbit)),
+        measure_errors=known(errors),
         residual=found.residual,
         multipliers=known(stability.multipliers),
         multiplier_errors=known(stability.errors),
@@ -225,12 +230,15 @@ def summarise_gait(
             found.ending == int(Search.FOUND), stability.bifurcation, int(Bifurcation.NONE)
         ),
         sensitivities=known(jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes)),
-        sensitivity_errors=known(jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), errors)),
+        sensitivity_errors=known(
+            jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), slope_errors)
+        ),
         elasticities=known(_elasticities(scene, active, measures, slopes)),
         evaluations=found.evaluations,
         history=found.history,
         solver_steps=last.attempted,
         grazes=last.grazes,
+        cycle_footsteps=minimal_cycle(last, jnp.stack(errors.state[1:]), precision.rtol),
         sound=found.sound,
         origin=jtu.tree_map(jnp.asarray, origin),
         orbit=_path(last, start),
@@ -254,9 +262,7 @@ def _measure_errors(measures: Measures, orbit: Orbit) -> Measures:
 def _at_fixed_point(once: LinearisedReturn, orbit: Orbit) -> Measures:
     """Measures of a return, linearly extrapolated to its own fixed point."""
     m = orbit.found.recurring.shape[0]
-    assert once.nodes is not None
-    # A row is time, hip_x and then all that must return.
-    begun = once.nodes.start.reshape(-1, 2 + m)[0, 2:]
+    begun = crossings_of(once)[0]
     correction = solve(jnp.eye(m) - once.jacobian[:, :m], once.recurring - begun)
     period = once.period + once.period_row[:m] @ correction
     length = once.advance[0] + once.advance_rows[0, :m] @ correction

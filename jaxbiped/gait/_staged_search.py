@@ -16,6 +16,7 @@ from jaxbiped.gait._continuation import BranchEnd, FollowedBranch, follow_branch
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._fixed_point_search import ROUGH, Found, Search
 from jaxbiped.gait._homotopy import Homotopy, homotopy_to
+from jaxbiped.gait._minimal_cycle import cycle_of
 from jaxbiped.gait._origin import (
     MOST_OTHERS,
     FoundBy,
@@ -42,7 +43,8 @@ _STARTS = {Scene: (16, 64), RigidScene: (1024,)}
 _SPREADS = (0.3, 0.8)
 """Largest relative scatter of the starts' angles and rates, of one half and of the other."""
 _PUSHES = (-0.05, -0.01, 0.01, 0.05)
-"""Sizes (scaled) of the pushes off an unstable gait from which walks begin as well."""
+"""Sizes (scaled) of the pushes off an unstable gait from which walks begin as well, and off a
+shorter cycle from which longer ones are sought."""
 _TURNS = 20
 """Turns that each further search may take."""
 _SCATTERED = 12
@@ -62,18 +64,21 @@ class Seen(NamedTuple):
         found: the fixed point.
         by: the stage that came to it.
         radius: its spectral radius.
+        is_whole: whether its cycle has all the footsteps that were asked for.
     """
 
     found: Found
     by: FoundBy
     radius: float
+    is_whole: bool = True
 
 
 class Staged(NamedTuple):
     """What a search in stages came to.
 
     Attributes:
-        best: the stable gait, else the one of smallest spectral radius; None where none was found.
+        best: the stable gait, else the one of smallest spectral radius; one of a shorter cycle only
+            where there is no other, None where none was found.
         others: the others that were seen, by their radius.
         branch: the branch from the seed's gait, None where it was not followed.
         line: the scenes along which.
@@ -92,29 +97,31 @@ def search_in_stages(
     scene: AbstractScene,
     modelled: Scene | RigidScene,
     first: Found,
+    rtol: float,
 ) -> Staged:
     """Searches on after Newton's method from the fitted start came to `first`.
 
     Args:
         search: Newton's method.
-        turning: whose cycles are sought.
+        spec: whose cycles are sought.
         scout: how to follow the branch: cycles of one footstep, in minimal coordinates.
         scene: the walker; `modelled` in minimal coordinates.
         first: what the first stage came to.
+        rtol: relative tolerance of the solves.
     """
     seen: list[Seen] = []
     branch = line = None
     start = default_guess(modelled)
 
     def has_stable() -> bool:
-        return any(each.radius < 1.0 for each in seen)
+        return any(each.radius < 1.0 and each.is_whole for each in seen)
 
     def add(found: Found, by: FoundBy) -> None:
         # What a walk itself settles on is one, however deep.
         sound = by is FoundBy.WALKING or bool(found.sound)
         known = any(_same(found, old) for old in seen)
         if int(found.ending) == int(Search.FOUND) and sound and not known:
-            seen.append(Seen(found, by, spectral_radius(found)))
+            seen.append(Seen(found, by, spectral_radius(found), is_whole(found, spec, rtol)))
 
     def try_all(points: Sequence[np.ndarray] | np.ndarray, by: FoundBy) -> None:
         for point in points:
@@ -132,7 +139,12 @@ def search_in_stages(
     add(first, FoundBy.START)
     if not has_stable():
         walk()
-    if not has_stable():
+    shorter = [each for each in seen if not each.is_whole]
+    if shorter and not has_stable():
+        sizes = component_sizes(modelled, start)
+        for each in shorter:
+            try_all(_push_off(each.found, sizes), FoundBy.SCATTERED_STARTS)
+    elif not has_stable():
         with stage("following the seed's gait to this scene"):
             line = homotopy_to(modelled)
             branch = _follow_from_seed(search, scout, line, start)
@@ -145,7 +157,7 @@ def search_in_stages(
         with stage(f"searching from {_SCATTERED} scattered starts"):
             scattered = _columns(rolling_starts(modelled, _SCATTERED, spread=0.5, seed=2))
             try_all(scattered[1:], FoundBy.SCATTERED_STARTS)
-    ordered = sorted(seen, key=lambda each: each.radius)
+    ordered = sorted(seen, key=lambda each: (not each.is_whole, each.radius))
     return Staged(ordered[0] if ordered else None, tuple(ordered[1:]), branch, line)
 
 
@@ -172,6 +184,11 @@ def origin_of(staged: Staged, scene: Scene | RigidScene, start: WalkerState) -> 
         branch_walk_ending=code_array(branch.code),
         nearest=nearest,
     )
+
+
+def is_whole(found: Found, spec: ReturnMapSpec, rtol: float) -> bool:
+    """Whether a fixed point's cycle has all the footsteps that were asked for."""
+    return spec.steps == 1 or cycle_of(found, rtol) == spec.steps
 
 
 def spectral_radius(found: Found) -> float:
@@ -209,14 +226,14 @@ def _starts(scene: Scene | RigidScene, seen: list[Seen], count: int) -> WalkerSt
     ]
     rows = np.concatenate([_columns(half) for half in halves])
     sizes = component_sizes(scene, halves[0])
-    pushed = [row for each in seen for row in _push_off_unstable(each.found, sizes)][: count // 2]
+    pushed = [row for each in seen for row in _push_off(each.found, sizes)][: count // 2]
     if pushed:
         rows[1 : 1 + len(pushed)] = pushed
     return type(halves[0])(jnp.zeros(count), *map(jnp.asarray, rows.T))
 
 
-def _push_off_unstable(found: Found, sizes: np.ndarray) -> list[np.ndarray]:
-    """States just off an unstable gait, along its leading direction."""
+def _push_off(found: Found, sizes: np.ndarray) -> list[np.ndarray]:
+    """States just off a gait, along its leading direction."""
     m = len(sizes)
     point = np.asarray(found.recurring)
     values, vectors = np.linalg.eig(np.asarray(found.last.jacobian)[:, :m])

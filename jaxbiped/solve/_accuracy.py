@@ -59,8 +59,8 @@ class Accuracy(NamedTuple):
 
 
 ACCURACIES = {
-    "draft": Accuracy(2e-5, 1e-4, Precision(1e-4, 1e-3), Precision(1e-6, 1e-5), 32768),
-    "balanced": Accuracy(1e-6, 1e-6, Precision(3e-7, 3e-6), Precision(1e-9, 1e-8), 32768),
+    "draft": Accuracy(2e-5, 1e-4, Precision(1e-4, 1e-3), Precision(1e-6, 1e-5), 16384),
+    "balanced": Accuracy(1e-6, 1e-6, Precision(3e-7, 3e-6), Precision(1e-9, 1e-8), 16384),
     "tight": Accuracy(2e-9, 1e-11, Precision(1e-9, 1e-8), Precision(1e-12, 1e-11), 32768),
 }
 """Named accuracies; the absolute tolerance is a hundredth of the relative one."""

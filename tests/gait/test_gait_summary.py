@@ -14,6 +14,7 @@ from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import walking_spec
 from jaxbiped.gait._stability import Stability
 from jaxbiped.scene._parameters import select_parameters
+from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._solve_to_section import Nodes
 
 NAMES = ("K", "hip_mass")
@@ -64,7 +65,7 @@ def summary():
         patch.setattr(_gait, "orbit_of", lambda *_, **__: orbit)
         patch.setattr(_gait, "with_parameter_columns", lambda *given: given[-1])
         return _gait.summarise_gait.__wrapped__(
-            spec, scene, start, None, orbit.found, NAMES, active, True, origin
+            spec, scene, start, Precision(0.0, 0.0), orbit.found, NAMES, active, True, origin
         )
 
     yield summarised

@@ -46,6 +46,24 @@ def test_fixed_points_of_the_simplest_walker(published):
         assert abs(last) < 1e-9
 
 
+@pytest.mark.parametrize(
+    ("slope", "asked", "least"), [(0.06, 2, 1), (0.102, 2, 2), (0.102, 4, 2), (0.102, 3, 3)]
+)
+def test_the_least_number_of_footsteps_is_that_of_the_map_itself(slope, asked, least):
+    """The orbit closes under the return map then, and not before; a longer cycle is sought."""
+    scene = jb.with_parameters(rigid_seed(), {"slope": slope})
+    gait = jb.find_gait(scene, footsteps=asked, **PLAIN)
+    assert gait.outcome is jb.gait.Search.FOUND
+    assert int(gait.cycle_footsteps) == least
+    state, first = gait.measures.state, np.array(gait.measures.state[1:])
+    for k in range(1, asked + 1):
+        state = jb.return_map(scene, state).state
+        off = np.max(np.abs(np.array(state[1:]) - first))
+        assert bool(off < 1e-4) is (k % least == 0)
+    said = jb.gait.explain_search(scene, gait)
+    assert (f"closes after {least} of the {asked} footsteps" in said) is (least < asked)
+
+
 def test_first_period_doubling_of_the_simplest_walker():
     seen = {"state": simplest_state(*STABLE)}
 

@@ -64,7 +64,9 @@ def staged(monkeypatch, first, *, walking=(), branch=None, scattered=(), engine=
     monkeypatch.setattr(_staged_search, "settle_walks", walks)
     monkeypatch.setattr(_staged_search, "_follow_from_seed", follow)
     scout = SimpleNamespace(engine=engine)
-    return search_in_stages(search, None, scout, SCENE, SCENE, first), took
+    return search_in_stages(
+        search, SimpleNamespace(steps=1), scout, SCENE, SCENE, first, 1e-9
+    ), took
 
 
 def test_a_stable_gait_ends_the_search_and_an_unstable_one_does_not(monkeypatch):
@@ -135,6 +137,7 @@ def gait(outcome, *, end=BranchEnd.NOT_FOLLOWED, stable=True, others=(), grazes=
     return SimpleNamespace(
         outcome=outcome, found_by="walks", others=others, grazes=grazes, stable=stable,
         walk_outcome=jb.Ending.STUMBLED,
+        orbit=(np.zeros((1, 1)),), cycle_footsteps=1,
         origin=SimpleNamespace(branch_end=int(end), nearest=nearest, branch_walk_ending=walk),
     )  # fmt: skip
 
