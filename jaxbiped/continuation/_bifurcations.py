@@ -145,7 +145,9 @@ def locate_near(
             for way in (-1.0, 1.0)
         )
         if here is not None and there is not None and test(here) * test(there) < 0.0:
-            return locate(curve, here, there, test)
+            found = locate(curve, here, there, test)
+            if found is not None:
+                return found
     return None
 
 

@@ -17,6 +17,8 @@ _CONTRACTION = 0.6
 _MOST_SECANTS = 24
 _BESIDE = 1e-6
 """Share of an interval by which a search moves aside from where it fails."""
+_ASIDES = (0.05, 0.1, 0.2)
+"""Shares of an interval between the points from which a zero is interpolated."""
 _ZERO = 1e-10
 """A test function as small as this has been located."""
 
@@ -185,7 +187,9 @@ def locate(
 ) -> CurvePoint | None:
     """The point between two where a test function that has other signs there vanishes.
 
-    By the secant rule with Illinois's halving; None where the curve is lost in between.
+    By the secant rule with Illinois's halving. Where the curve is lost on the way, as where another
+    crosses it, by interpolation between points on both sides, or as near as it came; None where
+    there is no such point.
     """
     ends = [0.0, _advance(here, there)]
     values = [test(here), test(there)]
@@ -198,7 +202,8 @@ def locate(
             length += _BESIDE * (b - a)
             found = _at_length(curve, here, best or here, length)
         if found is None:
-            return best
+            beside = (_interpolated(curve, here, there, length, test, aside) for aside in _ASIDES)
+            return next((each for each in beside if each is not None), best)
         value = test(found)
         if abs(value) < least:
             best, least = found, abs(value)
@@ -209,6 +214,43 @@ def locate(
         else:
             ends, values = [a, length], [0.5 * u, value]
     return best
+
+
+def _interpolated(
+    curve: Curve,
+    here: CurvePoint,
+    there: CurvePoint,
+    length: float,
+    test: Callable[[CurvePoint], float],
+    aside: float,
+) -> CurvePoint | None:
+    """Where a test function vanishes near a length from `here`, by a cubic through four points.
+
+    They lie `aside` and twice that, in units of the interval: Newton's method finds points about a
+    crossing of two curves, but none at it.
+    """
+    whole = _advance(here, there)
+    middle = float(np.clip(length, 2.0 * aside * whole, (1.0 - 2.0 * aside) * whole))
+    nodes = middle + aside * whole * np.array([-2.0, -1.0, 1.0, 2.0])
+    near = [here if at < 0.5 * whole else there for at in nodes]
+    points = [_at_length(curve, here, a, float(at)) for a, at in zip(near, nodes, strict=True)]
+    known = [point for point in points if point is not None]
+    if len(known) < len(nodes):
+        return None
+    values = np.array([test(point) for point in known])
+    scaled = (nodes - middle) / whole
+    zeros = np.roots(np.polyfit(scaled, values, 3))
+    zeros = zeros[np.abs(zeros.imag) < _BESIDE].real
+    zeros = zeros[np.abs(zeros) <= 2.0 * aside]
+    if not len(zeros):
+        return None
+    zero = zeros[np.argmin(np.abs(zeros))]
+    place, tangent = (
+        np.array([np.polyval(each, zero) for each in np.polyfit(scaled, np.stack(rows), 3).T])
+        for rows in ([each.place for each in known], [each.tangent for each in known])
+    )
+    change = curve.change(place[:-1] * curve.sizes[:-1], float(place[-1] * curve.sizes[-1]))
+    return None if change.code else CurvePoint(place, tangent / np.linalg.norm(tangent), change)
 
 
 def _at_length(
