@@ -66,6 +66,7 @@ def branch_numbers(branch: Branch) -> JsonObject:
                 "multiplier": [each.multiplier.real, each.multiplier.imag],
                 "error": each.error,
                 "value_error": None if math.isnan(each.value_error) else each.value_error,
+                "beyond": None if math.isnan(each.beyond) else each.beyond,
             }
             for each in branch.bifurcations
         ],

@@ -98,8 +98,10 @@ def bifurcation_curve(
     """
     check_type("branch", branch, Branch)
     check_type("bifurcation", bifurcation, BifurcationPoint)
-    if bifurcation.kind is BranchEvent.LIMIT:
-        raise ArgumentError("bifurcation is not allowed: a limit is no zero of a test function.")
+    if bifurcation.kind in (BranchEvent.LIMIT, BranchEvent.NOT_LOCATED):
+        raise ArgumentError(
+            f"bifurcation is not allowed: {bifurcation} is no zero of a test function."
+        )
     second = axis_of(branch.scene, along, bounds, log)
     if along == branch.along:
         raise ArgumentError(f"along = {along!r} is not allowed: the branch itself follows it.")

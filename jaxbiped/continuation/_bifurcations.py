@@ -37,6 +37,8 @@ class BranchEvent(enum.StrEnum):
     - neimark-sacker: a complex pair on the unit circle.
     - branch-point: one at +1 where the parameter does not turn back: branches cross.
     - limit: the branch ends by a limit of the model (see `LimitCause`).
+    - not-located: multipliers cross the unit circle between two neighbouring points, but where was
+      not found.
     """
 
     FOLD = "fold"
@@ -44,6 +46,7 @@ class BranchEvent(enum.StrEnum):
     NEIMARK_SACKER = "neimark-sacker"
     BRANCH_POINT = "branch-point"
     LIMIT = "limit"
+    NOT_LOCATED = "not-located"
 
 
 EVENTS = tuple(BranchEvent)
@@ -62,13 +65,17 @@ class BifurcationPoint(NamedTuple):
 
     Attributes:
         kind: what happens there.
-        point: the gait there; at a limit the last before it.
-        multiplier: the critical multiplier; at a limit the largest.
+        point: the gait there; at a limit the last before it, of an interval in which it was not
+            located that at one end.
+        multiplier: the critical multiplier; at a limit the largest, where it was not located that
+            nearest to the unit circle.
         error: its estimated error.
         value_error: estimated error of the parameter's value, SI units: how far from there the
             witness of the cycle, ten times looser, has the same, and at least what the errors of
             the critical multiplier nearby make of it; NaN at a limit, and at a fold where the
-            witness has none nearby.
+            witness has none nearby. Where it was not located, the length of the interval.
+        beyond: the parameter's value at the other end of the interval where it was not located, SI
+            units, else NaN.
     """
 
     kind: BranchEvent
@@ -76,6 +83,12 @@ class BifurcationPoint(NamedTuple):
     multiplier: complex
     error: float
     value_error: float = float("nan")
+    beyond: float = float("nan")
+
+    def __str__(self) -> str:
+        if self.kind is BranchEvent.NOT_LOCATED:
+            return f"{self.kind} between {self.beyond:.6g} and {self.value:.6g}"
+        return f"{self.kind} at {self.value:.6g}"
 
     @property
     def value(self) -> float:
@@ -130,6 +143,25 @@ def bifurcations_between(
                 off = _with_multiplier_errors(off, kind, point, ends)
             found.append((place, BifurcationPoint(kind, point, value, error, off)))
     return sorted(found, key=lambda each: float((each[0].place - here.place) @ here.tangent))
+
+
+def explains(here: CurvePoint, there: CurvePoint, kinds: list[BranchEvent]) -> bool:
+    """Whether bifurcations of these kinds make of the multipliers outside the unit circle at one
+    point those at the other."""
+    before, after = (
+        int(np.sum(np.abs(multipliers_of(each.change)) > 1.0)) for each in (here, there)
+    )
+    most = sum(2 if kind is BranchEvent.NEIMARK_SACKER else 1 for kind in kinds)
+    change = abs(after - before)
+    return change == 0 or (change <= most and (most - change) % 2 == 0)
+
+
+def not_located(point: BranchPoint, beyond: float) -> BifurcationPoint:
+    """The entry of an interval in which multipliers cross, from a value to a point."""
+    nearest = int(np.argmin(np.abs(np.abs(point.multipliers) - 1.0)))
+    value, error = complex(point.multipliers[nearest]), float(point.multiplier_errors[nearest])
+    width = abs(point.value - beyond)
+    return BifurcationPoint(BranchEvent.NOT_LOCATED, point, value, error, width, beyond)
 
 
 def locate_near(

@@ -27,8 +27,8 @@ class Branch(eqx.Module):
     Attributes:
         scene: the walker; on the branch its parameter takes other values.
         points: the gaits, each a `BranchPoint`.
-        bifurcations: folds, period doublings, Neimark–Sacker points and limits, in their order
-            along the branch, each a `BifurcationPoint`.
+        bifurcations: folds, period doublings, Neimark–Sacker points, limits and what was not
+            located, in their order along the branch, each a `BifurcationPoint`.
         stops: how the branch ended at its two ends, each a `BranchStop`.
         axis: the parameter and its range.
         state_type: of the states on the section.
@@ -52,7 +52,7 @@ class Branch(eqx.Module):
     def __repr__(self) -> str:
         low, high = self.values.min(initial=np.inf), self.values.max(initial=-np.inf)
         span = f"{low:.6g} to {high:.6g}" if len(self) else "none"
-        kinds = ", ".join(f"{each.kind} at {each.value:.6g}" for each in self.bifurcations)
+        kinds = ", ".join(map(str, self.bifurcations))
         return (
             f"Branch({len(self)} gaits of {self.footsteps} footsteps along {self.axis.name}: "
             f"{span}; {kinds or 'no bifurcations'}; ends: {self.stops[0].end}, "

@@ -47,6 +47,8 @@ def branch_dataset(branch: "Branch") -> "xarray.Dataset":
     variables["event_error"] = ("event", errors, {"units": ""})
     offs = np.array([each.value_error for each in branch.bifurcations], float)
     variables["event_value_error"] = ("event", offs, {"units": branch.unit})
+    beyond = np.array([each.beyond for each in branch.bifurcations], float)
+    variables["event_beyond"] = ("event", beyond, {"units": branch.unit})
     settings = {
         "along": branch.along,
         "axis": branch.axis._asdict(),

@@ -72,7 +72,10 @@ def continue_gait(
         progress: whether to show a bar on stderr.
 
     Returns:
-        The branch; without points where no gait was found, its `stops` then tell why.
+        The branch; without points where no gait was found, its `stops` then tell why. It passes no
+        gait twice: where it comes to one again, it ends as "closed", or as "jumped" where a step
+        led back to it. Between two points that differ in how many multipliers lie outside the unit
+        circle there is always an entry, "not-located" where the bifurcation was not found.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
@@ -107,17 +110,23 @@ def continue_gait(
             bar.update()
             bar.set_postfix_str(f"{along} = {point.value:.6g}", refresh=False)
 
-        before, after = (
-            trace(
+        def onwards(begin: CurvePoint, passed: list[BranchPoint]) -> Trace:
+            return trace(
                 setup.curve,
                 axis,
-                begin._replace(tangent=way * begin.tangent),
+                begin,
                 largest_step=float(largest_step),
                 max_points=int(max_points),
+                passed=passed,
                 tell=tell,
             )
-            for way in (-1.0, 1.0)
-        )
+
+        before = onwards(begin._replace(tangent=-begin.tangent), [])
+        known = before.reversed()
+        if before.stop.end is BranchEnd.CLOSED:
+            after = Trace(known.points[-1:], [], before.stop)
+        else:
+            after = onwards(begin, known.points[:-1])
     before, after = map(setup.with_cause, (before, after))
     return setup.branch(before.reversed(), after)
 

@@ -53,16 +53,15 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
     state_type = _STATES[settings["state_type"]]
     special = _points(dataset, state_type, settings["along"], "event_")
     events = [
-        BifurcationPoint(
-            EVENTS[int(kind)], point, complex(real, imaginary), float(error), float(value_error)
-        )
-        for kind, point, real, imaginary, error, value_error in zip(
+        BifurcationPoint(EVENTS[int(kind)], point, complex(real, imaginary), *map(float, errors))
+        for kind, point, real, imaginary, *errors in zip(
             _column(dataset, "event_kind"),
             special,
             _column(dataset, "event_multiplier_real"),
             _column(dataset, "event_multiplier_imag"),
             _column(dataset, "event_error"),
             _column(dataset, "event_value_error"),
+            _column(dataset, "event_beyond"),
             strict=True,
         )
     ]

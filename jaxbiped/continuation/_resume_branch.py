@@ -71,9 +71,16 @@ def resume_branch(
     begin = correct(setup.curve, last.place, along, along)
     if begin.found is None:
         raise ArgumentError(f"at = {at} is not allowed: from there the walk does not return.")
-    beyond = trace(setup.curve, axis, begin.found, largest_step=largest_step, max_points=max_points)
     events = _events_at(branch, kept, forward=forward)
     known = Trace(points, events, branch.stops[0 if forward else 1])
+    beyond = trace(
+        setup.curve,
+        axis,
+        begin.found,
+        largest_step=largest_step,
+        max_points=max_points,
+        passed=(known if forward else known.reversed()).points[:-1],
+    )
     return setup.branch(known, beyond) if forward else setup.branch(beyond.reversed(), known)
 
 

@@ -1,6 +1,6 @@
 """Trace of a curve of gaits in one direction: its points, its bifurcations, and how it ends."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import islice
 from typing import NamedTuple
 
@@ -12,9 +12,12 @@ from jaxbiped.continuation._bifurcations import (
     BifurcationPoint,
     BranchEvent,
     bifurcations_between,
+    explains,
+    not_located,
 )
 from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint, branch_point
 from jaxbiped.continuation._limit_cause import NOT_SMOOTH, OF_ENDINGS
+from jaxbiped.continuation._retrace import passed_before
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, follow
 
@@ -73,6 +76,7 @@ def trace(
     largest_step: float,
     max_points: int,
     until: BranchEvent | None = None,
+    passed: Sequence[BranchPoint] = (),
     tell: Callable[[BranchPoint], object] = lambda point: None,
 ) -> Trace:
     """Follows a curve of gaits onwards along a point's tangent; that point is the first.
@@ -83,6 +87,7 @@ def trace(
         largest_step: arclength of a step at most.
         max_points: points at most.
         until: a kind of bifurcation at the first of which to stop.
+        passed: points of the same branch before the first, in their order.
         tell: is called with each point.
     """
     points = [branch_point(curve, axis, begin)]
@@ -104,18 +109,28 @@ def trace(
         if attempt.found is None:
             return stopped(*reason_of(attempt.code))
         there = attempt.found
-        for place, event in bifurcations_between(curve, axis, here, there):
+        closes = len(points) > 3 and _closes(begin, here, there)
+        if closes:  # beyond its beginning everything is known
+            there = begin
+        elif (cosine := passed_before(curve, [*passed, *points], there)) is not None:
+            if cosine > 0.0:
+                return stopped(BranchEnd.CLOSED, "the branch is closed")
+            return stopped(BranchEnd.JUMPED, "a step jumped to gaits that the branch had passed")
+        located = bifurcations_between(curve, axis, here, there)
+        for place, event in located:
             points.append(branch_point(curve, axis, place))
             events.append(event)
             if event.kind is until:
                 return stopped(BranchEnd.UNFINISHED, f"stopped at the {until}")
         points.append(branch_point(curve, axis, there))
+        if not explains(here, there, [event.kind for _, event in located]):
+            events.append(not_located(points[-1], axis.value(float(here.place[-1]))))
         tell(points[-1])
         if abs(points[-1].multipliers[0]) > _DIVERGED:
             return stopped(BranchEnd.BREAKS_OFF, NOT_SMOOTH)
         if is_bound(there):
             return stopped(BranchEnd.REACHED, BOUND)
-        if len(points) > 3 and _closes(begin, here, there):
+        if closes:
             return stopped(BranchEnd.CLOSED, "the branch is closed")
         here = there
     return stopped(BranchEnd.UNFINISHED, f"{max_points} points were followed")

@@ -41,6 +41,7 @@ class BranchEnd(enum.IntEnum):
     - no walk: beyond, the orbit is none of a walk (see `Search`).
     - closed: it came back to its beginning.
     - branches off: it begins at another branch.
+    - jumped: a step led back to gaits that it had passed.
     """
 
     NOT_FOLLOWED = 0
@@ -53,6 +54,7 @@ class BranchEnd(enum.IntEnum):
     NO_WALK = 7
     CLOSED = 8
     BRANCHES_OFF = 9
+    JUMPED = 10
 
     def __str__(self) -> str:
         return self.name.lower().replace("_", " ")

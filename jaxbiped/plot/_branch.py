@@ -35,6 +35,7 @@ _MARKS = {
     BranchEvent.NEIMARK_SACKER: ("^", "Neimark–Sacker"),
     BranchEvent.BRANCH_POINT: ("P", "branch point"),
     BranchEvent.LIMIT: ("X", "limit of the model"),
+    BranchEvent.NOT_LOCATED: ("*", "bifurcation, not located"),
 }
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe and Ito's colours: one for each number of footsteps."""

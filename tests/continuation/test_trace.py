@@ -6,6 +6,7 @@ import pytest
 from jaxbiped._ending import Ending
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch_point import NO_WALK, is_stable
+from jaxbiped.continuation._retrace import passed_before
 from jaxbiped.continuation._trace import trace
 from jaxbiped.gait._continuation import BranchEnd
 from tests.continuation.maps import (
@@ -137,6 +138,53 @@ def test_a_jump_of_the_map_is_named_grazing():
     assert found.stop.end is BranchEnd.BREAKS_OFF
     assert "grazing" in found.stop.cause
     assert found.stop.value == pytest.approx(0.6, abs=1e-4)
+
+
+def test_a_crossing_that_is_not_located_has_an_entry_all_the_same():
+    """The multiplier jumps over 1 at r = 1/2: no point has it there."""
+    slope = lambda r: 0.5 + (r > 0.5)
+    curve, axis = curve_of(
+        lambda x, r: np.array([slope(r) * x[0]]),
+        lambda x, r: np.array([[slope(r), 0.0]]),
+        (0.0, 1.0),
+    )
+    found = trace(curve, axis, begin_at(curve, axis, [0.0], 0.01), **USUAL)
+    (event,) = found.bifurcations
+    assert event.kind is BranchEvent.NOT_LOCATED
+    assert event.beyond <= 0.5 <= event.value
+    assert event.value_error == pytest.approx(event.value - event.beyond)
+    assert str(event).startswith("not-located between 0.4")
+
+
+def test_a_closed_curve_is_passed_once_from_a_point_of_it_that_is_no_fold():
+    """Fixed points on the circle x² + (r − 1/2)² = 1/16, with a fold at either end."""
+    curve, axis = curve_of(
+        lambda x, r: np.array([x[0] + 0.1 * (x[0] ** 2 + (r - 0.5) ** 2 - 0.0625)]),
+        lambda x, r: np.array([[1.0 + 0.2 * x[0], 0.2 * (r - 0.5)]]),
+        (0.0, 1.0),
+    )
+    begin = begin_at(curve, axis, [-0.25], 0.45)
+    found = trace(curve, axis, begin, **USUAL)
+    assert found.stop.end is BranchEnd.CLOSED
+    assert [event.kind for event in found.bifurcations] == [BranchEvent.FOLD] * 2
+    np.testing.assert_allclose([event.value for event in found.bifurcations], [0.75, 0.25])
+    np.testing.assert_array_equal(found.points[-1].place, begin.place)
+    # From a gait that was passed a branch goes no further, and says in which sense it came to it.
+    for way, end in ((1.0, BranchEnd.CLOSED), (-1.0, BranchEnd.JUMPED)):
+        onto = begin._replace(tangent=way * begin.tangent)
+        again = trace(curve, axis, onto, passed=found.points, **USUAL)
+        assert (again.stop.end, len(again.points), again.bifurcations) == (end, 1, [])
+
+
+def test_sheets_that_a_fold_joins_are_no_gait_twice():
+    curve, axis = saddle_node((-1e-4, 0.5))
+    begin = begin_at(curve, axis, [0.5], 0.25)
+    there = begin._replace(tangent=-begin.tangent)
+    found = trace(curve, axis, there, largest_step=0.2, max_points=200)
+    assert found.stop.end is BranchEnd.REACHED
+    place = found.points[3].place + 1e-3 * found.points[3].tangent
+    again = begin_at(curve, axis, place[:1], axis.value(place[-1]))
+    assert passed_before(curve, found.points, again) == pytest.approx(-1.0, abs=1e-6)
 
 
 def test_it_stops_at_the_first_of_a_kind():
