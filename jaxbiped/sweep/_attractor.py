@@ -31,7 +31,11 @@ class Attractor(NamedTuple):
         metric: W, shape (m − 1, m): |W (x − x*)| falls by the `contraction` in a cycle near it.
         contraction: of that distance, below 1.
         radius: distance within which every start is taken to converge: all of a sample on shells
-            up to there came nearer in one cycle. Negative where it was not measured, or none did.
+            up to there came nearer (see `with_radius`). Negative where it was not measured, or none
+            did.
+        model: B, shape (m − 1, m − 1): W (x − x*) is B times that after a cycle, to first order.
+        crossings: its states on the section, those of the other footsteps as well, shape
+            (cycle_footsteps, m).
     """
 
     cycle_footsteps: int
@@ -42,6 +46,8 @@ class Attractor(NamedTuple):
     metric: np.ndarray
     contraction: float
     radius: float
+    model: np.ndarray
+    crossings: np.ndarray
 
     @property
     def point(self) -> np.ndarray:
@@ -53,10 +59,8 @@ class Attractor(NamedTuple):
         return np.linalg.norm((states - self.point) @ self.metric.T, axis=1)
 
 
-def attractor_without_radius(scene: Scene | RigidScene, gait: Gait, length: int) -> Attractor:
+def attractor_without_radius(scene: Scene | RigidScene, gait: Gait) -> Attractor:
     """A gait's metric, from its return map's derivative; its radius is not known yet.
-
-    `length` counts the footsteps in its cycle.
 
     The metric is Lyapunov's for the derivative A on the section: with a contraction q between the
     spectral radius and 1, P = Σ (A/q)ᵏᵀ S (A/q)ᵏ gives |A e| ≤ q |e|, S measuring each component
@@ -81,7 +85,7 @@ def attractor_without_radius(scene: Scene | RigidScene, gait: Gait, length: int)
     squared = scipy.linalg.solve_discrete_lyapunov(slopes.T / contraction, weights)
     factor = np.linalg.cholesky(0.5 * (squared + squared.T))
     return Attractor(
-        cycle_footsteps=length,
+        cycle_footsteps=int(gait.cycle_footsteps),
         duration=float(gait.measures.period),
         step_length=float(gait.measures.step_length),
         state=state,
@@ -89,6 +93,8 @@ def attractor_without_radius(scene: Scene | RigidScene, gait: Gait, length: int)
         metric=factor.T @ tangents.T,
         contraction=contraction,
         radius=-1.0,
+        model=factor.T @ slopes @ np.linalg.inv(factor.T),
+        crossings=np.stack([np.asarray(leaf)[:, 0] for leaf in gait.orbit[1][1:]], axis=1),
     )
 
 

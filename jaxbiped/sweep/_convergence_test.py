@@ -1,6 +1,7 @@
 """Convergence test: what arrivals so far tell of a walk, and when its label is certain."""
 
 import functools
+import math
 import operator
 from typing import NamedTuple
 
@@ -14,6 +15,11 @@ DEPTH = 4
 """Longest cycle [footsteps] that is recognised where no gait is known."""
 _AGAIN = 3
 """Arrivals in a row that must each be near the one a cycle before."""
+_IN_A_ROW, _OFF, _NOISE = 4, 0.1, 30.0
+"""Cycles in a row for which a walk must do what a gait's linear model says; how far it may be off
+as a share of the distance, and besides in units of the solver's tolerance."""
+_CYCLE = 1e-2
+"""Share of the change within a cycle that may be left after it, where it repeats itself."""
 _NEARING = 0.999
 """Share of the distance from a known gait, a cycle ago, below which it may be where this ends."""
 UNDECIDED = int(Label.PENDING)
@@ -24,7 +30,9 @@ class ArrivalHistory(NamedTuple):
 
     Attributes:
         recent: states at the last `DEPTH` of them, the latest first, without hip_x.
-        distances: of each gait's point, at as many of the last ones as its cycle has.
+        distances: of each gait's point, at as many of the last ones as two of its cycles have.
+        steady: for each gait, at as many of the last ones as its cycle has, how many arrivals a
+            cycle apart did what its linear model says.
         closest: smallest distance of any.
         rate: share of the distance that is left after a footstep, from the last cycle; NaN before.
         repeats: for cycles of 1, 2, … footsteps, how many arrivals in a row repeated one.
@@ -35,6 +43,7 @@ class ArrivalHistory(NamedTuple):
 
     recent: tuple[tuple[Scalar, ...], ...]
     distances: tuple[tuple[Scalar, ...], ...]
+    steady: tuple[tuple[Scalar, ...], ...]
     closest: Scalar
     rate: Scalar
     repeats: tuple[Scalar, ...]
@@ -49,7 +58,8 @@ def empty_history(zero: Scalar, size: int, cycles: tuple[int, ...]) -> ArrivalHi
     far = zero + jnp.inf
     return ArrivalHistory(
         recent=tuple([tuple([far] * size)] * DEPTH),
-        distances=tuple(tuple([far] * length) for length in cycles),
+        distances=tuple(tuple([far] * (2 * length)) for length in cycles),
+        steady=tuple(tuple([none] * length) for length in cycles),
         closest=far,
         rate=zero + jnp.nan,
         repeats=tuple([none] * DEPTH),
@@ -65,29 +75,43 @@ def after_arrival(
     goals: Goals,
     cycles: tuple[int, ...],
     gap: Scalar,
+    rtol: Scalar,
 ) -> ArrivalHistory:
-    """After an arrival in this state.
+    """After an arrival in this state; `rtol` is the solver's tolerance.
 
     It converges to a known gait where it lies within that gait's radius, and nearer than a cycle
     before, or within `gap` of the state then: at the gait itself rounding decides which is nearer.
+    Also where it does for several cycles what that gait's linear model says, and comes nearer, or
+    is so near that the tolerance hides by how much: slow gaits are recognised by that.
     Where each of several arrivals in a row differs from the one a cycle before by less
     than `gap` (in units of the scales, root mean square), and no known gait comes nearer, it
     converges to some other one: the verdict is then "unresolved", with the cycle's footsteps.
     """
     repeats = _repeats(trace, state, goals, gap)
-    distances, certain, rates = [], [], []
+    distances, steadies, certain, rates = [], [], [], []
     nearing = jnp.asarray(False)
     for g, length in enumerate(cycles):
         distance = _distance(goals, g, state)
-        before = trace.distances[g][-1]
+        before, earlier = trace.distances[g][length - 1], trace.distances[g][-1]
         nearer = distance < before
-        nearing |= jnp.isfinite(before) & (distance < _NEARING * before)
+        for old in (before, earlier):
+            nearing |= jnp.isfinite(old) & (distance < _NEARING * old)
         # Of a longer cycle only the arrivals tell that are near the point itself.
-        for other in trace.distances[g][:-1]:
+        for other in trace.distances[g][: length - 1]:
             nearing |= other < _NEARING * distance
+        steady = jnp.zeros_like(trace.goal)
         if length <= DEPTH:
             nearer |= repeats[length - 1] > 0
-        certain.append((distance <= goals.radii[g]) & jnp.isfinite(before) & nearer)
+            # Not farther than the tolerance hides, where it hides what the gait draws in.
+            hidden = (1.0 - goals.contractions[g]) * distance < _NOISE * rtol
+            allowed = earlier + jnp.where(hidden, _NOISE * rtol, 0.0)
+            does = _does_as_predicted(trace, state, goals, g, length, rtol)
+            does &= jnp.isfinite(earlier) & (distance < allowed)
+            steady = jnp.where(does, trace.steady[g][-1] + 1, 0)
+        nearing |= steady > 0
+        inside = (distance <= goals.radii[g]) & jnp.isfinite(before) & nearer
+        certain.append(inside | (steady >= _IN_A_ROW))
+        steadies.append((steady, *trace.steady[g][:-1]))
         rates.append((distance / before) ** (1.0 / length))
         distances.append((distance, *trace.distances[g][:-1]))
     verdict, cycle, goal = trace.verdict, trace.cycle_footsteps, trace.goal
@@ -99,7 +123,7 @@ def after_arrival(
     for g in range(len(cycles)):
         nearer = distances[g][0] < nearest
         # Far from every gait the nearest one tells the rate.
-        known = jnp.isfinite(trace.distances[g][-1]) & jnp.isfinite(rates[g])
+        known = jnp.isfinite(trace.distances[g][cycles[g] - 1]) & jnp.isfinite(rates[g])
         rate = jnp.where(nearer & known, rates[g], rate)
         nearest = jnp.minimum(nearest, distances[g][0])
     for g, length in reversed(list(enumerate(cycles))):
@@ -107,11 +131,12 @@ def after_arrival(
         cycle = jnp.where(certain[g], length, cycle)
         goal = jnp.where(certain[g], g, goal)
         # Where nothing but rounding is left of the distance it says nothing.
-        left = jnp.where(distances[g][0] < trace.distances[g][-1], rates[g], jnp.nan)
+        left = jnp.where(distances[g][0] < distances[g][length], rates[g], jnp.nan)
         rate = jnp.where(certain[g], left, rate)
     return ArrivalHistory(
         recent=(state, *trace.recent[:-1]),
         distances=tuple(distances),
+        steady=tuple(steadies),
         closest=jnp.minimum(trace.closest, nearest),
         rate=rate,
         repeats=repeats,
@@ -123,21 +148,63 @@ def after_arrival(
 
 def _distance(goals: Goals, g: int, state: tuple[Scalar, ...]) -> Scalar:
     """From a gait's point, in its metric; infinite where there is no such gait."""
-    off = [x - goals.points[g, i] for i, x in enumerate(state)]
-    rows = range(goals.metrics.shape[1])
-    parts = [_sum([goals.metrics[g, j, i] * e for i, e in enumerate(off)]) for j in rows]
-    distance = jnp.sqrt(_sum([part * part for part in parts]))
+    distance = _size(_image(goals, g, state))
     return jnp.where(goals.radii[g] == NO_GAIT, jnp.inf, distance)
+
+
+def _does_as_predicted(
+    trace: ArrivalHistory,
+    state: tuple[Scalar, ...],
+    goals: Goals,
+    g: int,
+    length: int,
+    rtol: Scalar,
+) -> Scalar:
+    """Whether the last cycle, or the last two together, were those of the gait's linear model.
+
+    It may be off by a tenth: corrections of a higher order than the first, of which the next alone
+    counts, then change no sign on the way to the gait. Near a multiplier of −1 it is right over two
+    cycles from farther away.
+    """
+    now, does = _image(goals, g, state), jnp.asarray(False)
+    for cycles in range(1, DEPTH // length + 1)[:2]:
+        then = _image(goals, g, trace.recent[cycles * length - 1])
+        predicted = then
+        for _ in range(cycles):
+            predicted = _times(goals.models[g], predicted)
+        off = _size([a - b for a, b in zip(now, predicted, strict=True)])
+        does |= off <= _OFF * _size(then) + _NOISE * rtol
+    return does
+
+
+def _image(goals: Goals, g: int, state: tuple[Scalar, ...]) -> list[Scalar]:
+    """The offset from a gait's point in its metric."""
+    return _times(goals.metrics[g], [x - goals.points[g, i] for i, x in enumerate(state)])
+
+
+def _times(matrix: Scalar, vector: list[Scalar]) -> list[Scalar]:
+    rows = range(matrix.shape[0])
+    return [_sum([matrix[j, i] * each for i, each in enumerate(vector)]) for j in rows]
+
+
+def _size(parts: list[Scalar]) -> Scalar:
+    return jnp.sqrt(_sum([part * part for part in parts]))
 
 
 def _repeats(
     trace: ArrivalHistory, state: tuple[Scalar, ...], goals: Goals, gap: Scalar
 ) -> tuple[Scalar, ...]:
-    counts = []
-    for old, count in zip(trace.recent, trace.repeats, strict=True):
+    offs: list[Scalar] = []
+    for old in trace.recent:
         parts = [(x - y) / goals.scales[i] for i, (x, y) in enumerate(zip(state, old, strict=True))]
-        off = jnp.sqrt(_sum([part * part for part in parts]) / len(parts))
-        counts.append(jnp.where(off < gap, count + 1, 0))
+        offs.append(_size(parts) / math.sqrt(len(parts)))
+    counts = []
+    for length, (off, count) in enumerate(zip(offs, trace.repeats, strict=True), 1):
+        again = off < gap
+        for shorter in (k for k in range(1, length) if length % k == 0):
+            # A slow transient about a shorter cycle comes back as well, but less far each time.
+            again &= off < jnp.maximum(_CYCLE * offs[shorter - 1], _CYCLE * gap)
+        counts.append(jnp.where(again, count + 1, 0))
     return tuple(counts)
 
 

@@ -118,12 +118,16 @@ class Family(NamedTuple):
         goals = Goals(
             np.zeros((count, size)),
             np.zeros((count, size - 1, size)),
+            np.zeros((count, size - 1, size - 1)),
+            np.zeros(count),
             np.full(count, NO_GAIT),
             self.scales[k],
         )
         for place, gait in zip(_places(self.rows[k], cycles), self.rows[k], strict=True):
             goals.points[place] = gait.point
             goals.metrics[place] = gait.metric
+            goals.models[place] = gait.model
+            goals.contractions[place] = gait.contraction
             goals.radii[place] = gait.radius
         return goals
 

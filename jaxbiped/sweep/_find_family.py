@@ -17,7 +17,8 @@ from jaxbiped.sweep._family import Family
 from jaxbiped.sweep._radius import with_radius
 
 _SAME = 1e-5
-"""Relative difference of duration and length up to which two finds are of one gait."""
+"""Distance in the components' sizes up to which two states on the section are of one gait, where
+its convergence is quick."""
 
 
 def find_family(
@@ -49,7 +50,7 @@ def find_family(
         if not rows[k]:
             own = scene_with(scene, names, table[k])
             guesses = [*(near(k) or [guess]), None]
-            rows[k] = _found(own, guesses, 1, effort)
+            rows[k] = tuple(with_radius(own, gait, effort) for gait in _found(own, guesses, 1))
     return _family(scene, names, table, tuple(rows), guess)
 
 
@@ -64,10 +65,11 @@ def with_gaits(
     for k, guesses in found.items():
         own = scene_with(scene, family.names, family.table[k])
         for length, guess in guesses:
+            scales = family.scales[k]
             new = [
-                gait
-                for gait in _found(own, [guess], length, effort)
-                if not any(_same(gait, old) for old in rows[k])
+                with_radius(own, gait, effort)
+                for gait in _found(own, [guess], length)
+                if not any(_same(gait, old, scales) for old in rows[k])
             ]
             # Stable by the cycles' lengths, from which positions follow.
             rows[k] = tuple(sorted([*rows[k], *new], key=lambda gait: gait.cycle_footsteps))
@@ -82,19 +84,28 @@ def scene_with(scene: SomeScene, names: Sequence[str], values: np.ndarray) -> So
 
 
 def _found(
-    scene: Scene | RigidScene, guesses: Sequence[PyTree], length: int, effort: Effort
+    scene: Scene | RigidScene, guesses: Sequence[PyTree], length: int
 ) -> tuple[Attractor, ...]:
-    """The stable gait that the first successful guess leads to, or none."""
+    """The stable gait that the first successful guess leads to, of its minimal cycle, or none.
+
+    Its radius is not known yet.
+    """
     for guess in guesses:
-        gait = find_gait(
-            scene,
-            None if guess is None else jtu.tree_map(as_float, guess),
-            footsteps=length,
-            parameters=(),
-            radius_sensitivities=False,
-        )
+        near, count = guess, length
+        while True:
+            gait = find_gait(
+                scene,
+                None if near is None else jtu.tree_map(as_float, near),
+                footsteps=count,
+                parameters=(),
+                radius_sensitivities=False,
+            )
+            least = int(gait.cycle_footsteps)
+            if not bool(gait.stable) or least == count:
+                break
+            near, count = gait.measures.state, least
         if bool(gait.stable):
-            return (with_radius(scene, attractor_without_radius(scene, gait, length), effort),)
+            return (attractor_without_radius(scene, gait),)
     return ()
 
 
@@ -115,9 +126,10 @@ def _family(
     return Family(names, table, rows, tuple(states), np.stack(scales))
 
 
-def _same(a: Attractor, b: Attractor) -> bool:
-    return (
-        a.cycle_footsteps == b.cycle_footsteps
-        and abs(a.duration / b.duration - 1.0) < _SAME
-        and abs(a.step_length / b.step_length - 1.0) < _SAME
+def _same(a: Attractor, b: Attractor, scales: np.ndarray) -> bool:
+    """Whether two finds are of one orbit, which may begin at any of its crossings."""
+    off = np.linalg.norm((a.point - b.crossings) / scales, axis=1)
+    # Where hardly anything is left out of a cycle's change, Newton's residual says little.
+    return a.cycle_footsteps == b.cycle_footsteps and bool(
+        off.min() < _SAME / (1.0 - b.contraction)
     )

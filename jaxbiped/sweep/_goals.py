@@ -15,6 +15,9 @@ class Goals(NamedTuple):
     Attributes:
         points: a state of each on the section, shape (G, m).
         metrics: W, shape (G, m − 1, m): |W (x − point)| falls from cycle to cycle near the gait.
+        models: B, shape (G, m − 1, m − 1): the offset W (x − point) is B times that after a cycle,
+            by the derivative of the return map.
+        contractions: of the distance in a cycle, shape (G,).
         radii: distance, so measured, within which every start converges; negative where none is
             known to. Shape (G,).
         scales: size of each component, by which recurrences are measured; shape (m,).
@@ -22,5 +25,7 @@ class Goals(NamedTuple):
 
     points: Numbers
     metrics: Numbers
+    models: Numbers
+    contractions: Numbers
     radii: Numbers
     scales: Numbers

@@ -192,9 +192,7 @@ class CompliantLabelling(AbstractLabellingLoop):
                 return section.value(scene, at(time))
 
             time = arrival_time(value, last.t, after.t)
-            return after_arrival(
-                now.trace, _recurring_components(at(time)), start.goals, self.cycles, start.gap
-            )
+            return _after_arrival(start, now, at(time), self.cycles)
 
         return _trace_or(arrives, on_section, now.trace)
 
@@ -223,9 +221,7 @@ class RigidLabelling(AbstractLabellingLoop):
         )
 
         def on_section() -> ArrivalHistory:
-            return after_arrival(
-                now.trace, _recurring_components(after.state), start.goals, self.cycles, start.gap
-            )
+            return _after_arrival(start, now, after.state, self.cycles)
 
         trace = _trace_or(after.struck, on_section, now.trace)
         strike = jnp.where(after.struck, after.t, now.strike)
@@ -288,9 +284,12 @@ def _trace_or(
     return trace
 
 
-def _recurring_components(state: PyTree) -> tuple[Scalar, ...]:
-    """A state without the place along the slope, its first component."""
-    return tuple(state[1:])
+def _after_arrival(
+    start: Start, now: Progress, state: PyTree, cycles: tuple[int, ...]
+) -> ArrivalHistory:
+    """After an arrival in this state, its place along the slope left out."""
+    recurring = tuple(state[1:])
+    return after_arrival(now.trace, recurring, start.goals, cycles, start.gap, start.solve.rtol)
 
 
 def _with_leg_names(exchanged: bool, state: PyTree) -> PyTree:

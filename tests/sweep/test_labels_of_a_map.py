@@ -14,7 +14,7 @@ from jaxbiped.sweep._goals import NO_GAIT, Goals
 from jaxbiped.sweep._labelling_loop import CompliantLabelling, Progress, Start, _outcome
 from jaxbiped.sweep._sliding import contact_places, slip_distances
 
-RADIUS, GAP = 0.1, 1e-4
+RADIUS, GAP, RTOL = 0.1, 1e-4, 1e-7
 ONWARD = jax.jit(after_arrival, static_argnums=3)
 
 
@@ -24,6 +24,8 @@ def goals(*points, radii=None):
     return Goals(
         jnp.asarray([[p, 0.0] for p in points]),
         jnp.asarray([[[1.0, 0.0]]] * count),
+        jnp.full((count, 1, 1), jnp.inf),
+        jnp.ones(count),
         jnp.asarray([RADIUS] * count if radii is None else radii),
         jnp.asarray([1.0, 10.0]),
     )
@@ -33,7 +35,7 @@ def histories(sequence, to, cycles):
     """What is known after each arrival."""
     now = empty_history(jnp.zeros(()), 2, cycles)
     for x, y in sequence:
-        now = ONWARD(now, (jnp.asarray(x), jnp.asarray(y)), to, cycles, GAP)
+        now = ONWARD(now, (jnp.asarray(x), jnp.asarray(y)), to, cycles, GAP, RTOL)
         yield now
 
 
@@ -54,6 +56,61 @@ def test_a_walk_that_comes_within_the_radius_and_nearer_walks():
     assert int(now.cycle_footsteps) == 1
     # Within the radius but going away it is open.
     assert first_verdict([(0.01 * 1.1**k, 1.0) for k in range(9)], goals(0.0), (1,))[0] is None
+
+
+def slow(multiplier, bend, footsteps, begin=0.03, noise=0.0):
+    """Arrivals of x → λ x + b x² − x³, of λ's place in the plane where it is complex."""
+    random, z = np.random.default_rng(0), begin + 0.0j
+    for _ in range(footsteps):
+        yield z.real, 10.0 * z.imag
+        z = multiplier * z + bend * z * z - z * abs(z) ** 2 + noise * random.uniform(-1.0, 1.0)
+
+
+def linear_model(multiplier):
+    """A gait at the origin that is known by its multiplier alone: no radius was measured."""
+    rotation = np.array([[multiplier.real, -multiplier.imag], [multiplier.imag, multiplier.real]])
+    metric = np.diag([1.0, 0.1])  # in which the second component is the imaginary part
+    return Goals(*map(jnp.asarray, (
+        np.zeros((1, 2)), metric[None], rotation[None], [0.5 * (1.0 + abs(multiplier))],
+        [-1.0], [1.0, 10.0],
+    )))  # fmt: skip
+
+
+@pytest.mark.parametrize("noise", [0.0, 3e-7])
+@pytest.mark.parametrize(
+    ("multiplier", "bend", "begin"),
+    [
+        (-0.97, 1.0, 0.03), (-0.999, 1.0, 0.03), (0.99 * np.exp(1.0j), 0.5, 0.03),
+        (0.9999 * np.exp(2.5j), 0.5, 0.003), (0.99, -1.0, 0.03), (0.9999, -1.0, 0.03),
+        (0.9999, 1.0, 3e-5), (-0.5, 3.0, 0.03),
+    ],
+)  # fmt: skip
+def test_a_slow_gait_is_recognised_by_its_linear_model(multiplier, bend, begin, noise):
+    """The map contracts there: iterated for long it comes to the origin."""
+    multiplier = complex(multiplier)
+    far = abs(list(slow(multiplier, bend, 4000, begin))[-1][0])
+    assert far < 0.9 * begin
+    _, now = first_verdict(slow(multiplier, bend, 60, begin, noise), linear_model(multiplier), (1,))
+    assert (int(now.verdict), int(now.goal)) == (int(Label.WALKING), 0)
+    assert int(now.cycle_footsteps) == 1
+
+
+@pytest.mark.parametrize(
+    ("multiplier", "bend", "begin"), [(0.99, 1.0, 0.012), (0.9999, 1.0, 0.02), (-0.97, 0.0, 0.2)]
+)
+def test_what_leaves_a_slow_gait_does_not_converge_to_it(multiplier, bend, begin):
+    """It begins beyond the unstable fixed point, or outside the unstable cycle of two."""
+    arrivals = list(slow(multiplier, bend, 16, begin))
+    assert abs(arrivals[-1][0]) > begin
+    _, now = first_verdict(arrivals, linear_model(complex(multiplier)), (1,))
+    assert now is None or int(now.verdict) != int(Label.WALKING)
+
+
+def test_a_slow_transient_about_an_unknown_gait_is_no_cycle_of_two():
+    for multiplier in (-0.97, -0.9):
+        arrivals = slow(complex(multiplier), 0.0, 600, 1e-3)
+        _, now = first_verdict(arrivals, goals(5.0, radii=[NO_GAIT]), (1,))
+        assert int(now.cycle_footsteps) == 1
 
 
 def test_a_cycle_of_two_is_told_by_every_other_footstep():
@@ -156,8 +213,9 @@ def attempt():
         last = SimpleNamespace(noted=True, t=t - 0.01, state=before, coefficients=None)
         step = _Step(t, after, (zero, zero, zero), last)
         trace = empty_history(zero, 7, (1,))
-        far = Goals(jnp.zeros((1, 7)), jnp.zeros((1, 6, 7)), jnp.asarray([NO_GAIT]), jnp.ones(7))
-        solve = SimpleNamespace(scene=SCENE)
+        flat, none = jnp.zeros((1, 6, 7)), jnp.asarray([NO_GAIT])
+        far = Goals(jnp.zeros((1, 7)), flat, flat[..., 1:], jnp.zeros(1), none, jnp.ones(7))
+        solve = SimpleNamespace(scene=SCENE, rtol=zero)
         found, over = loop.attempt(
             Start(solve, far, 0.0, 2.0), Progress(step, trace, strike, landed)
         )

@@ -25,7 +25,19 @@ def with_attractor(labelling):
     (state,) = labelling.family.states
     size = len(state) - 1
     metric = np.linalg.qr(np.random.default_rng(0).standard_normal((size, size)))[0][:-1]
-    gait = jb.Attractor(1, 3.88, 0.398, state, np.full(size - 1, 0.5), metric, 0.75, 1e-2)
+    point = np.array([[float(leaf) for leaf in state[1:]]])
+    gait = jb.Attractor(
+        1,
+        3.88,
+        0.398,
+        state,
+        np.full(size - 1, 0.5),
+        metric,
+        0.75,
+        1e-2,
+        0.5 * np.eye(size - 1),
+        point,
+    )
     family = labelling.family._replace(rows=((gait,),))
     return jb.Labelling(labelling.scene, family, labelling.effort)
 
