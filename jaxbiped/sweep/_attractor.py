@@ -34,6 +34,8 @@ class Attractor(NamedTuple):
             up to there came nearer (see `with_radius`). Negative where it was not measured, or none
             did.
         model: B, shape (m − 1, m − 1): W (x − x*) is B times that after a cycle, to first order.
+        slowest: ℓ, shape (2, m): |ℓ (x − x*)| is the offset along the leading multiplier's
+            direction, in the metric.
         crossings: its states on the section, those of the other footsteps as well, shape
             (cycle_footsteps, m).
     """
@@ -47,6 +49,7 @@ class Attractor(NamedTuple):
     contraction: float
     radius: float
     model: np.ndarray
+    slowest: np.ndarray
     crossings: np.ndarray
 
     @property
@@ -84,6 +87,9 @@ def attractor_without_radius(scene: Scene | RigidScene, gait: Gait) -> Attractor
     weights = tangents.T @ np.diag(component_scales(scene, state) ** -2.0) @ tangents
     squared = scipy.linalg.solve_discrete_lyapunov(slopes.T / contraction, weights)
     factor = np.linalg.cholesky(0.5 * (squared + squared.T))
+    values, vectors = np.linalg.eig(slopes)
+    first = np.argmax(np.abs(values))
+    left = np.linalg.pinv(vectors)[first] * np.linalg.norm(factor.T @ vectors[:, first])
     return Attractor(
         cycle_footsteps=int(gait.cycle_footsteps),
         duration=float(gait.measures.period),
@@ -94,6 +100,7 @@ def attractor_without_radius(scene: Scene | RigidScene, gait: Gait) -> Attractor
         contraction=contraction,
         radius=-1.0,
         model=factor.T @ slopes @ np.linalg.inv(factor.T),
+        slowest=np.stack([left.real, left.imag]) @ tangents.T,
         crossings=np.stack([np.asarray(leaf)[:, 0] for leaf in gait.orbit[1][1:]], axis=1),
     )
 

@@ -15,7 +15,7 @@ DEPTH = 4
 """Longest cycle [footsteps] that is recognised where no gait is known."""
 _AGAIN = 3
 """Arrivals in a row that must each be near the one a cycle before."""
-_IN_A_ROW, _OFF, _NOISE = 4, 0.1, 30.0
+_IN_A_ROW, _OFF, _NOISE = 4, 0.1, 10.0
 """Cycles in a row for which a walk must do what a gait's linear model says; how far it may be off
 as a share of the distance, and besides in units of the solver's tolerance."""
 _CYCLE = 1e-2
@@ -30,7 +30,8 @@ class ArrivalHistory(NamedTuple):
 
     Attributes:
         recent: states at the last `DEPTH` of them, the latest first, without hip_x.
-        distances: of each gait's point, at as many of the last ones as two of its cycles have.
+        distances: of each gait's point, at as many of the last ones as its cycle has.
+        slow: offsets from it in its slowest direction, at as many as two of its cycles have.
         steady: for each gait, at as many of the last ones as its cycle has, how many arrivals a
             cycle apart did what its linear model says.
         closest: smallest distance of any.
@@ -43,6 +44,7 @@ class ArrivalHistory(NamedTuple):
 
     recent: tuple[tuple[Scalar, ...], ...]
     distances: tuple[tuple[Scalar, ...], ...]
+    slow: tuple[tuple[Scalar, ...], ...]
     steady: tuple[tuple[Scalar, ...], ...]
     closest: Scalar
     rate: Scalar
@@ -58,7 +60,8 @@ def empty_history(zero: Scalar, size: int, cycles: tuple[int, ...]) -> ArrivalHi
     far = zero + jnp.inf
     return ArrivalHistory(
         recent=tuple([tuple([far] * size)] * DEPTH),
-        distances=tuple(tuple([far] * (2 * length)) for length in cycles),
+        distances=tuple(tuple([far] * length) for length in cycles),
+        slow=tuple(tuple([far] * (2 * length)) for length in cycles),
         steady=tuple(tuple([none] * length) for length in cycles),
         closest=far,
         rate=zero + jnp.nan,
@@ -81,39 +84,37 @@ def after_arrival(
 
     It converges to a known gait where it lies within that gait's radius, and nearer than a cycle
     before, or within `gap` of the state then: at the gait itself rounding decides which is nearer.
-    Also where it does for several cycles what that gait's linear model says, and comes nearer, or
-    is so near that the tolerance hides by how much: slow gaits are recognised by that.
+    Also where for several cycles it does what that gait's linear model says: the offset in the
+    slowest direction shrinks as its multiplier promises, or that much is hidden by the tolerance.
+    Slow gaits are recognised by that.
     Where each of several arrivals in a row differs from the one a cycle before by less
     than `gap` (in units of the scales, root mean square), and no known gait comes nearer, it
     converges to some other one: the verdict is then "unresolved", with the cycle's footsteps.
     """
     repeats = _repeats(trace, state, goals, gap)
-    distances, steadies, certain, rates = [], [], [], []
+    distances, slows, steadies, certain, rates = [], [], [], [], []
     nearing = jnp.asarray(False)
     for g, length in enumerate(cycles):
         distance = _distance(goals, g, state)
-        before, earlier = trace.distances[g][length - 1], trace.distances[g][-1]
+        before = trace.distances[g][-1]
         nearer = distance < before
-        for old in (before, earlier):
-            nearing |= jnp.isfinite(old) & (distance < _NEARING * old)
+        nearing |= jnp.isfinite(before) & (distance < _NEARING * before)
         # Of a longer cycle only the arrivals tell that are near the point itself.
-        for other in trace.distances[g][: length - 1]:
+        for other in trace.distances[g][:-1]:
             nearing |= other < _NEARING * distance
+        slow = _size(_times(goals.slowest[g], _off(goals, g, state)))
         steady = jnp.zeros_like(trace.goal)
         if length <= DEPTH:
             nearer |= repeats[length - 1] > 0
-            # Not farther than the tolerance hides, where it hides what the gait draws in.
-            hidden = (1.0 - goals.contractions[g]) * distance < _NOISE * rtol
-            allowed = earlier + jnp.where(hidden, _NOISE * rtol, 0.0)
-            does = _does_as_predicted(trace, state, goals, g, length, rtol)
-            does &= jnp.isfinite(earlier) & (distance < allowed)
-            steady = jnp.where(does, trace.steady[g][-1] + 1, 0)
+            does = _does_as_predicted(trace, state, goals, g, slow, length, rtol)
+            steady = jnp.where(does & jnp.isfinite(distance), trace.steady[g][-1] + 1, 0)
         nearing |= steady > 0
         inside = (distance <= goals.radii[g]) & jnp.isfinite(before) & nearer
         certain.append(inside | (steady >= _IN_A_ROW))
         steadies.append((steady, *trace.steady[g][:-1]))
         rates.append((distance / before) ** (1.0 / length))
         distances.append((distance, *trace.distances[g][:-1]))
+        slows.append((slow, *trace.slow[g][:-1]))
     verdict, cycle, goal = trace.verdict, trace.cycle_footsteps, trace.goal
     for length in range(DEPTH, 0, -1):
         again = (repeats[length - 1] >= _AGAIN) & ~nearing
@@ -123,7 +124,7 @@ def after_arrival(
     for g in range(len(cycles)):
         nearer = distances[g][0] < nearest
         # Far from every gait the nearest one tells the rate.
-        known = jnp.isfinite(trace.distances[g][cycles[g] - 1]) & jnp.isfinite(rates[g])
+        known = jnp.isfinite(trace.distances[g][-1]) & jnp.isfinite(rates[g])
         rate = jnp.where(nearer & known, rates[g], rate)
         nearest = jnp.minimum(nearest, distances[g][0])
     for g, length in reversed(list(enumerate(cycles))):
@@ -131,11 +132,12 @@ def after_arrival(
         cycle = jnp.where(certain[g], length, cycle)
         goal = jnp.where(certain[g], g, goal)
         # Where nothing but rounding is left of the distance it says nothing.
-        left = jnp.where(distances[g][0] < distances[g][length], rates[g], jnp.nan)
+        left = jnp.where(distances[g][0] < trace.distances[g][-1], rates[g], jnp.nan)
         rate = jnp.where(certain[g], left, rate)
     return ArrivalHistory(
         recent=(state, *trace.recent[:-1]),
         distances=tuple(distances),
+        slow=tuple(slows),
         steady=tuple(steadies),
         closest=jnp.minimum(trace.closest, nearest),
         rate=rate,
@@ -148,7 +150,7 @@ def after_arrival(
 
 def _distance(goals: Goals, g: int, state: tuple[Scalar, ...]) -> Scalar:
     """From a gait's point, in its metric; infinite where there is no such gait."""
-    distance = _size(_image(goals, g, state))
+    distance = _size(_times(goals.metrics[g], _off(goals, g, state)))
     return jnp.where(goals.radii[g] == NO_GAIT, jnp.inf, distance)
 
 
@@ -157,29 +159,37 @@ def _does_as_predicted(
     state: tuple[Scalar, ...],
     goals: Goals,
     g: int,
+    slow: Scalar,
     length: int,
     rtol: Scalar,
 ) -> Scalar:
-    """Whether the last cycle, or the last two together, were those of the gait's linear model.
+    """Whether the last cycles were those of the gait's linear model.
 
-    It may be off by a tenth: corrections of a higher order than the first, of which the next alone
-    counts, then change no sign on the way to the gait. Near a multiplier of −1 it is right over two
-    cycles from farther away.
+    It may be off by a tenth of the offset, over one cycle or, as near a multiplier of −1 it is
+    right over two from farther away, over both. In the slowest direction it must have led nearer
+    in these two by half of what the multiplier promises: what is left out of the model then turns
+    nothing back on the way to the gait, and what lies beyond an unstable cycle does not pass for
+    drawn in.
+    Where the tolerance hides how much that is, it must be as near as before and the model hold.
     """
-    now, does = _image(goals, g, state), jnp.asarray(False)
+    now, holds = _times(goals.metrics[g], _off(goals, g, state)), []
+    noise = _NOISE * rtol
     for cycles in range(1, DEPTH // length + 1)[:2]:
-        then = _image(goals, g, trace.recent[cycles * length - 1])
-        predicted = then
+        before = trace.recent[cycles * length - 1]
+        then = predicted = _times(goals.metrics[g], _off(goals, g, before))
         for _ in range(cycles):
             predicted = _times(goals.models[g], predicted)
         off = _size([a - b for a, b in zip(now, predicted, strict=True)])
-        does |= off <= _OFF * _size(then) + _NOISE * rtol
-    return does
+        holds.append(off <= _OFF * _size(then) + noise)
+    earlier, rho = trace.slow[g][-1], 2.0 * goals.contractions[g] - 1.0
+    drawn = slow <= 0.5 * (1.0 + rho * rho) * earlier
+    hidden = ((1.0 - rho) * slow < noise) & (slow < earlier + noise) & holds[0]
+    either = functools.reduce(operator.or_, holds)
+    return jnp.isfinite(earlier) & ((either & drawn) | hidden)
 
 
-def _image(goals: Goals, g: int, state: tuple[Scalar, ...]) -> list[Scalar]:
-    """The offset from a gait's point in its metric."""
-    return _times(goals.metrics[g], [x - goals.points[g, i] for i, x in enumerate(state)])
+def _off(goals: Goals, g: int, state: tuple[Scalar, ...]) -> list[Scalar]:
+    return [x - goals.points[g, i] for i, x in enumerate(state)]
 
 
 def _times(matrix: Scalar, vector: list[Scalar]) -> list[Scalar]:

@@ -119,6 +119,7 @@ class Family(NamedTuple):
             np.zeros((count, size)),
             np.zeros((count, size - 1, size)),
             np.zeros((count, size - 1, size - 1)),
+            np.zeros((count, 2, size)),
             np.zeros(count),
             np.full(count, NO_GAIT),
             self.scales[k],
@@ -127,6 +128,7 @@ class Family(NamedTuple):
             goals.points[place] = gait.point
             goals.metrics[place] = gait.metric
             goals.models[place] = gait.model
+            goals.slowest[place] = gait.slowest
             goals.contractions[place] = gait.contraction
             goals.radii[place] = gait.radius
         return goals

@@ -96,6 +96,7 @@ def _no_goals(scene: Scene | RigidScene, attractor: Attractor, count: int) -> Go
         attractor.point[None],
         attractor.metric[None],
         np.full((1, *attractor.model.shape), np.inf),
+        attractor.slowest[None],
         np.ones(1),
         np.full(1, -1.0),
         component_scales(scene, attractor.state),

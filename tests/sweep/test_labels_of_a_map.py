@@ -25,6 +25,7 @@ def goals(*points, radii=None):
         jnp.asarray([[p, 0.0] for p in points]),
         jnp.asarray([[[1.0, 0.0]]] * count),
         jnp.full((count, 1, 1), jnp.inf),
+        jnp.asarray([[[1.0, 0.0]] * 2] * count),
         jnp.ones(count),
         jnp.asarray([RADIUS] * count if radii is None else radii),
         jnp.asarray([1.0, 10.0]),
@@ -71,8 +72,8 @@ def linear_model(multiplier):
     rotation = np.array([[multiplier.real, -multiplier.imag], [multiplier.imag, multiplier.real]])
     metric = np.diag([1.0, 0.1])  # in which the second component is the imaginary part
     return Goals(*map(jnp.asarray, (
-        np.zeros((1, 2)), metric[None], rotation[None], [0.5 * (1.0 + abs(multiplier))],
-        [-1.0], [1.0, 10.0],
+        np.zeros((1, 2)), metric[None], rotation[None], metric[None],
+        [0.5 * (1.0 + abs(multiplier))], [-1.0], [1.0, 10.0],
     )))  # fmt: skip
 
 
@@ -214,7 +215,9 @@ def attempt():
         step = _Step(t, after, (zero, zero, zero), last)
         trace = empty_history(zero, 7, (1,))
         flat, none = jnp.zeros((1, 6, 7)), jnp.asarray([NO_GAIT])
-        far = Goals(jnp.zeros((1, 7)), flat, flat[..., 1:], jnp.zeros(1), none, jnp.ones(7))
+        far = Goals(
+            jnp.zeros((1, 7)), flat, flat[..., 1:], flat[:, :2], jnp.zeros(1), none, jnp.ones(7)
+        )
         solve = SimpleNamespace(scene=SCENE, rtol=zero)
         found, over = loop.attempt(
             Start(solve, far, 0.0, 2.0), Progress(step, trace, strike, landed)

@@ -88,7 +88,9 @@ def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, write
 def test_positions_of_gaits_follow_when_more_are_met():
     def gait(length):
         nothing = np.zeros(0)
-        return jb.Attractor(length, 1.0, 1.0, None, nothing, nothing, 0.5, 0.1, nothing, nothing)
+        return jb.Attractor(
+            length, 1.0, 1.0, None, nothing, nothing, 0.5, 0.1, nothing, nothing, nothing
+        )
 
     rows = ((),), ((gait(1),), (gait(2),)), ((gait(1), gait(1)), (gait(2),))
     few, one, two = (LABELLING.family._replace(rows=each) for each in rows)

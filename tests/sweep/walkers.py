@@ -36,6 +36,7 @@ def with_attractor(labelling):
         0.75,
         1e-2,
         0.5 * np.eye(size - 1),
+        metric[:2],
         point,
     )
     family = labelling.family._replace(rows=((gait,),))
