@@ -189,10 +189,22 @@ def check_type(name: str, value: object, *kinds: type) -> None:
         raise ArgumentError(f"{name} = {value!r} is not allowed: it must be a {allowed}.")
 
 
+def user_path(path: str | Path) -> Path:
+    """A path as the user means it: "~" is the home folder.
+
+    Raises:
+        ArgumentError: no path, or a home folder that is not known.
+    """
+    try:
+        return Path(path).expanduser()
+    except (TypeError, RuntimeError) as error:
+        raise ArgumentError(f"path = {path!r} is not allowed: {error}.") from None
+
+
 def read_json(name: str, path: str | Path) -> Any:
     """What a JSON file holds; raises `ArgumentError` for one that cannot be read or is no JSON."""
     try:
-        return json.loads(Path(path).read_text())
+        return json.loads(user_path(path).read_text())
     except OSError as error:
         reason = (error.strerror or "unreadable").lower()
         raise ArgumentError(f"{name} = {str(path)!r} cannot be read ({reason}).") from None

@@ -1,14 +1,14 @@
 """Branch as a dataset in SI units."""
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from jaxbiped._strict_json import strict_json
 from jaxbiped.continuation._bifurcations import EVENTS
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.scene._scene_identity import scene_identity
 
 if TYPE_CHECKING:
     import xarray
@@ -53,13 +53,13 @@ def branch_dataset(branch: "Branch") -> "xarray.Dataset":
         "along": branch.along,
         "axis": branch.axis._asdict(),
         "stops": [[int(each.end), each.cause, each.value] for each in branch.stops],
-        "scene": {name: float(value) for name, value in parameter_values(branch.scene).items()},
+        **scene_identity(branch.scene),
         "state_type": branch.state_type.__name__,
         "footsteps": branch.footsteps,
         "accuracy": branch.accuracy,
         "engine": branch.engine,
     }
-    return xarray.Dataset(variables, attrs={"branch": json.dumps(settings)})
+    return xarray.Dataset(variables, attrs={"branch": strict_json(settings, unknown=str)})
 
 
 def _flags(names: Any, codes: Any = None) -> dict[str, Any]:

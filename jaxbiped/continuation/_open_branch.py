@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._identity import difference_of
 from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
 from jaxbiped.continuation._branch import Branch
@@ -16,9 +17,9 @@ from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._continuation import BranchEnd
-from jaxbiped.scene._parameters import parameter_values
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene_identity import scene_identity
 
 if TYPE_CHECKING:
     import xarray
@@ -43,12 +44,13 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
     if "branch" not in dataset.attrs:
         raise ArgumentError("dataset is not allowed: it must be that of a branch.")
     settings = json.loads(dataset.attrs["branch"])
-    own = {name: float(value) for name, value in parameter_values(scene).items()}
-    if own != settings["scene"]:
-        kept = settings["scene"]
-        names = sorted(name for name in own.keys() | kept.keys() if own.get(name) != kept.get(name))
+    # Datasets of earlier versions do not tell what the scene is made of beside its numbers.
+    kept = {name: settings[name] for name in ("scene", "model") if name in settings}
+    own = scene_identity(scene)
+    difference = difference_of(kept, {name: own[name] for name in kept})
+    if difference is not None:
         raise ArgumentError(
-            f"scene is not allowed: it differs from the branch's own in {', '.join(names)}."
+            f"scene is not allowed: it differs from the branch's own in {difference}."
         )
     state_type = _STATES[settings["state_type"]]
     special = _points(dataset, state_type, settings["along"], "event_")
@@ -65,7 +67,7 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
             strict=True,
         )
     ]
-    first, last = (BranchStop(BranchEnd(end), why, at) for end, why, at in settings["stops"])
+    first, last = (BranchStop(BranchEnd(end), why, float(at)) for end, why, at in settings["stops"])
     return Branch(
         scene=scene,
         points=tuple(_points(dataset, state_type, settings["along"], "")),

@@ -11,6 +11,8 @@ from typing import Any
 
 from tqdm import tqdm
 
+from jaxbiped._provenance import DECISIVE, provenance
+from jaxbiped._strict_json import strict_json
 from jaxbiped._types import JsonObject
 
 
@@ -21,7 +23,8 @@ def study(
     store: Path | None = None,
     follow: Callable[[JsonObject], None] | None = None,
 ) -> list[JsonObject]:
-    """Verdicts of cases, in their order; those that the store holds are not run again.
+    """Verdicts of cases, in their order; those that the store holds of this version are not run
+    again.
 
     Args:
         cases: dataclasses with a `key` and a `group`.
@@ -32,17 +35,18 @@ def study(
     Returns:
         For each case its fields under "case", and its verdict's beside.
     """
-    held = {} if store is None or not store.exists() else _read(store)
+    writer = {name: provenance()[name] for name in DECISIVE}
+    held = {} if store is None or not store.exists() else _read(store, writer)
     todo = sum(case.key not in held for case in cases)
     rows = []
     with tqdm(total=todo, unit="cases", file=sys.stderr, disable=todo == 0) as bar:
         for case in cases:
             if case.key not in held:
-                row = {"key": case.key, "case": dataclasses.asdict(case)}
+                row = {"key": case.key, "case": dataclasses.asdict(case), "writer": writer}
                 held[case.key] = row | dataclasses.asdict(judge(case))
                 if store is not None:
                     with store.open("a") as lines:
-                        lines.write(json.dumps(held[case.key]) + "\n")
+                        lines.write(strict_json(held[case.key], unknown=str) + "\n")
                 bar.update()
             elif follow is not None:
                 follow(held[case.key])
@@ -50,14 +54,16 @@ def study(
     return rows
 
 
-def _read(store: Path) -> dict[str, JsonObject]:
+def _read(store: Path, writer: JsonObject) -> dict[str, JsonObject]:
+    """What this version has judged."""
     held = {}
     for line in store.read_text().splitlines():
         try:
             row = json.loads(line)
         except json.JSONDecodeError:
             continue  # cut off while it was written
-        held[row["key"]] = row
+        if row.get("writer") == writer:
+            held[row["key"]] = row
     return held
 
 

@@ -6,10 +6,13 @@ in the same order, finds them here, and goes on where it was.
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, failure_kind
+from jaxbiped._identity import difference_of
+from jaxbiped._strict_json import strict_json
 from jaxbiped._types import JsonObject
 from jaxbiped.optimise._objectives import Evaluation
 
@@ -17,18 +20,23 @@ from jaxbiped.optimise._objectives import Evaluation
 class Evaluations:
     """Designs by their u, with what is known of each; None for one whose gait was lost."""
 
-    def __init__(self, path: Path | None, settings: JsonObject) -> None:
+    def __init__(self, path: Path | None = None, settings: JsonObject | None = None) -> None:
         self._known: dict[bytes, Evaluation | None] = {}
         self._path, self.count = path, 0
         if path is None:
             return
         try:
-            if path.exists() and path.stat().st_size:
-                self._read(path, settings)
-            else:
-                path.write_text(json.dumps(settings) + "\n")
+            text = path.read_text() if path.exists() else ""
         except OSError as error:
             raise failure_kind(error)(f"store = {str(path)!r}: {error.strerror}.") from None
+        except UnicodeDecodeError:
+            text = "no text"
+        if text:
+            self._read(path, text.splitlines(), json.loads(strict_json(settings)))
+        else:
+            self._append(settings)
+        if text and not text.endswith("\n"):
+            self._append(None)  # what was cut off ends: the next line stands by itself
 
     def get(self, u: np.ndarray) -> Evaluation | None:
         """What is known of a design."""
@@ -58,56 +66,55 @@ class Evaluations:
         """The designs with a gait, in the order they were evaluated."""
         return [(np.frombuffer(key), each) for key, each in self._known.items() if each is not None]
 
-    def _read(self, path: Path, settings: JsonObject) -> None:
-        first, *lines = path.read_text().splitlines()
-        try:
-            same = json.loads(first) == json.loads(json.dumps(settings))
-        except json.JSONDecodeError:
-            same = False
-        if not same:
+    def _read(self, path: Path, lines: list[str], settings: JsonObject) -> None:
+        rows = [_row(line) for line in lines]
+        difference = "it holds something else"
+        if isinstance(rows[0], dict):
+            difference = difference_of(rows[0], settings) or ""
+        if difference:
             raise ArgumentError(
-                f"store = {str(path)!r} belongs to another problem: give another file, or the same "
-                "scene, variables, objective and requirements."
+                f"store = {str(path)!r} belongs to another problem ({difference}): give another "
+                "file, or the same scene, variables, measures and settings."
             )
-        for line in lines:
-            try:
-                row = json.loads(line)
-            except json.JSONDecodeError:  # cut off where a run was killed
-                break
-            u = np.asarray(row["u"], dtype=float)
-            self._known[u.tobytes()] = None if row["known"] is None else _evaluation(row["known"])
+        for row in rows:
+            # Two runs that begin one store both write what it is of.
+            if isinstance(row, dict) and "u" in row:
+                known = row["known"]
+                u = np.asarray(row["u"], dtype=float)
+                self._known[u.tobytes()] = None if known is None else _evaluation(known)
         self.count = sum(each is not None for each in self._known.values())
-        # What was cut off goes, so that the next line stands by itself.
-        kept = [
-            json.dumps({"u": np.frombuffer(k).tolist(), "known": _plain(e)})
-            for k, e in self._known.items()
-        ]
-        path.write_text("\n".join([first, *kept]) + "\n")
 
     def _write(self, u: np.ndarray, known: Evaluation | None) -> None:
+        self._append({"u": u, "known": None if known is None else known._asdict()})
+
+    def _append(self, row: JsonObject | None) -> None:
+        """In one piece, so that another run may add to the same file; without a row a line's end.
+
+        What is no finite number is a word that `float` reads.
+        """
         if self._path is None:
             return
+        text = "" if row is None else strict_json(row, unknown=str)
         try:
             with self._path.open("a") as file:
-                file.write(json.dumps({"u": u.tolist(), "known": _plain(known)}) + "\n")
+                file.write(text + "\n")
         except OSError as error:
             raise failure_kind(error)(f"store = {str(self._path)!r}: {error.strerror}.") from None
 
 
-def _plain(known: Evaluation | None) -> JsonObject | None:
-    if known is None:
+def _row(line: str) -> Any:
+    """What a line holds, None where it was cut off."""
+    try:
+        return json.loads(line)
+    except json.JSONDecodeError:
         return None
-    told = known._asdict()
-    for name in ("slopes", "slope_errors"):
-        told[name] = {key: value.tolist() for key, value in told[name].items()}
-    for name in ("state", "state_slopes"):
-        told[name] = told[name].tolist()
-    return told
 
 
 def _evaluation(told: JsonObject) -> Evaluation:
+    for name in ("values", "errors"):
+        told[name] = {key: float(value) for key, value in told[name].items()}
     for name in ("slopes", "slope_errors"):
-        told[name] = {key: np.asarray(value) for key, value in told[name].items()}
+        told[name] = {key: np.asarray(value, float) for key, value in told[name].items()}
     for name in ("state", "state_slopes"):
-        told[name] = np.asarray(told[name])
-    return Evaluation(**told | {"beyond_range": tuple(told.get("beyond_range", ()))})
+        told[name] = np.asarray(told[name], float)
+    return Evaluation(**told | {"beyond_range": tuple(told["beyond_range"])})

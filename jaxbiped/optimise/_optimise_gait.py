@@ -11,7 +11,9 @@ from jaxbiped._checks import (
     check_finite,
     check_not_negative,
     check_type,
+    user_path,
 )
+from jaxbiped._provenance import DECISIVE, provenance
 from jaxbiped._types import JsonObject
 from jaxbiped.continuation._nearest_bifurcation import range_of
 from jaxbiped.gait._gait import Gait
@@ -28,6 +30,7 @@ from jaxbiped.optimise._variables import start_of, variables_of
 from jaxbiped.scene._parameters import parameter_values
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene_identity import scene_identity
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 if TYPE_CHECKING:
@@ -126,7 +129,9 @@ def optimise_gait(
         accuracy: "balanced" or "tight".
         engine: as for `find_gait`.
         progress: whether to show a bar on stderr.
-        store: file that keeps every evaluation; the same call with it goes on where it was.
+        store: file that keeps every evaluation; the same call with it goes on where it was. It
+            serves whatever asks for the same measures of the same designs, so another optimiser
+            and other bounds of these measures too.
 
     Returns:
         The best design, its gait, and how good it is: see `certify` for more.
@@ -166,8 +171,12 @@ def optimise_gait(
         worse = _larger_is_worse(told, sense, requirements) if criterion == "worst" else {}
         ensemble = ensemble_of(scene, scatter, members, criterion, worse, seed)
     settings = GaitSettings(footsteps, accuracy, engine)
-    path = None if store is None else Path(store)
-    evaluations = Evaluations(path, _problem_settings(scene, vary, told, sense, settings, ensemble))
+    measures = {*told, *(each.name for each in requirements)}
+    evaluations = Evaluations()
+    if store is not None:
+        path = user_path(store)
+        own = _problem_settings(scene, vary, measures, settings, ensemble)
+        evaluations = Evaluations(path, own)
     problem = DesignProblem(
         scene, variables, told, sense, requirements, settings, evaluations, ensemble
     )
@@ -233,21 +242,22 @@ def _larger_is_worse(
 def _problem_settings(
     scene: Scene | RigidScene,
     vary: Mapping[str, tuple[float, float]],
-    told: Mapping[str, float],
-    sense: float,
+    measures: set[str],
     settings: GaitSettings,
     ensemble: Ensemble | None,
 ) -> JsonObject:
-    """What evaluations depend on, and in which order they come."""
+    """All that evaluations depend on: whatever begins, bounds and optimises may use them."""
+    own = scene_identity(scene)
+    kept = {name: value for name, value in own["scene"].items() if name not in vary}
+    writer = provenance(scene)
     return {
-        "scene": {name: float(value) for name, value in parameter_values(scene).items()},
-        "model": repr(type(scene).__name__),
+        "scene": kept,
+        "model": own["model"],
         "vary": {name: [float(x) for x in bounds] for name, bounds in vary.items()},
-        "goal": [dict(told), sense],
+        "measures": sorted(measures),
         "settings": settings._asdict(),
-        "ensemble": None
-        if ensemble is None
-        else {"of": ensemble.names, "factors": ensemble.factors.tolist(), "by": ensemble.criterion},
+        "ensemble": None if ensemble is None else ensemble._asdict(),
+        "writer": {name: writer[name] for name in DECISIVE},
     }
 
 

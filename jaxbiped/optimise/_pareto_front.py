@@ -8,6 +8,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError
 from jaxbiped.optimise._objectives import check_objective
 from jaxbiped.optimise._optimise_gait import Optimum, optimise_gait
+from jaxbiped.optimise._requirements import SubjectTo, requirements_of
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
@@ -37,7 +38,7 @@ def pareto_front(
     upper: bool = True,
     maximise: str | None = None,
     minimise: str | None = None,
-    subject_to: Mapping[str, tuple[float | None, float | None]] | None = None,
+    subject_to: SubjectTo = None,
     **options: Any,
 ) -> ParetoFront:
     """The trade between two measures: the best of one under each of several bounds of the other.
@@ -52,7 +53,7 @@ def pareto_front(
         upper: whether they are upper bounds.
         maximise, minimise: as for `optimise_gait`.
         subject_to: what else must hold.
-        options: others of `optimise_gait`.
+        options: others of `optimise_gait`; a `store` keeps the evaluations of all points.
 
     Returns:
         The front.
@@ -64,7 +65,7 @@ def pareto_front(
     values = np.asarray(bounds, dtype=float)
     if values.ndim != 1 or not values.size:
         raise ArgumentError(f"bounds has the shape {values.shape}: it must be (n,), n at least 1.")
-    more = dict(subject_to or {})
+    more = {each.name: (each.low, each.high) for each in requirements_of(scene, subject_to)}
     if against in more:
         raise ArgumentError(f"subject_to has {against!r} already: the front bounds it itself.")
     optima: list[Optimum] = []

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import shutil
 import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +15,7 @@ import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._strict_json import strict_json
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.gait._continuation import BranchEnd
@@ -23,7 +23,7 @@ from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._origin import FoundBy
 from jaxbiped.sweep._same_store import ALSO, SETTINGS, check_same, check_writers
-from jaxbiped.sweep._zarr_store import consolidate, open_store, unwritable
+from jaxbiped.sweep._zarr_store import consolidate, create_store, open_store, unwritable
 
 if TYPE_CHECKING:
     import xarray
@@ -128,8 +128,10 @@ class GaitGrid:
             group: Any = zarr.open_group(str(self._path), mode="r+", use_consolidated=False)
             # What says that points are known is written after what is known of them.
             names = [str(name) for name in self._dataset.data_vars if name != _DONE]
-            for name in (*names, _DONE):
-                group[name][...] = self._dataset[name].data
+            # What is not there then was lost, whatever it held.
+            with zarr.config.set({"array.write_empty_chunks": True}):
+                for name in (*names, _DONE):
+                    group[name][...] = self._dataset[name].data
         except OSError as error:
             raise unwritable(self._path, error) from None
         self._written = time.monotonic()
@@ -159,7 +161,7 @@ def open_gait_grid(
         any_version: whether a store may have been written by another version.
     """
     state = type(first.measures.state)
-    dataset = _empty(first, values, units).assign_attrs({**writer, SETTINGS: json.dumps(settings)})
+    dataset = _empty(first, values, units).assign_attrs({**writer, SETTINGS: strict_json(settings)})
     if path is None:
         return GaitGrid(dataset, state, None)
     path = path.absolute()
@@ -167,21 +169,36 @@ def open_gait_grid(
         if path.exists() and any(path.iterdir()):
             check_same(path, settings)
             new = check_writers(path, writer, any_version)
-            dataset = _same_variables(open_store(path).load(), dataset, path)
+            dataset = _same_variables(_load(path, dataset), dataset, path)
             if new:
                 others = [*json.loads(dataset.attrs.get(ALSO, "[]")), dict(writer)]
                 _note(path, {ALSO: json.dumps(others)})
         else:
-            half = path.with_name(f".{path.name}.unfinished")
-            shutil.rmtree(half, ignore_errors=True)
-            dataset.to_zarr(half, consolidated=False, zarr_format=3)
-            consolidate(half)
-            if path.exists():
-                path.rmdir()
-            half.rename(path)
+            empty = dataset
+            create_store(path, lambda half: empty.to_zarr(half, consolidated=False, zarr_format=3))
     except OSError as error:
         raise unwritable(path, error) from None
     return GaitGrid(dataset, state, path)
+
+
+def _load(path: Path, empty: "xarray.Dataset") -> "xarray.Dataset":
+    """What a store holds; nothing where some of it was lost or damaged."""
+    import zarr
+
+    try:
+        stored = open_store(path).load()
+        arrays = [each for _, each in zarr.open_group(str(path), mode="r").arrays()]
+        whole = all(each.nchunks_initialized == each.nchunks for each in arrays)
+        if whole or not bool(stored[_DONE].any()):
+            return stored
+    except Exception:  # damaged, of which each codec has errors of its own
+        pass
+    warnings.warn(
+        f"store = {str(path)!r} was damaged: its gaits are searched anew.",
+        RuntimeWarning,
+        stacklevel=4,
+    )
+    return empty
 
 
 def _same_variables(

@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import PyTree
 from tqdm import tqdm
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type
+from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type, user_path
+from jaxbiped._provenance import provenance
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
@@ -24,11 +25,10 @@ from jaxbiped.scene._parameters import (
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene_identity import scene_identity
 from jaxbiped.sweep._gait_grid import open_gait_grid
 from jaxbiped.sweep._gait_waves import GaitWaves
 from jaxbiped.sweep._grid_waves import LARGE, Place, neighbours, rings
-from jaxbiped.sweep._identity import identity
-from jaxbiped.sweep._provenance import provenance
 from jaxbiped.sweep._zarr_store import check_store
 
 if TYPE_CHECKING:
@@ -85,17 +85,19 @@ def gait_sweep(
     """
     check_type("scene", scene, Scene, RigidScene, RedundantScene)
     values = _check_values(scene, over)
-    if store is not None:
-        check_store(Path(store))
+    path = None if store is None else user_path(store)
+    if path is not None:
+        check_store(path)
     options: dict[str, Any] = dict(
         parameters=parameters,
         footsteps=footsteps,
         accuracy=accuracy,
         radius_sensitivities=radius_sensitivities,
     )
+    own = scene_identity(scene)
     settings = {
-        "scene": {k: float(v) for k, v in parameter_values(scene).items()},
-        "models": identity(scene),
+        "scene": own["scene"],
+        "models": own["model"],
         "over": {name: column.tolist() for name, column in values.items()},
         "options": {**options, "parameters": None if parameters is None else list(parameters)},
     }
@@ -120,7 +122,6 @@ def gait_sweep(
         return _find(scene_at(place), near, options | {"engine": engine}, alone=not again)
 
     first = search_alone(centre)
-    path = None if store is None else Path(store)
     units = {name: parameter_quantities(scene)[name].unit for name in values}
     grid = open_gait_grid(
         first, values, units, settings, provenance(scene), path, any_version=any_version

@@ -11,19 +11,20 @@ import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject, as_float
 from jaxbiped.basins._label import Label
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._parameters import parameter_values, with_parameters
+from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene_identity import scene_identity
 from jaxbiped.sweep._broadcast import broadcast_leaves
 from jaxbiped.sweep._effort import Effort
 from jaxbiped.sweep._family import Family
 from jaxbiped.sweep._follow_start import follow_starts
-from jaxbiped.sweep._identity import identity
 from jaxbiped.sweep._labelled import Labelled
 from jaxbiped.sweep._settled_labels import settled_labels
 
@@ -118,7 +119,7 @@ class Labelling(eqx.Module):
 
     def settings(self) -> JsonObject:
         """Everything that the labels depend on, ready for JSON."""
-        scene: JsonObject = {k: float(v) for k, v in parameter_values(self.scene).items()}
+        own = scene_identity(self.scene)
         effort = self.effort._asdict() | {"solver": type(self.effort.solver).__name__}
         # All engines give the same labels; the gap follows from the tolerance.
         del effort["engine"], effort["may_move"], effort["gap"], effort["embedded"]
@@ -126,9 +127,9 @@ class Labelling(eqx.Module):
             del effort["wanted"]
         return {
             "model": "compliant" if self.scene.compliant else "rigid",
-            "scene": scene,
+            "scene": own["scene"],
             "effort": effort,
-            "models": {"scene": identity(self.scene), "solver": identity(self.effort.solver)},
+            "models": {"scene": own["model"], "solver": identity(self.effort.solver)},
             "gaits": self.family.described(),
         }
 

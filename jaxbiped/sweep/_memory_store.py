@@ -1,11 +1,11 @@
 """Memory store: results of a sweep without a disk."""
 
-import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from jaxbiped._strict_json import strict_json
 from jaxbiped._types import JsonObject
 from jaxbiped.sweep._array_layout import Layout, empty_dataset
 from jaxbiped.sweep._same_store import SETTINGS
@@ -21,7 +21,7 @@ class MemoryStore(AbstractStore):
     def __init__(self, layout: Layout, settings: JsonObject, attributes: Mapping[str, str]):
         self.layout = layout
         self._dataset = empty_dataset(layout)
-        self._dataset.attrs = dict(attributes) | {SETTINGS: json.dumps(settings)}
+        self._dataset.attrs = dict(attributes) | {SETTINGS: strict_json(settings)}
         for name in self._dataset.data_vars:
             self._dataset[name].data = np.array(self._dataset[name].data)
 

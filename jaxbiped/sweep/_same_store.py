@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._identity import difference_of
+from jaxbiped._provenance import DECISIVE
+from jaxbiped._strict_json import strict_json
 from jaxbiped._types import JsonObject
-from jaxbiped.sweep._provenance import DECISIVE
 
 SETTINGS = "settings"
 """Attribute that holds, as JSON, all that the labels depend on."""
@@ -31,10 +33,10 @@ def check_same(path: Path, settings: JsonObject, *, but: str = "") -> None:
             f"store = {str(path)!r} holds something else: it must be a new directory, or a store "
             "of the same sweep."
         ) from None
-    here = json.loads(json.dumps(settings))
+    here = json.loads(strict_json(settings))
     for each in (stored, here):
         each.pop(but, None)
-    difference = _difference(stored, here, "")
+    difference = difference_of(stored, here, alike=_is_close)
     if difference is not None:
         raise ArgumentError(
             f"store = {str(path)!r} was made with other settings: {difference}; give it those, or "
@@ -54,7 +56,7 @@ def check_writers(path: Path, writer: Mapping[str, str], any_version: bool) -> b
     here = {name: writer[name] for name in DECISIVE}
     others = json.loads(str(attributes.get(ALSO, "[]")))
     known = [{name: each.get(name) for name in DECISIVE} for each in (attributes, *others)]
-    difference = next((_difference(each, here, "") for each in known if each != here), None)
+    difference = next((difference_of(each, here) for each in known if each != here), None)
     if difference is not None and not any_version:
         raise ArgumentError(
             f"store = {str(path)!r} was written by another version: {difference}; give it another "
@@ -63,34 +65,8 @@ def check_writers(path: Path, writer: Mapping[str, str], any_version: bool) -> b
     return here not in known
 
 
-def _difference(old: object, new: object, name: str) -> str | None:
-    """The first difference of two settings in words, None for none."""
-    if isinstance(old, dict) and isinstance(new, dict):
-        for key in dict.fromkeys([*new, *old]):
-            inner = f"{name}.{key}" if name else key
-            if key not in old or key not in new:
-                here = "only in the store" if key in old else "not in the store"
-                return f"{inner} is {here}"
-            found = _difference(old[key], new[key], inner)
-            if found is not None:
-                return found
-        return None
-    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
-        pairs = enumerate(zip(old, new, strict=True))
-        found_ = (_difference(a, b, f"{name}[{i}]") for i, (a, b) in pairs)
-        return next((each for each in found_ if each is not None), None)
-    if old == new or _is_close(old, new, name):
-        return None
-    return f"{name} = {_shown(old)} there, {_shown(new)} here"
-
-
 def _is_close(old: Any, new: Any, name: str) -> bool:
     """Gaits are found anew by each run, to their tolerance."""
     numbers = isinstance(old, float) and isinstance(new, float)
     own = name.startswith("gaits")
     return numbers and own and abs(old - new) <= _CLOSE * max(1e-3, abs(old))
-
-
-def _shown(value: object) -> str:
-    text = json.dumps(value)
-    return text if len(text) < 60 else f"{text[:57]}..."

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from tqdm import tqdm
 
-from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._checks import ArgumentError, check_type, user_path
+from jaxbiped._provenance import provenance
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label import Label
 from jaxbiped.basins._label_errors import ERRORS
@@ -17,7 +18,6 @@ from jaxbiped.sweep._array_layout import Layout, fields_of
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._memory_store import MemoryStore
 from jaxbiped.sweep._prepare import Guesses, guesses_among, with_gaits_met, with_guesses
-from jaxbiped.sweep._provenance import provenance
 from jaxbiped.sweep._same_store import GAITS
 from jaxbiped.sweep._store import ALL_GAITS, AbstractStore
 from jaxbiped.sweep._tighter_labels import tightened
@@ -87,8 +87,9 @@ def sweep(
     check_whole("workers", workers, 1)
     if not starts.size:
         raise ArgumentError("starts is empty: give at least one.")
-    if store is not None:
-        check_store(Path(store))
+    path = None if store is None else user_path(store)
+    if path is not None:
+        check_store(path)
     began = time.perf_counter()
     quantities = coordinate_quantities(labelling.scene)
     units = {name: quantity.unit for name, quantity in quantities.items()}
@@ -100,14 +101,14 @@ def sweep(
         "chunk_shape": list(layout.chunk_shape),
     }
     writer = provenance(labelling.scene, labelling.effort.solver, starts)
-    if store is not None:
-        ZarrStore.check(Path(store), labelling.settings() | own, writer, any_version=any_version)
+    if path is not None:
+        ZarrStore.check(path, labelling.settings() | own, writer, any_version=any_version)
     known = with_gaits_met(labelling, starts) if look_for_gaits else labelling
     settings = known.settings() | own
     results: AbstractStore = (
         MemoryStore(layout, settings, writer)
-        if store is None
-        else ZarrStore.open(Path(store), layout, settings, writer, any_version=any_version)
+        if path is None
+        else ZarrStore.open(path, layout, settings, writer, any_version=any_version)
     )
     missing = results.missing()
     sizes = layout.sizes

@@ -1,16 +1,22 @@
 """Zarr store: results written a chunk at a time, continued where a killed run left off."""
 
+import contextlib
+import glob
 import json
 import os
 import shutil
+import time
+import uuid
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, ResourceError, failure_kind
+from jaxbiped._disk_cache import ABANDONED
+from jaxbiped._strict_json import strict_json
 from jaxbiped._types import JsonObject
 from jaxbiped.sweep._array_layout import Layout, empty_dataset
 from jaxbiped.sweep._same_store import ALSO, GAITS, SETTINGS, check_same, check_writers
@@ -34,8 +40,11 @@ class ZarrStore(AbstractStore):
 
         self.path, self.layout = path, layout
         self._group: Any = zarr.open_group(str(path), mode="r+", use_consolidated=False)
-        done: Any = self._group[_DONE]
-        self._done = np.asarray(done[:])
+        try:
+            self._done = np.asarray(self._group[_DONE][:])
+        except Exception:  # damaged, of which each codec has errors of its own
+            self._done = np.zeros(layout.chunks, np.int8)
+        self._forget_lost()
 
     @staticmethod
     def open(
@@ -65,7 +74,7 @@ class ZarrStore(AbstractStore):
         path = path.absolute()
         try:
             if _is_new(path):
-                _create(path, layout, settings, writer)
+                create_store(path, lambda half: _write_empty(half, layout, settings, writer))
             check_same(path, settings)
             new = check_writers(path, writer, any_version)
             store = ZarrStore(path, layout)
@@ -93,6 +102,37 @@ class ZarrStore(AbstractStore):
         except OSError as error:
             raise unwritable(path, error) from None
 
+    def _forget_lost(self) -> None:
+        """Takes chunks whose files are not all there and whole for not labelled yet."""
+        names = [name for name in map(str, self._group.array_keys()) if self._is_cut(name)]
+        lost = 0
+        for chunk in np.flatnonzero(self._done):
+            places = [part.start // n for part, n in self._cuts(int(chunk))]
+            files = [self.path.joinpath(name, "c", *map(str, places)) for name in names]
+            try:
+                whole = all(file.exists() for file in files)
+                self.read(int(chunk), tuple(names) if whole else ())
+            except Exception:  # as above
+                whole = False
+            if not whole:
+                for file in files:
+                    file.unlink(missing_ok=True)
+                self._mark(int(chunk), 0)
+                lost += 1
+        if lost:
+            warnings.warn(
+                f"store = {str(self.path)!r}: {lost} of its chunks were lost or damaged; their "
+                "starts are labelled anew.",
+                RuntimeWarning,
+                stacklevel=4,
+            )
+
+    def _cuts(self, chunk: int) -> Iterator[tuple[slice, int]]:
+        return zip(self.layout.region(chunk), self.layout.chunk_shape, strict=True)
+
+    def _is_cut(self, name: str) -> bool:
+        return name != _DONE and name not in self.layout.starts.axes
+
     def missing(self) -> np.ndarray:
         return np.flatnonzero(self._done == 0)
 
@@ -100,21 +140,26 @@ class ZarrStore(AbstractStore):
         return np.flatnonzero(self._done < mark)
 
     def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, mark: int = COMPLETE) -> None:
+        import zarr
+
         region = self.layout.region(chunk)
         shape = self.layout.shape_of(chunk)
         try:
             if self._done[chunk]:
                 # Were it killed amid writing, the chunk must not pass for complete.
                 self._mark(chunk, 0)
-            for name, values in fields.items():
-                self._group[name][region] = np.reshape(values, shape)
+            # A chunk that is not there is one that was lost, whatever it held.
+            with zarr.config.set({"array.write_empty_chunks": True}):
+                for name, values in fields.items():
+                    self._group[name][region] = np.reshape(values, shape)
             self._mark(chunk, mark)
         except OSError as error:
             raise unwritable(self.path, error) from None
 
     def _mark(self, chunk: int, complete: int) -> None:
         self._done[chunk] = complete
-        self._group[_DONE][chunk] = complete
+        # All of them: another client that fills the same store may have written without its own.
+        self._group[_DONE][:] = self._done
 
     def read(self, chunk: int, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         region = self.layout.region(chunk)
@@ -161,55 +206,65 @@ def unwritable(path: Path, error: OSError) -> ArgumentError | ResourceError:
     )
 
 
-def _create(
-    path: Path, layout: Layout, settings: JsonObject, attributes: Mapping[str, str]
-) -> None:
-    """A store without results, complete in itself or not there at all.
+def create_store(path: Path, write: Callable[[Path], object]) -> None:
+    """A store that is complete in itself or not there at all.
 
-    Arrays take no room until they are written.
+    Where another client makes the same one meanwhile, that one stays.
     """
-    import zarr
-
-    half = path.with_name(f".{path.name}.unfinished")
-    shutil.rmtree(half, ignore_errors=True)
+    half = path.with_name(f".{path.name}.{uuid.uuid4().hex}.unfinished")
+    for left in path.parent.glob(f".{glob.escape(path.name)}.*unfinished"):
+        if left.stat().st_mtime < time.time() - ABANDONED:
+            shutil.rmtree(left, ignore_errors=True)
     try:
         half.parent.mkdir(parents=True, exist_ok=True)
-        group = zarr.create_group(
-            str(half), zarr_format=3, attributes={**attributes, SETTINGS: json.dumps(settings)}
-        )
-        for name, variable in empty_dataset(layout).variables.items():
-            own = name not in layout.starts.axes
-            array = group.create_array(
-                str(name),
-                shape=variable.shape,
-                chunks=layout.chunk_shape if own else variable.shape,
-                dtype=variable.dtype,
-                fill_value=variable.values.flat[0] if own else None,
-                dimension_names=list(map(str, variable.dims)),
-                attributes=variable.attrs,
-            )
-            if not own:
-                array[:] = variable.values
-        done: JsonObject = {
-            "long_name": "whether the chunk is complete; 2 after gaits were found late, more after "
-            "rounds of finer tolerances"
-        }
-        group.create_array(
-            _DONE,
-            shape=(layout.chunks,),
-            chunks=(layout.chunks,),
-            dtype="i1",
-            fill_value=0,
-            dimension_names=["chunk"],
-            attributes=done,
-        )
+        write(half)
         consolidate(half)
-        if path.exists():
-            path.rmdir()
-        half.rename(path)
-    except OSError:
+        with contextlib.suppress(OSError):
+            path.rmdir()  # where it is there and empty
+        try:
+            half.rename(path)
+        except OSError:
+            if _is_new(path):
+                raise
+    finally:
         shutil.rmtree(half, ignore_errors=True)
-        raise
+
+
+def _write_empty(
+    path: Path, layout: Layout, settings: JsonObject, attributes: Mapping[str, str]
+) -> None:
+    """A store without results. Arrays take no room until they are written."""
+    import zarr
+
+    group = zarr.create_group(
+        str(path), zarr_format=3, attributes={**attributes, SETTINGS: strict_json(settings)}
+    )
+    for name, variable in empty_dataset(layout).variables.items():
+        own = name not in layout.starts.axes
+        array = group.create_array(
+            str(name),
+            shape=variable.shape,
+            chunks=layout.chunk_shape if own else variable.shape,
+            dtype=variable.dtype,
+            fill_value=variable.values.flat[0] if own else None,
+            dimension_names=list(map(str, variable.dims)),
+            attributes=variable.attrs,
+        )
+        if not own:
+            array[:] = variable.values
+    done: JsonObject = {
+        "long_name": "whether the chunk is complete; 2 after gaits were found late, more after "
+        "rounds of finer tolerances"
+    }
+    group.create_array(
+        _DONE,
+        shape=(layout.chunks,),
+        chunks=(layout.chunks,),
+        dtype="i1",
+        fill_value=0,
+        dimension_names=["chunk"],
+        attributes=done,
+    )
 
 
 def consolidate(path: Path) -> None:

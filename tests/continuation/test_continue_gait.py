@@ -196,7 +196,7 @@ def test_a_dataset_says_what_is_in_it(rigid):
     assert data["event_kind"].attrs["flag_meanings"].split()[int(data["event_kind"][0])] == (
         "period-doubling"
     )
-    with pytest.raises(jb.ArgumentError, match="differs from the branch's own in r"):
+    with pytest.raises(jb.ArgumentError, match=r"differs from the branch's own in scene\.r"):
         open_branch(data, jb.with_parameters(rigid_seed(), {"r": 0.09}))
     with pytest.raises(jb.ArgumentError, match="must be that of a branch"):
         open_branch(xarray.Dataset(), rigid_seed())

@@ -30,6 +30,10 @@ def test_a_store_is_gone_on_from(tmp_path):
     store.write_text(store.read_text() + "\n")
     rows = study(CASES, judged, store=store, follow=shown.append)
     assert calls == [case.key for case in CASES]
+    # What another version judged is judged anew.
+    store.write_text(store.read_text().replace("version_jaxbiped", "of_another"))
+    assert len(study(CASES, judged, store=store)) == 3
+    assert calls == 2 * [case.key for case in CASES]
     assert [row["verdict"] for row in shown] == ["accurate", "refused"]
     assert counts(rows, VERDICTS) == {
         "run": 3, "accurate": 1, "flagged": 0, "refused": 2, "silently_wrong": 0, "unresolved": 0

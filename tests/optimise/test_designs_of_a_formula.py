@@ -72,7 +72,7 @@ def problem(vary, told, sense, subject_to=None):
     scene = jb.with_parameters(SCENE, {"slope": 0.02})
     made = Formulas(
         scene, variables_of(scene, vary), told, sense, requirements_of(scene, subject_to),
-        GaitSettings(), Evaluations(None, {}),
+        GaitSettings(), Evaluations(),
     )  # fmt: skip
     made.at(np.full(len(vary), 0.4))
     return made

@@ -1,14 +1,19 @@
 """Optimisation of a gait: against a grid, through lost gaits, resumed, interrupted; bad inputs."""
 
+import dataclasses
 import json
 
+import jax.tree_util as jtu
 import numpy as np
 import optax
 import pytest
 
 import jaxbiped as jb
 from jaxbiped.optimise._design_problem import DesignProblem
+from jaxbiped.optimise._ensemble import GaitSettings
 from jaxbiped.optimise._evaluations import Evaluations
+from jaxbiped.optimise._objectives import Evaluation
+from jaxbiped.optimise._optimise_gait import _problem_settings
 from jaxbiped.optimise._variables import variables_of
 
 pytestmark = pytest.mark.slow
@@ -157,16 +162,74 @@ def test_a_store_is_resumed_where_it_was(tmp_path):
     some = best_of(subject_to="step_length<0.19", iterations=3, store=path)
     lines = len(path.read_text().splitlines())
     assert lines == 1 + some.evaluations
-    # A line that a killed run left half-written is left out.
+    # A line that a killed run left half-written is passed over.
     with path.open("a") as file:
         file.write('{"u": [0.1')
     again = best_of(subject_to="step_length<0.19", store=path)
     assert again.variables == whole.variables
     assert again.evaluations == whole.evaluations
-    assert len(path.read_text().splitlines()) == 1 + again.evaluations
-    with pytest.raises(jb.ArgumentError, match="another problem"):
-        best_of(vary={"d": (0.08, 0.13)}, store=path)
-    assert json.loads(path.read_text().splitlines()[0])["goal"][1] == -1.0
+    assert len(path.read_text().splitlines()) == 2 + again.evaluations
+    for other in (
+        {"vary": {"d": (0.08, 0.13)}},
+        {"accuracy": "tight"},
+        {"subject_to": "spectral_radius<0.4"},
+        {"subject_to": None},
+        {"scatter": {"l": 0.01}},
+    ):
+        with pytest.raises(jb.ArgumentError, match="another problem"):
+            best_of(**{"subject_to": "step_length<0.19"} | other, store=path)
+    # Another bound of the same measure, another design to begin from: what is kept serves them.
+    other_way = best_of(subject_to="step_length<0.185", store=path)
+    assert other_way.objective == pytest.approx(
+        best_of(subject_to="step_length<0.185").objective, rel=1e-9
+    )
+
+
+def test_a_store_is_of_the_laws_and_rules_of_its_scene(tmp_path):
+    """Scenes whose numbers are all the same."""
+    seed = jb.seed_scene()
+    numbers = {f.name: getattr(seed.friction, f.name) for f in dataclasses.fields(seed.friction)}
+    others = (
+        dataclasses.replace(seed, friction=jb.laws.SmoothBengisuAkay(**numbers)),
+        dataclasses.replace(seed, clearance=jb.laws.AlwaysTouching()),
+        jb.with_parameters(seed, {"mu_static": 0.51}),
+    )
+
+    def settings(scene):
+        return _problem_settings(scene, {"d": (0.08, 0.12)}, {"speed"}, GaitSettings(), None)
+
+    Evaluations(tmp_path / "a", settings(seed))
+    # What is varied takes other values in every design.
+    Evaluations(tmp_path / "a", settings(jb.with_parameters(seed, {"d": 0.11})))
+    for other in others:
+        with pytest.raises(jb.ArgumentError, match="another problem"):
+            Evaluations(tmp_path / "a", settings(other))
+
+
+def test_what_is_not_finite_comes_back_from_a_store(tmp_path):
+    some = Evaluation(
+        {"speed": 1.0}, {"speed": np.inf}, {"speed": np.array([np.nan, 1.0])},
+        {"speed": np.array([-np.inf, 1.0])}, np.array([0.5]), np.array([[np.nan]]),
+    )  # fmt: skip
+    for _ in range(2):  # as two runs that begin it together
+        Evaluations(tmp_path / "a", {"of": 1}).add(np.array([0.25]), some)
+
+    def refuse(word):
+        raise AssertionError(word)
+
+    for line in (tmp_path / "a").read_text().splitlines():
+        json.loads(line, parse_constant=refuse)
+    kept = Evaluations(tmp_path / "a", {"of": 1}).get(np.array([0.25]))
+    jtu.tree_map(np.testing.assert_array_equal, kept, some)
+
+
+def test_a_front_keeps_the_evaluations_of_all_its_points(tmp_path):
+    options = {"vary": {"d": (0.05, 0.2)}, "maximise": "speed", "subject_to": "step_length<0.3",
+               "against": "spectral_radius", "bounds": [0.5, 0.45]}  # fmt: skip
+    plain = jb.optimise.pareto_front(RIGID, **options)
+    for _ in range(2):
+        front = jb.optimise.pareto_front(RIGID, **options, store=tmp_path / "a")
+        np.testing.assert_allclose(front.values("speed"), plain.values("speed"), rtol=1e-9)
 
 
 def test_ctrl_c_keeps_the_best(monkeypatch):

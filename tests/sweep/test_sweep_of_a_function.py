@@ -9,7 +9,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.basins._label import Label
-from jaxbiped.sweep import _nearest_failure
+from jaxbiped.sweep import _nearest_failure, _zarr_store
 from jaxbiped.sweep._attractor import attractor_without_radius, component_scales
 from jaxbiped.sweep._effort import effort_of
 from jaxbiped.sweep._labelled import Labelled
@@ -60,6 +60,44 @@ def test_a_store_keeps_what_was_labelled_and_labels_it_once(tmp_path, by_formula
     assert sum(by_formula) == 12
     assert (again.attrs["labelled_in_this_run"], again.attrs["chunks_found_complete"]) == (0, 3)
     np.testing.assert_array_equal(again.label, expected)
+
+
+@pytest.mark.parametrize("field", ["label", "gait", "closest", "attempted"])
+@pytest.mark.parametrize("damage", [None, b"garbage"])
+def test_a_lost_or_damaged_chunk_is_labelled_anew(tmp_path, by_formula, field, damage):
+    whole = swept(tmp_path / "a", grid()).load()
+    assert by_formula == [4, 4, 4]
+    chunk = tmp_path / "a" / field / "c" / "2" / "0"
+    chunk.unlink() if damage is None else chunk.write_bytes(damage)
+    with pytest.warns(RuntimeWarning, match="1 of its chunks were lost or damaged"):
+        again = swept(tmp_path / "a", grid())
+    assert by_formula == [4] * 4
+    assert again.load().drop_attrs().identical(whole.drop_attrs())
+    swept(tmp_path / "a", grid())
+    assert by_formula == [4] * 4
+
+
+def test_two_clients_begin_one_store(tmp_path, by_formula, monkeypatch):
+    """The other one makes the same store while this one writes its own."""
+    plain, inner = _zarr_store._write_empty, []
+
+    def write(*args):
+        if not inner:
+            inner.append(1)
+            swept(tmp_path / "a", grid())
+        plain(*args)
+
+    monkeypatch.setattr(_zarr_store, "_write_empty", write)
+    found = swept(tmp_path / "a", grid())
+    assert (found.label.values >= 0).all()
+    assert [each.name for each in tmp_path.iterdir()] == ["a"]
+    assert swept(tmp_path / "a", grid()).attrs["labelled_in_this_run"] == 0
+
+
+def test_a_store_in_the_home_folder(tmp_path, by_formula, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    swept("~/a", grid())
+    assert [each.name for each in tmp_path.iterdir()] == ["a"]
 
 
 def place(scene, states):

@@ -166,9 +166,10 @@ def test_a_directory_of_something_else_is_refused(tmp_path):
 
 
 def test_a_creation_that_was_cut_off_is_begun_anew(tmp_path):
-    half = tmp_path / ".store.unfinished"
+    half = tmp_path / ".store.ab12.unfinished"
     (half / "label").mkdir(parents=True)
     (half / "zarr.json").write_text('{"zarr_form')
+    os.utime(half, (0.0, 0.0))  # long ago
     (tmp_path / "store").mkdir()
     same_results(_swept(tmp_path / "store"), _swept())
     assert not half.exists()

@@ -7,7 +7,8 @@ import equinox as eqx
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.sweep._identity import code_digests, identity
+from jaxbiped._identity import code_digests, identity
+from jaxbiped.scene._scene_identity import scene_identity
 from tests.sweep.walkers import gaitless
 
 SEED = jb.seed_scene()
@@ -61,7 +62,27 @@ def test_functions_are_known_by_module_name_and_what_is_bound():
         return identity(functools.partial(max, k))
 
     assert of(1) != of(2)
-    assert identity(test_numbers_are_told_once_and_by_name).startswith("tests.sweep.test_identity")
+    assert identity(test_numbers_are_told_once_and_by_name).startswith("tests.test_identity")
+
+
+def test_functions_are_known_by_what_they_were_made_with():
+    def power(exponent):
+        return lambda x, scale=2.0: scale * x**exponent
+
+    def again(count):
+        return count and again(count - 1)
+
+    assert identity(power(1)) == identity(power(1)) != identity(power(2))
+    assert "again" in identity(again)
+
+
+def test_constants_of_a_constraint_method_tell_scenes_apart():
+    def of(**constants):
+        method = jb.constraints.Baumgarte(**constants)
+        return scene_identity(jb.RedundantScene(SEED, method))
+
+    assert of() == of() != of(a=7.0)
+    assert of()["scene"]["K"] == 1e6
 
 
 def test_only_the_code_of_a_user_is_digested():

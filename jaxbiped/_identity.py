@@ -8,8 +8,9 @@ import enum
 import functools
 import hashlib
 import inspect
+import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -53,9 +54,57 @@ def identity(value: object) -> Any:
         return {"class": qualified_name(type(value))} | {
             name: identity(part) for name, part in _telling(value)
         }
+    if inspect.isfunction(value):
+        return _function_identity(value)
     if hasattr(value, "__qualname__"):
         return qualified_name(value)
     return repr(value)
+
+
+def _function_identity(function: Any) -> Any:
+    """A function's name, with what it was made with where that differs from call to call."""
+    nonlocals = inspect.getclosurevars(function).nonlocals.items()
+    bound = {
+        "defaults": function.__defaults__,
+        "keywords": function.__kwdefaults__,
+        "closure": {name: each for name, each in nonlocals if each is not function},
+    }
+    bound = {name: identity(each) for name, each in bound.items() if each}
+    return {"function": qualified_name(function), **bound} if bound else qualified_name(function)
+
+
+def difference_of(
+    old: object,
+    new: object,
+    name: str = "",
+    alike: Callable[[Any, Any, str], bool] = lambda old, new, name: False,
+) -> str | None:
+    """The first difference of two identities in words, None for none.
+
+    `alike` may say of two values and their name that they count as equal.
+    """
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in dict.fromkeys([*new, *old]):
+            inner = f"{name}.{key}" if name else key
+            if key not in old or key not in new:
+                here = "only in the store" if key in old else "not in the store"
+                return f"{inner} is {here}"
+            found = difference_of(old[key], new[key], inner, alike)
+            if found is not None:
+                return found
+        return None
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        pairs = enumerate(zip(old, new, strict=True))
+        found_ = (difference_of(a, b, f"{name}[{i}]", alike) for i, (a, b) in pairs)
+        return next((each for each in found_ if each is not None), None)
+    if old == new or alike(old, new, name):
+        return None
+    return f"{name} = {_shown(old)} there, {_shown(new)} here"
+
+
+def _shown(value: object) -> str:
+    text = json.dumps(value)
+    return text if len(text) < 60 else f"{text[:57]}..."
 
 
 def code_digests(*values: object) -> dict[str, str]:
@@ -69,7 +118,8 @@ def code_digests(*values: object) -> dict[str, str]:
             digest = hashlib.sha256(inspect.getsource(own).encode()).hexdigest()[:16]
         except (OSError, TypeError):
             digest = "unknown"
-        found[qualified_name(own)] = digest
+        name = qualified_name(own)  # which several functions without names of their own share
+        found[name] = f"{found[name]} {digest}" if name in found else digest
     return dict(sorted(found.items()))
 
 

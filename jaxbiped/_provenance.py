@@ -8,13 +8,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from jaxbiped._caches import bounded_cache
-from jaxbiped.sweep._identity import code_digests
+from jaxbiped._identity import code_digests
 
 _PACKAGES = ("jaxbiped", "jax", "diffrax", "numpy", "llvmlite")
 
 
 DECISIVE = ("version_jaxbiped", "git_revision", "user_code")
-"""Of the provenance, what decides on labels; other packages' versions change their rounding."""
+"""Of the provenance, what decides on results; other packages' versions change their rounding."""
 
 
 def provenance(*models: object) -> dict[str, str]:
@@ -50,6 +50,6 @@ def _revision() -> str:
 
 def _git(*command: str) -> str:
     """What git says of the package's own folder."""
-    package = Path(__file__).parents[1]
+    package = Path(__file__).parent
     asked = ["git", "-C", str(package), *command]
     return subprocess.run(asked, capture_output=True, text=True, check=True).stdout
