@@ -1,14 +1,17 @@
 """Checks of arguments: one clear sentence each, raised before anything is compiled.
 
-Values that are being traced (inside `jit`, `vmap`, `grad`) have no number to check and pass. JAX is
-not imported for a check, nor NumPy before one: the command line refuses without them.
+Values that are being traced (inside `jit`, `vmap`, `grad`) have no number to check and pass; what
+would be refused is noted for those who ask (`traced_rules`). JAX is not imported for a check, nor
+NumPy before one: the command line refuses without them.
 """
 
+import contextlib
 import errno
 import json
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -16,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from jaxtyping import ArrayLike
 
-_Test: TypeAlias = "Callable[[np.ndarray], np.ndarray]"
+_Test: TypeAlias = "Callable[[Any], Any]"
 
 
 class ArgumentError(ValueError):
@@ -49,7 +52,7 @@ def is_number(value: object) -> bool:
         return bool(jax.dtypes.issubdtype(value.dtype, np.number))  # type: ignore[attr-defined]
     if isinstance(value, list | tuple):
         return all(map(is_number, value))
-    return not isinstance(value, str | bytes | bool)
+    return value is not None and not isinstance(value, str | bytes | bool)
 
 
 def _is_traced(value: object) -> bool:
@@ -74,29 +77,67 @@ def _shown(array: "np.ndarray", bad: "np.ndarray") -> str:
     return first if array.size == 1 else f"{first} (one of {int(bad.sum())} such entries)"
 
 
+_RULES: ContextVar["list[ArrayLike] | None"] = ContextVar("rules", default=None)
+
+
+@contextlib.contextmanager
+def traced_rules() -> "Iterator[list[ArrayLike]]":
+    """Gathers, of all that is checked within and traced, whether it is allowed (booleans).
+
+    A door puts NaN where one of them does not hold, so that this lane fails and no other does.
+    Doors within doors gather for both.
+    """
+    rules: list[ArrayLike] = []
+    outer, token = _RULES.get(), _RULES.set(rules)
+    try:
+        yield rules
+    finally:
+        _RULES.reset(token)
+        if outer is not None:
+            outer.extend(rules)
+
+
+def _note(holds: "Callable[[], ArrayLike]") -> None:
+    if (rules := _RULES.get()) is not None:
+        rules.append(holds())
+
+
 def _require(name: str, value: object, allowed: str, test: _Test) -> None:
     if _is_traced(value):
+        import jax.numpy as jnp
+
+        _note(lambda: jnp.all(jnp.isfinite(value) & test(value)))  # type: ignore[arg-type]
         return
     import numpy as np
 
     array = _numbers(name, value)
+    if not array.ndim and np.isfinite(one := array.item()) and test(one):
+        return  # the quick way for what is asked of every number at every door
     bad = ~(np.isfinite(array) & test(array))
     if bad.any():
         raise ArgumentError(f"{name} = {_shown(array, bad)} is not allowed: it must be {allowed}.")
 
 
 def holds_somewhere(condition: "ArrayLike") -> bool:
-    """Whether a condition is known to hold in any entry; what is being traced is not known."""
+    """Whether a condition that must not hold is known to, in any entry.
+
+    What is being traced is not known, and noted.
+    """
     import numpy as np
 
-    return not _is_traced(condition) and bool(np.any(np.asarray(condition)))
+    if _is_traced(condition):
+        _note(lambda: ~condition.any())  # type: ignore[union-attr]
+        return False
+    return bool(np.any(np.asarray(condition)))
 
 
-def is_zero_somewhere(value: "ArrayLike") -> bool:
-    """Whether any entry is known to be zero."""
+def are_zero_together(one: "ArrayLike", other: "ArrayLike") -> bool:
+    """Whether two numbers that must not both be zero are known to be, in any entry."""
     import numpy as np
 
-    return not _is_traced(value) and bool(np.any(np.asarray(value) == 0.0))
+    if _is_traced(one) or _is_traced(other):
+        return holds_somewhere((one == 0.0) & (other == 0.0))
+    return bool(np.any((np.asarray(one) == 0.0) & (np.asarray(other) == 0.0)))
 
 
 def check_finite(name: str, value: object) -> None:
@@ -147,7 +188,9 @@ def check_at_least(name: str, value: object, bound_name: str, bound: object) -> 
 
     `bound_name` is the argument that sets the bound, or the bound itself in words.
     """
-    if not _is_traced(bound):
+    if _is_traced(bound):
+        _note(lambda: (value >= bound).all())  # type: ignore[operator]
+    else:
         floor = _numbers(bound_name, bound)
         allowed = f"at least {bound_name}"
         if floor.size == 1 and bound_name.isidentifier():

@@ -68,11 +68,12 @@ def parameter_infos(part: Any) -> dict[str, ParameterInfo]:
 
 def check_parameters(part: object) -> None:
     """Raises `ArgumentError` for the first parameter of a part that is not allowed."""
-    for name, info in parameter_infos(part).items():
-        value = getattr(part, name)
-        if value is not None:
+    infos = parameter_infos(part)
+    for field in dataclasses.fields(part):  # type: ignore[arg-type]
+        value = getattr(part, field.name)
+        if field.name in infos and (value is not None or field.default is not None):
             for entry in value if isinstance(value, tuple) else (value,):
-                info.check(name, entry)
+                infos[field.name].check(field.name, entry)
 
 
 def _optional_float(value: Parameter | None) -> Scalar | None:

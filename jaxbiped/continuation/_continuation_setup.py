@@ -5,7 +5,7 @@ from typing import NamedTuple, cast
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_type, check_unbatched
+from jaxbiped._checks import ArgumentError, check_unbatched
 from jaxbiped._types import as_float
 from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._branch import Branch
@@ -23,6 +23,7 @@ from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._pseudo_arclength import Attempt, Curve, CurvePoint, correct
 from jaxbiped.gait._return_map_spec import walking_spec
 from jaxbiped.gait._solver import orbit_solver
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -112,7 +113,7 @@ def continuation_setup(
     scene: Scene | RigidScene, axis: Axis, *, footsteps: int, accuracy: str, engine: str
 ) -> ContinuationSetup:
     """The setup for a scene; raises `ArgumentError` for an engine that cannot."""
-    scene = jtu.tree_map(as_float, scene)
+    scene = check_scene(scene, Scene, RigidScene)
     like = default_guess(scene)
     solver = orbit_solver(None, rigid=not scene.compliant)
     section = section_of(scene, None)
@@ -138,5 +139,5 @@ def check_followed(scene: object) -> None:
             "scene is not allowed in redundant coordinates: its gaits are those of scene.minimal, "
             "which can be followed."
         )
-    check_type("scene", scene, Scene, RigidScene)
+    check_scene(scene, Scene, RigidScene)
     check_unbatched("scene", scene)

@@ -7,7 +7,8 @@ from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._continue_gait import continue_gait
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._parameters import parameter_names, parameter_values
+from jaxbiped.scene._check_scene import check_scene
+from jaxbiped.scene._parameters import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
@@ -15,6 +16,8 @@ FACTOR = 8.0
 """How far a parameter is followed to both sides of its own value."""
 STEEPEST = 0.1
 """How far the slope is followed to both sides of level ground [rad]."""
+_FINEST = 1e-9
+"""Share of a range to which the end of what is allowed is found."""
 
 
 class NearestBifurcation(NamedTuple):
@@ -37,17 +40,35 @@ class NearestBifurcation(NamedTuple):
     error: float
 
 
-def range_of(along: str, own: float, factor: float = FACTOR) -> tuple[float, float]:
-    """The range in which a gait is followed from a parameter's own value.
+def range_of(scene: Scene | RigidScene, along: str, factor: float = FACTOR) -> tuple[float, float]:
+    """The range in which a gait is followed from a parameter's own value, as far as it is allowed.
 
     Raises:
         ArgumentError: a parameter other than the slope that is zero.
     """
-    if own != 0.0:
-        return own / factor, own * factor
-    if along != "slope":
+    own = float(parameter_values(scene)[along])
+    if own == 0.0 and along != "slope":
         raise ArgumentError(f"along = {along!r} is not allowed where {along} is 0: no factor fits.")
-    return -STEEPEST, STEEPEST
+    ends = (own / factor, own * factor) if own else (-STEEPEST, STEEPEST)
+    low, high = (_furthest(scene, along, own, end) for end in ends)
+    return low, high
+
+
+def _furthest(scene: Scene | RigidScene, along: str, own: float, end: float) -> float:
+    """The value nearest to an end of which the parts of the scene allow all on the way."""
+    allowed = 0.0
+    share, step = 1.0, 1.0
+    while step > _FINEST:
+        try:
+            with_parameters(scene, {along: own + share * (end - own)})
+            allowed = share
+        except ArgumentError:
+            pass
+        if allowed == 1.0:
+            break
+        step *= 0.5
+        share = allowed + step
+    return end if allowed == 1.0 else own + allowed * (end - own)
 
 
 def nearest_bifurcation(
@@ -59,8 +80,8 @@ def nearest_bifurcation(
         scene: the gait's.
         gait: where to begin.
         along: the parameter's name (see `parameter_names`).
-        factor: how far to follow it: from its own value over this to its own times this; the slope
-            of level ground by 0.1 rad to both sides.
+        factor: how far to follow it: from its own value over this to its own times this, or as far
+            as the scene allows; the slope of level ground by 0.1 rad to both sides.
 
     Returns:
         The one whose value differs by the smallest factor.
@@ -69,11 +90,12 @@ def nearest_bifurcation(
         ArgumentError: an argument that is not allowed, before anything is compiled; a parameter
             other than the slope that is zero, which no factor changes.
     """
+    scene = check_scene(scene, Scene, RigidScene)
     check_choice("along", along, parameter_names(scene))
     own = float(parameter_values(scene)[along])
     if not factor > 1.0:
         raise ArgumentError(f"factor = {factor!r} is not allowed: it must be above 1.")
-    bounds, level = range_of(along, own, factor), own == 0.0
+    bounds, level = range_of(scene, along, factor), own == 0.0
     steps = gait.orbit[0].shape[0]
     branch = continue_gait(scene, along, bounds=bounds, guess=gait, footsteps=steps)
     seen = [each for each in branch.bifurcations if level or each.value / own > 0.0]

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._checks import ArgumentError
 from jaxbiped._identity import difference_of
 from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
@@ -17,6 +17,7 @@ from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._scene_identity import scene_identity
@@ -40,7 +41,7 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
     Raises:
         ArgumentError: a dataset of something else, of another scene, or that lacks a variable.
     """
-    check_type("scene", scene, Scene, RigidScene)
+    scene = check_scene(scene, Scene, RigidScene)
     if "branch" not in dataset.attrs:
         raise ArgumentError("dataset is not allowed: it must be that of a branch.")
     settings = json.loads(dataset.attrs["branch"])

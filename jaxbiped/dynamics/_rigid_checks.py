@@ -12,6 +12,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._rigid_scene import RigidScene
 
 
@@ -68,7 +69,7 @@ def rigid_checks(scene: RigidScene, states: RigidState) -> RigidChecks:
     Raises:
         ArgumentError: an argument of the wrong type.
     """
-    check_type("scene", scene, RigidScene)
+    scene = check_scene(scene, RigidScene)
     check_type("states", states, RigidState)
     states = jtu.tree_map(lambda leaf: np.ravel(np.asarray(leaf)), states)
     known = np.isfinite(states.theta_2)

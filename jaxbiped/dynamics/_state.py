@@ -85,12 +85,18 @@ def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTre
 
 
 def check_leaves(state: SomeState, name: str) -> SomeState:
-    """`state` with every leaf a floating-point array of one shape; None stays.
+    """`state` with every leaf a floating-point array of one shape; None stays where a kind of
+    state has it.
 
     Raises:
         ArgumentError: an entry that is not finite, or leaves of different shapes.
     """
-    given = {field: value for field, value in state._asdict().items() if value is not None}
+    left_out = [name for name, default in state._field_defaults.items() if default is None]
+    given = {
+        field: value
+        for field, value in state._asdict().items()
+        if value is not None or field not in left_out
+    }
     for field, value in given.items():
         check_finite(f"{name}.{field}", value)
     leaves = {field: as_float(value) for field, value in given.items()}

@@ -13,9 +13,8 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._caches import PROGRAMS, Once, bounded_cache
-from jaxbiped._checks import check_choice, check_count, check_type, check_unbatched
+from jaxbiped._checks import check_choice, check_count, check_unbatched
 from jaxbiped._progress import stage
-from jaxbiped._types import as_float
 from jaxbiped.compiler import deferred_checks, host_jit
 from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._consistent_state import consistent_state
@@ -36,6 +35,7 @@ from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._staged_search import is_whole, origin_of, search_in_stages, spectral_radius
 from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._parameters import select_parameters
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -118,7 +118,7 @@ def find_gait(
         >>> str(gait.outcome), round(float(gait.measures.period), 4)
         ('found', 0.4438)
     """
-    check_type("scene", scene, Scene, RigidScene, RedundantScene)
+    scene = check_scene(scene, Scene, RigidScene, RedundantScene)
     if not isinstance(accuracy, str | Precision):
         check_wanted(accuracy, optimiser=optimiser)
         find = functools.partial(
@@ -145,7 +145,6 @@ def find_gait(
     check_unbatched("guess", start, "one state")
     most = (40 if method == "newton" else 400) if max_evaluations is None else max_evaluations
     check_count("max_evaluations", most)
-    scene = jtu.tree_map(as_float, scene)
     # A redundant scene's leaves begin with those of what it models.
     modelled = scene.minimal
     names, active = select_parameters(modelled, parameters)

@@ -8,13 +8,14 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._cached_jit import cached_jit
-from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
@@ -56,14 +57,14 @@ def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options:
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
     """
-    check_type("scene", scene, Scene, RigidScene)
+    scene = check_scene(scene, Scene, RigidScene)
     shapes = {jnp.shape(leaf) for leaf in jtu.tree_leaves(starts)}
     if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):
         raise ArgumentError(
             f"starts has leaves of shapes {sorted(shapes)}: they must all be (n,), n at least 1."
         )
 
-    gaits = _find_each(jtu.tree_map(as_float, scene), jtu.tree_map(as_float, starts), options)
+    gaits = _find_each(scene, jtu.tree_map(as_float, starts), options)
     first, which = _told_apart(gaits)
     reached = np.bincount(which[which >= 0], minlength=len(first))
     order = np.argsort(-reached, kind="stable")

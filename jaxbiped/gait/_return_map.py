@@ -19,7 +19,10 @@ from jaxbiped.gait._return_by_xla import forward_by_xla, reverse_by_xla
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.scene._abstract_scene import is_rigid
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.variational._hybrid_system import (
@@ -92,6 +95,8 @@ def return_map(
     check_anywhere(gradient, "a return map")
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     check_positive("footsteps", footsteps)
+    if system is None:
+        args = check_scene(args, Scene, RigidScene, RedundantScene)
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
     redundant = isinstance(args, RedundantScene) and system is None
     enters = redundant and not is_redundant(state)

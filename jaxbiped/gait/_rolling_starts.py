@@ -4,16 +4,15 @@ from typing import cast
 
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
 
 from jaxbiped._cached_jit import cached_jit
-from jaxbiped._checks import check_positive, check_type
-from jaxbiped._types import as_float
+from jaxbiped._checks import check_positive
 from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._default_guess import default_guess
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
@@ -36,10 +35,10 @@ def rolling_starts(
     Raises:
         ArgumentError: count below 1, or spread not above 0.
     """
-    check_type("scene", scene, Scene, RigidScene)
+    scene = check_scene(scene, Scene, RigidScene)
     check_positive("count", count)
     check_positive("spread", spread)
-    return _scatter(jtu.tree_map(as_float, scene), int(count), float(spread), int(seed))
+    return _scatter(scene, int(count), float(spread), int(seed))
 
 
 @cached_jit  # many small operations

@@ -11,6 +11,7 @@ from jaxbiped._checks import ArgumentError, check_choice, check_count, check_fin
 from jaxbiped.identify._gait_fit import FitEnding, GaitFit, information
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._parameters import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -61,7 +62,7 @@ def fit_gait(
         >>> str(fit.ending), round(fit.estimates["J"], 4)
         ('converged', 0.0096)
     """
-    check_type("scene", scene, Scene, RigidScene)
+    scene = check_scene(scene, Scene, RigidScene)
     bounds = _check_bounds(scene, vary)
     gaits = [measured] if isinstance(measured, MeasuredGait) else list(measured)
     if not gaits:

@@ -119,7 +119,7 @@ def bifurcation_distance(
     check_choice("along", along, parameter_names(scene))
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     own = float(parameter_values(scene)[along])
-    bounds = range_of(along, own)
+    bounds = range_of(scene, along)
     axis = axis_of(scene, along, bounds, None)
     steps = int(gait.orbit[0].shape[0])
     setup = continuation_setup(scene, axis, footsteps=steps, accuracy=accuracy, engine=gait.engine)

@@ -12,7 +12,11 @@ from jaxbiped._types import as_float
 from jaxbiped.basins._fractions import Fraction, wilson_interval
 from jaxbiped.basins._label import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock
-from jaxbiped.continuation._nearest_bifurcation import NearestBifurcation, nearest_bifurcation
+from jaxbiped.continuation._nearest_bifurcation import (
+    NearestBifurcation,
+    nearest_bifurcation,
+    range_of,
+)
 from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._section import HeelStrike
 from jaxbiped.gait._find_gait import find_gait
@@ -142,6 +146,7 @@ def certify(
     check_choice("footsteps of the gait", gait.orbit[0].shape[0], (1,))
     for name in bifurcations_along:
         check_choice("bifurcations_along", name, parameter_names(scene))
+        range_of(scene, name)  # refused where it has none
     sizes, errors = np.abs(np.asarray(gait.multipliers)), np.asarray(gait.multiplier_errors)
     undecided = bool(np.any(np.abs(sizes - 1.0) <= errors))
     labels = bool(starts or fatal_push)

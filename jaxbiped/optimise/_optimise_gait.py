@@ -27,7 +27,7 @@ from jaxbiped.optimise._requirements import Requirement, SubjectTo, requirements
 from jaxbiped.optimise._restarts import scattered_designs
 from jaxbiped.optimise._runs import Iteration, Outcome, Runs
 from jaxbiped.optimise._variables import start_of, variables_of
-from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._scene_identity import scene_identity
@@ -148,7 +148,7 @@ def optimise_gait(
         >>> str(best.outcome), round(best.variables["d"], 4)
         ('converged', 0.0873)
     """
-    check_type("scene", scene, Scene, RigidScene)
+    scene = check_scene(scene, Scene, RigidScene)
     variables = variables_of(scene, vary)
     told, sense = _goal(scene, maximise, minimise)
     requirements = requirements_of(scene, subject_to)
@@ -263,8 +263,7 @@ def _problem_settings(
 
 def _message(problem: DesignProblem, best: Design, ended: Ended) -> str:
     """The optimiser's own words, and which bifurcations the best design does not meet."""
-    own = float(parameter_values(problem.scene_at(best.u))["slope"])
-    low, high = range_of("slope", own)
+    low, high = range_of(problem.scene_at(best.u), "slope")
     return " ".join(
         [
             ended.message,

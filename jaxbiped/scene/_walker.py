@@ -4,8 +4,8 @@ import equinox as eqx
 
 from jaxbiped._checks import (
     ArgumentError,
+    are_zero_together,
     check_at_least,
-    is_zero_somewhere,
 )
 from jaxbiped._parameter import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
@@ -39,13 +39,12 @@ class Walker(eqx.Module):
     def __check_init__(self) -> None:
         check_parameters(self)
         check_at_least("l", self.l, "r", self.r)
-        if is_zero_somewhere(self.J):
-            for name in ("d", "hip_mass"):
-                if is_zero_somewhere(getattr(self, name)):
-                    raise ArgumentError(
-                        f"J = 0 is not allowed where {name} = 0: legs that are mass points need d "
-                        "and hip_mass above 0."
-                    )
+        for name in ("d", "hip_mass"):
+            if are_zero_together(self.J, getattr(self, name)):
+                raise ArgumentError(
+                    f"J = 0 is not allowed where {name} = 0: legs that are mass points need d "
+                    "and hip_mass above 0."
+                )
 
     @property
     def hip_to_foot(self) -> Scalar:

@@ -7,12 +7,13 @@ from jaxbiped._checks import (
     ArgumentError,
     check_count,
     check_positive,
-    check_type,
     check_unbatched,
+    traced_rules,
 )
 from jaxbiped._types import as_float, by_numpy
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import check_state
+from jaxbiped.scene._check_scene import check_scene, where_allowed
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._accurate_rigid_walk import accurate_rigid_walk
 from jaxbiped.simulate._accurate_walk import check_accurate_walk
@@ -77,27 +78,28 @@ def rigid_walk(
         >>> str(walk.outcome), int(walk.arrivals.total)
         ('walking', 2)
     """
-    check_type("scene", scene, RigidScene)
-    scene = jtu.tree_map(as_float, scene)
-    state = in_one_precision(check_state(in_own_precision(state), RigidState))
-    check_single_scene(scene)
-    check_unbatched("state", state, "one start")
-    if duration is None and footsteps is None:
-        raise ArgumentError("duration = None and footsteps = None: say how long to walk.")
-    if footsteps is not None:
-        check_count("footsteps", footsteps)
-    if duration is not None:
-        check_unbatched("duration", duration)
-        check_positive("duration", duration, "s")
+    with traced_rules() as rules:
+        scene = check_scene(scene, RigidScene)
+        state = in_one_precision(check_state(in_own_precision(state), RigidState))
+        check_single_scene(scene)
+        check_unbatched("state", state, "one start")
+        if duration is None and footsteps is None:
+            raise ArgumentError("duration = None and footsteps = None: say how long to walk.")
+        if footsteps is not None:
+            check_count("footsteps", footsteps)
+        if duration is not None:
+            check_unbatched("duration", duration)
+            check_positive("duration", duration, "s")
+        wanted = check_accurate_walk(accuracy, rtol=rtol)
+        named = accuracy if isinstance(accuracy, str) else "balanced"
+        tolerance = ACCURACIES[named].rigid_walk if rtol is None else rtol
+        check_positive("rtol", tolerance)
+    # Of a lane that is not allowed nothing is known from the start.
+    state, duration = where_allowed(rules, state), where_allowed(rules, duration, 1.0)
     if max_arrivals:
         check_count("max_arrivals", max_arrivals)
     check_count("max_solver_steps", max_solver_steps)
-    wanted = check_accurate_walk(accuracy, rtol=rtol)
-    named = accuracy if isinstance(accuracy, str) else "balanced"
-    tolerance = ACCURACIES[named].rigid_walk if rtol is None else rtol
-    check_positive("rtol", tolerance)
-    leaves = jtu.tree_leaves((scene, state))
-    narrow = any(jnp.result_type(leaf) != jnp.float64 for leaf in leaves)
+    narrow = state.theta_1.dtype != jnp.float64
     chosen = engine_for(
         engine, obstacle="it computes in 64 bits" if narrow else None, by_device=True
     )

@@ -17,8 +17,8 @@ from jaxbiped._checks import (
     check_choice,
     check_count,
     check_positive,
-    check_type,
     check_unbatched,
+    traced_rules,
 )
 from jaxbiped._types import Numbers, Scalar, as_array
 from jaxbiped.compiler import Request
@@ -26,6 +26,7 @@ from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
+from jaxbiped.scene._check_scene import check_scene, where_allowed
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._by_lanes import able_request, by_lanes, prepare_lanes
@@ -108,9 +109,7 @@ class Simulation(eqx.Module):
         engine: str = "auto",
     ) -> "Simulation":
         """Checks the arguments, which are those of `simulate`."""
-        check_type("scene", scene, Scene, RedundantScene)
         given = state
-        state, correction = start_for(scene, state)
         if duration is None and footsteps is None:
             raise ArgumentError("duration = None and footsteps = None: say how long to simulate.")
         if footsteps is not None:
@@ -119,8 +118,16 @@ class Simulation(eqx.Module):
         time = allowed_time if duration is None else duration
         for name, value in (("duration", time), ("rtol", rtol), ("atol", atol)):
             check_unbatched(name, value)
-        check_positive("duration", time, "s")
         check_count("max_solver_steps", max_solver_steps)
+        with traced_rules() as rules:
+            scene = check_scene(scene, Scene, RedundantScene)
+            state, correction = start_for(scene, state)
+            check_positive("duration", time, "s")
+            relative, absolute = tolerances(accuracy, rtol, atol, scene)
+            method = solver_named(solver)
+            check_steps(method, dt, most_steps=max_solver_steps, duration=time)
+        # Of a lane that is not allowed nothing is known from the start.
+        state, time = where_allowed(rules, state), where_allowed(rules, time, 1.0)
         for name in watch:
             check_choice("watch", name, WATCHES)
         if isinstance(save, str):
@@ -130,13 +137,10 @@ class Simulation(eqx.Module):
         timed = section is None and not isinstance(save, str)
         if timed:
             check_times(save, time)
-        relative, absolute = tolerances(accuracy, rtol, atol, scene)
         dtype = jnp.result_type(jtu.tree_leaves(state)[0])
         check_precision(scene, dtype)
         if isinstance(given, State | BristleState):
             check_start_height(scene, given)
-        method = solver_named(solver)
-        check_steps(method, dt, most_steps=max_solver_steps, duration=time)
         if isinstance(scene, RedundantScene):
             check_adjoint(scene.method, adjoint)
 
@@ -153,6 +157,7 @@ class Simulation(eqx.Module):
         units = units_of(scene, state)
         units = units if atol is None else si_units(units)
         save_steps = isinstance(save, str) and save == "steps"
+        scene, time = jtu.tree_map(cast, (scene, time))
         chosen = choose_engine(
             engine,
             solver=method,
@@ -165,10 +170,10 @@ class Simulation(eqx.Module):
             section=section,
         )
         return Simulation(
-            scene=jtu.tree_map(cast, scene),
+            scene=scene,
             state=state,
             correction=correction,
-            duration=cast(time),
+            duration=time,
             times=cast(save) if timed else None,
             rtol=cast(relative),
             atol=cast(absolute),

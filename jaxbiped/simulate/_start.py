@@ -20,6 +20,9 @@ from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.actuation._catalogue import ACTUATORS
 from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS
 
+_PRECISIONS = (np.float16, np.float32, np.float64)
+"""Of NumPy's, those that JAX has."""
+
 
 def start_for(scene: Scene | RedundantScene, state: PyTree) -> tuple[PyTree, Consistent | None]:
     """A checked start of the kind that a scene needs, and how it was put on its constraints.
@@ -44,7 +47,7 @@ def in_own_precision(state: PyTree) -> PyTree:
     """A start with NumPy's floating-point leaves as arrays of JAX, which keep their precision."""
 
     def kept(leaf: object) -> object:
-        own = isinstance(leaf, np.ndarray | np.generic) and np.issubdtype(leaf.dtype, np.floating)
+        own = isinstance(leaf, np.ndarray | np.generic) and leaf.dtype in _PRECISIONS
         return jnp.asarray(leaf) if own else leaf
 
     return jtu.tree_map(kept, state)

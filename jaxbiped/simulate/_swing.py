@@ -14,6 +14,7 @@ from jaxbiped.constraints._independence import check_independent
 from jaxbiped.constraints._linkage_constraints import Constraints, constraints_of
 from jaxbiped.constraints._projection import correct_step, nearest_consistent
 from jaxbiped.dynamics._linkage_motion import LinkageState, linkage_field
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._linkage_scene import LinkageScene
 from jaxbiped.simulate._start import check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
@@ -55,7 +56,7 @@ def swing(
         ArgumentError: an argument that is not allowed, or constraints that the method cannot hold,
             before anything is compiled.
     """
-    check_type("scene", scene, LinkageScene)
+    scene = check_scene(scene, LinkageScene)
     check_type("state", state, LinkageState)
     count = scene.linkage.coordinates * len(scene.linkage.bodies)
     for name in ("q", "v"):
@@ -77,7 +78,6 @@ def swing(
     check_adjoint(scene.method, adjoint)
     relative, absolute = tolerances(accuracy, rtol, atol)
     control = step_control(relative, absolute, rms_norm) if dt is None else None
-    scene = jtu.tree_map(as_float, scene)
     chosen = diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint
     try:
         return _solve(scene, state, times, method, control, dt, max_solver_steps, chosen)

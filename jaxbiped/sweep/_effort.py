@@ -5,9 +5,10 @@ from typing import NamedTuple
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_positive, check_type
+from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.compiler import DEVICES
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, resolve_slip_speed
@@ -84,7 +85,7 @@ def effort_of(
     Raises:
         ArgumentError: an argument that is not allowed.
     """
-    check_type("scene", scene, Scene, RigidScene)
+    scene = check_scene(scene, Scene, RigidScene)
     check_whole("footsteps", footsteps, 1)
     check_whole("max_solver_steps", max_solver_steps, 1)
     if any(np.ndim(leaf) for leaf in jtu.tree_leaves(scene)):

@@ -10,12 +10,13 @@ import numpy as np
 from jaxtyping import PyTree
 from tqdm import tqdm
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_type, user_path
+from jaxbiped._checks import ArgumentError, check_choice, check_finite, user_path
 from jaxbiped._provenance import provenance
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._parameters import (
     parameter_names,
     parameter_quantities,
@@ -83,7 +84,7 @@ def gait_sweep(
             other settings, or one that may not be written.
         ResourceError: a full disk. What is in the store stays.
     """
-    check_type("scene", scene, Scene, RigidScene, RedundantScene)
+    scene = check_scene(scene, Scene, RigidScene, RedundantScene)
     values = _check_values(scene, over)
     path = None if store is None else user_path(store)
     if path is not None:

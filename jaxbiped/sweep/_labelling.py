@@ -17,6 +17,7 @@ from jaxbiped.basins._label import Label
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -82,6 +83,7 @@ class Labelling(eqx.Module):
         """Labels of starts that are checked, by one solve of each."""
         count = len(states.hip_x)
         scene = with_parameters(self.scene, {k: jnp.asarray(v) for k, v in given.items()})
+        scene = check_scene(scene, Scene, RigidScene)
         scene = jtu.tree_map(lambda leaf: _spread(leaf, count), scene)
         goals, cycles = self.family.goals(given, count)
         outcome = follow_starts(scene, states, goals, cycles, effort)

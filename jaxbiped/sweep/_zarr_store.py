@@ -41,7 +41,8 @@ class ZarrStore(AbstractStore):
         self.path, self.layout = path, layout
         self._group: Any = zarr.open_group(str(path), mode="r+", use_consolidated=False)
         try:
-            self._done = np.asarray(self._group[_DONE][:])
+            done: Any = self._group[_DONE]
+            self._done = np.asarray(done[:])
         except Exception:  # damaged, of which each codec has errors of its own
             self._done = np.zeros(layout.chunks, np.int8)
         self._forget_lost()

@@ -1,12 +1,14 @@
 """The nearest bifurcation of a gait, against that of the whole branch."""
 
+import numpy as np
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.continuation._nearest_bifurcation import range_of
 
 pytestmark = pytest.mark.slow
 
-RIGID = jb.ladder()["rigid"]
+RIGID, SEED = jb.ladder()["rigid"], jb.seed_scene()
 
 
 @pytest.fixture(scope="module")
@@ -46,3 +48,17 @@ def test_a_parameter_that_is_zero_is_refused(gait):
         jb.continuation.nearest_bifurcation(RIGID, gait, "hip_mass")
     with pytest.raises(jb.ArgumentError, match="factor = 1"):
         jb.continuation.nearest_bifurcation(RIGID, gait, factor=1)
+
+
+def test_a_range_ends_where_a_constructor_refuses():
+    """A foot is no larger than its leg; a slope is below a right angle; an exponent at least 1."""
+    own = jb.parameter_values(SEED)
+    assert range_of(SEED, "d") == (float(own["d"]) / 8.0, 8.0 * float(own["d"]))
+    assert range_of(SEED, "r")[1] == pytest.approx(float(own["l"]), rel=1e-8)
+    assert range_of(SEED, "l")[0] == pytest.approx(float(own["r"]), rel=1e-6)
+    assert range_of(SEED, "n")[0] == pytest.approx(1.0, abs=1e-8)
+    steep = range_of(jb.seed_scene(slope=0.3), "slope")[1]
+    assert steep == pytest.approx(np.pi / 2, rel=1e-8)
+    for name in ("r", "l", "n"):
+        for end in range_of(SEED, name):
+            jb.with_parameters(SEED, {name: end})

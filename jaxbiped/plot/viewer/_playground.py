@@ -21,6 +21,7 @@ from jaxbiped.plot.viewer._played_program import (
     played_module,
     played_request,
 )
+from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._scene import Scene
 
 
@@ -115,7 +116,7 @@ def playground(scene: Scene, state: State, *, footsteps: int = 5) -> Playground:
         >>> page.module[:4]
         b'\\x00asm'
     """
-    check_type("scene", scene, Scene)
+    scene = check_scene(scene, Scene)
     check_type("state", state, State)
     check_count("footsteps", footsteps)
     request = played_request(scene, state, footsteps)

@@ -1,0 +1,71 @@
+"""Check of a scene at a public function's door, by the rules of its parts' constructors.
+
+Values that `equinox.tree_at` or `vmap` put in have passed no constructor.
+"""
+
+from collections.abc import Iterator
+from typing import Any, TypeVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import ArrayLike
+
+from jaxbiped._checks import ArgumentError, check_type, is_number, traced_rules
+from jaxbiped._types import SomeTree, as_float
+
+SomeModule = TypeVar("SomeModule", bound=eqx.Module)
+
+
+def check_scene(scene: Any, *kinds: type[SomeModule], name: str = "scene") -> Any:
+    """A scene of one of these kinds with all its numbers in 64 bits, each as its part allows.
+
+    Raises:
+        ArgumentError: another kind, or a number that is not allowed. A traced scene that has one is
+            NaN throughout instead, in that lane.
+    """
+    check_type(name, scene, *kinds)
+    with traced_rules() as rules:
+        scene = jtu.tree_map(_in_64_bits, scene)
+        for part in _parts(scene):
+            for kind in reversed(type(part).__mro__):
+                if "__check_init__" in vars(kind):
+                    kind.__check_init__(part)  # type: ignore[attr-defined]
+    return where_allowed(rules, scene)
+
+
+def where_allowed(
+    rules: list[ArrayLike], tree: SomeTree, otherwise: float = float("nan")
+) -> SomeTree:
+    """The tree, its numbers others where one of the rules (see `traced_rules`) does not hold."""
+    if not rules:
+        return tree
+    kept = jnp.all(jnp.stack(rules))
+    return jtu.tree_map(
+        lambda leaf: jnp.where(kept, leaf, jnp.asarray(otherwise, jnp.result_type(leaf))), tree
+    )
+
+
+def _in_64_bits(leaf: Any) -> Any:
+    if isinstance(leaf, jax.core.Tracer):
+        return as_float(leaf).astype(float)
+    if isinstance(leaf, jax.Array) and leaf.dtype == jnp.float64 and not leaf.weak_type:
+        return leaf
+    if not is_number(leaf):
+        raise ArgumentError(f"scene holds {leaf!r}, which is not a number.")
+    return as_float(leaf).astype(float)
+
+
+def _parts(tree: Any) -> Iterator[eqx.Module]:
+    """The modules that a scene is made of, itself and theirs among them."""
+    inside: Any = ()
+    if isinstance(tree, eqx.Module):
+        yield tree
+        inside = vars(tree).values()
+    elif isinstance(tree, list | tuple):
+        inside = tree
+    elif isinstance(tree, dict):
+        inside = tree.values()
+    for each in inside:
+        yield from _parts(each)
