@@ -2,10 +2,12 @@
 
 from typing import NamedTuple, TypeVar
 
+import jax
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_finite, check_type
-from jaxbiped._types import Scalar, as_float
+from jaxbiped._types import Scalar, as_float, by_numpy
 
 
 class State(NamedTuple):
@@ -13,7 +15,8 @@ class State(NamedTuple):
 
     The frame is fixed to the slope: x along it, downhill positive; z along its outward normal. A
     leg's angle is measured from that normal, positive when its foot is ahead of (downhill from)
-    the hip. Leaves may carry any common batch shape.
+    the hip. A start whose angles are a whole turn more is the same start, and begins between −π
+    and π. Leaves may carry any common batch shape.
 
     Attributes:
         hip_x, hip_z: hip position [m].
@@ -54,6 +57,19 @@ def seed_state() -> State:
     )
 
 
+_ANGLES = ("theta_1", "theta_2")
+
+
+def within_a_turn(angle: Scalar) -> Scalar:
+    """An angle [rad] without whole turns, between −π and π: the same start."""
+    known = not isinstance(angle, jax.core.Tracer)
+    if known and not np.any(np.abs(np.asarray(angle)) > np.pi):
+        return angle
+    turn = 2.0 * np.pi
+    wrapped: Scalar = by_numpy(lambda numpy, x: x - turn * numpy.round(x / turn), angle)
+    return wrapped
+
+
 SomeState = TypeVar("SomeState", bound=NamedTuple)
 """A state of any kind, which comes back as the same kind."""
 
@@ -75,7 +91,7 @@ def exchange_legs(state: SomeState) -> SomeState:
 
 
 def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTree:
-    """`state` with every leaf a floating-point array of one shape.
+    """`state` with every leaf a floating-point array of one shape, angles without whole turns.
 
     Raises:
         ArgumentError: not a `kind`, an entry that is not finite, or leaves of different shapes.
@@ -85,8 +101,9 @@ def check_state(state: PyTree, kind: type = State, name: str = "state") -> PyTre
 
 
 def check_leaves(state: SomeState, name: str) -> SomeState:
-    """`state` with every leaf a floating-point array of one shape; None stays where a kind of
-    state has it.
+    """`state` with every leaf a floating-point array of one shape, angles without whole turns.
+
+    None stays where a kind of state has it.
 
     Raises:
         ArgumentError: an entry that is not finite, or leaves of different shapes.
@@ -100,6 +117,7 @@ def check_leaves(state: SomeState, name: str) -> SomeState:
     for field, value in given.items():
         check_finite(f"{name}.{field}", value)
     leaves = {field: as_float(value) for field, value in given.items()}
+    leaves |= {name: within_a_turn(leaf) for name, leaf in leaves.items() if name in _ANGLES}
     shapes = {leaf.shape for leaf in leaves.values()}
     if len(shapes) > 1:
         raise ArgumentError(

@@ -12,6 +12,7 @@ from jaxbiped._checks import check_choice, check_positive
 from jaxbiped._types import Scalar, Time, as_float, select
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._state import check_leaves
 from jaxbiped.gait._engine import check_holds_none, orbit_engine
 from jaxbiped.gait._gradient_modes import AbstractGradient, Forward, Reverse, check_anywhere
 from jaxbiped.gait._return_by_lanes import forward_by_lanes, reverse_by_lanes
@@ -97,6 +98,7 @@ def return_map(
     check_positive("footsteps", footsteps)
     if system is None:
         args = check_scene(args, Scene, RigidScene, RedundantScene)
+        state = check_leaves(state, "state")
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
     redundant = isinstance(args, RedundantScene) and system is None
     enters = redundant and not is_redundant(state)

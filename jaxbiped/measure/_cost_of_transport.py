@@ -14,6 +14,7 @@ from jaxbiped.measure._rigid_ledger import kept_strikes, rigid_ledger
 from jaxbiped.measure._samples import evaluate_at, sample
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 
@@ -85,6 +86,7 @@ def cost_of_transport(
     else:
         check_type("walk", walk, Trajectory)
         check_type("walk.state", walk.state, State, BristleState, RedundantState, EulerState)
+        check_scene_of(walk, scene, "walk")
         ends = heel_strikes(scene, walk).time_s if times is None else np.asarray(times)
         distance, gravity, motors = _compliant(scene, walk, ends)
     return CostOfTransport((motors + gravity) / (weight * distance), motors, gravity, distance)

@@ -16,6 +16,7 @@ from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
     import xarray
 
     check_type("scene", scene, Scene, RedundantScene)
+    check_scene_of(trajectory, scene)
     if np.ndim(trajectory.t) != 1:
         raise ValueError("This is a batch of trajectories: take one of them at a time.")
     state = trajectory.state

@@ -7,6 +7,7 @@ import numpy as np
 from jaxbiped.dynamics._energy import energies, powers
 from jaxbiped.measure._samples import evaluate_at, sample
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 
@@ -64,6 +65,7 @@ def energy_ledger(
         >>> books.gravity_work.round(3), books.damper_loss.round(3)
         (array([0.195]), array([0.071]))
     """
+    check_scene_of(trajectory, scene)
     trajectory.require_dense()
     ends = np.asarray(trajectory.t)[[0, -1]] if times is None else np.asarray(times)
     held = evaluate_at(scene, trajectory, energies, ends)

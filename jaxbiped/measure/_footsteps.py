@@ -10,6 +10,7 @@ from jaxbiped.dynamics._feet import Feet, landings, touches
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._samples import Samples, at_steps, evaluate_at, moments_of_change, sample
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 
@@ -64,6 +65,7 @@ def heel_strikes(scene: Scene, trajectory: Trajectory) -> HeelStrikes:
     Raises:
         ValueError: a trajectory without its continuous solution, or a batch of them.
     """
+    check_scene_of(trajectory, scene)
     trajectory.require_dense()
     both = at_steps(scene, trajectory, contacts).feet
     before, after = (_part(both, part) for part in (slice(-1), slice(1, None)))

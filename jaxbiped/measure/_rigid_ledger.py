@@ -15,6 +15,7 @@ from jaxbiped.dynamics._rolling import rolling_hip_motion, rolling_rates
 from jaxbiped.measure._rigid_samples import states_after
 from jaxbiped.measure._samples import NODES, Samples
 from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 _PANELS = 24
@@ -92,6 +93,7 @@ def kept_strikes(scene: RigidScene, walk: Trajectory[RigidState]) -> tuple[np.nd
     check_type("scene", scene, RigidScene)
     check_type("walk", walk, Trajectory)
     check_type("walk.state", walk.state, RigidState)
+    check_scene_of(walk, scene, "walk")
     assert walk.arrivals is not None
     times = np.asarray(walk.arrivals.t)
     known = np.isfinite(times)

@@ -15,6 +15,7 @@ from jaxbiped.plot._samples import end_time, state_at
 from jaxbiped.plot._upright import Pose, poses, upright
 from jaxbiped.plot.style import GROUND_COLOUR, LEG_COLOURS, LEG_NAMES, LEG_STYLES, new_figure
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 _TICK = 0.1
@@ -45,6 +46,7 @@ def animate(
     Raises:
         ValueError: the trajectory was not saved step by step, or a number not above 0.
     """
+    check_scene_of(trajectory, scene)
     check_positive("frames_per_second", frames_per_second)
     check_positive("slow_down", slow_down)
     interval = 1.0 / (frames_per_second * slow_down)

@@ -21,6 +21,7 @@ from jaxbiped.plot.style import (
     new_figure,
 )
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 _BEFORE, _AFTER = 0.5e-3, 4.5e-3
@@ -54,6 +55,7 @@ def contact_forces(
     Raises:
         ValueError: the trajectory was not saved step by step, or has fewer heel strikes.
     """
+    check_scene_of(trajectory, scene)
     t, found = sampled_forces(scene, trajectory)
     times, feet = heel_strikes(scene, trajectory)
     if times.size and not -times.size <= strike < times.size:

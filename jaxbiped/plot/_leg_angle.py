@@ -16,6 +16,7 @@ from jaxbiped.plot.style import (
     legend_above,
 )
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 
@@ -33,6 +34,7 @@ def leg_angles(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None) 
     Raises:
         ValueError: the trajectory was not saved step by step.
     """
+    check_scene_of(trajectory, scene)
     t, state = sample(trajectory)
     return draw_leg_angles(t, (state.theta_1, state.theta_2), "Leg angles", ax)
 

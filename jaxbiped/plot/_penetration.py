@@ -20,6 +20,7 @@ from jaxbiped.plot.style import (
     legend_above,
 )
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 
@@ -40,6 +41,7 @@ def penetrations(scene: Scene, trajectory: Trajectory, *, ax: Axes | None = None
     Raises:
         ValueError: the trajectory was not saved step by step.
     """
+    check_scene_of(trajectory, scene)
     samples = sample(trajectory)
     found = evaluate_along(scene, samples.state, contacts)
     ax = axes_or_new(ax, 7.2, 3.4)

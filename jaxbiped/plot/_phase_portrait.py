@@ -23,6 +23,7 @@ from jaxbiped.plot.style import (
     legend_below,
 )
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 _FAINT = 0.35
@@ -55,6 +56,7 @@ def phase_portrait(
     Raises:
         ValueError: the trajectory was not saved step by step, or a leg of another number.
     """
+    check_scene_of(trajectory, scene)
     if not legs or not set(legs) <= {1, 2}:
         raise ArgumentError(f"legs = {legs!r} is not allowed: it must name legs 1, 2 or both.")
     t, state = sample(trajectory)

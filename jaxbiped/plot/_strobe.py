@@ -24,6 +24,7 @@ from jaxbiped.plot.style import (
     legend_above,
 )
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 _SHOWN = 1.8
@@ -67,6 +68,7 @@ def gait_strobe(
     Raises:
         ValueError: the trajectory was not saved step by step, or does not reach the start.
     """
+    check_scene_of(trajectory, scene)
     if count is not None:
         check_positive("count", count)
     last = end_time(trajectory)

@@ -18,6 +18,7 @@ from jaxbiped.simulate._slopes import Slopes
 from jaxbiped.solve._engine import engine_named
 from jaxbiped.solve._rigid_program import rigid_program
 from jaxbiped.solve._rigid_steps import RigidWalk
+from jaxbiped.solve._scene_key import scene_key
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 
 _ROOM = 256
@@ -71,6 +72,7 @@ class RigidSimulation(eqx.Module):
             rejected=found.rejected,
             arrivals=arrivals_among(rows, found.footsteps, state),
             grazes=found.grazes,
+            scene_key=scene_key(self.walk.scene),
             engine=self.engine,
         )
 

@@ -1,5 +1,6 @@
 """Checked request to simulate, which can be compiled and run at other tolerances."""
 
+import dataclasses
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -40,6 +41,7 @@ from jaxbiped.simulate._start_height import check_start_height
 from jaxbiped.solve._accuracy import check_precision, tolerances
 from jaxbiped.solve._ending import WATCHES
 from jaxbiped.solve._projected_solver import check_adjoint
+from jaxbiped.solve._scene_key import scene_key
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import Units, si_units, units_of
@@ -213,7 +215,8 @@ class Simulation(eqx.Module):
 
 def _run(run: Simulation) -> Trajectory:
     request = run.lane_request()
-    return trim(by_xla(run)) if request is None else by_lanes(run, request)
+    walk = trim(by_xla(run)) if request is None else by_lanes(run, request)
+    return dataclasses.replace(walk, scene_key=scene_key(run.scene))
 
 
 def _moving(run: Simulation) -> tuple[PyTree, PyTree, PyTree]:
@@ -259,4 +262,5 @@ class CompiledSimulation:
 
     def __call__(self) -> Trajectory:
         """Runs the solve and waits for it."""
-        return trim(jax.block_until_ready(self._program(self._request)))
+        walk = trim(jax.block_until_ready(self._program(self._request)))
+        return dataclasses.replace(walk, scene_key=scene_key(self._request.scene))

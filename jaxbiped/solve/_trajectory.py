@@ -67,6 +67,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
             stepped over them; None where no `dt` was given.
         grazes: how many times the swing foot of a rigid walker met the ground, or missed it, by
             less than the tolerance tells: it did not count as a heel strike. None of other models.
+        scene_key: a number that its scene alone has, by which measures and figures refuse another.
         engine: what computed it, "xla", "lanes" or "cuda".
     """
 
@@ -84,6 +85,7 @@ class Trajectory(eqx.Module, Generic[SomeState]):
     error: ErrorEstimate | None = None
     missed_contacts: Int[Array, "..."] | None = None
     grazes: Int[Array, "..."] | None = None
+    scene_key: Float[Array, "..."] | None = None
     engine: str = eqx.field(static=True, default="xla")
 
     def __repr__(self) -> str:

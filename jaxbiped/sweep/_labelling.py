@@ -16,7 +16,7 @@ from jaxbiped._types import JsonObject, as_float
 from jaxbiped.basins._label import Label
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._formulation import state_type
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import State, within_a_turn
 from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -148,7 +148,11 @@ def _check_states(scene: Scene | RigidScene, states: PyTree) -> PyTree:
         raise ArgumentError(
             f"states has leaves of shapes {sorted(shapes)}: all of them must be (n,)."
         )
-    return kind(*leaves)
+    whole: PyTree = kind(*leaves)
+    return whole._replace(
+        theta_1=np.asarray(within_a_turn(whole.theta_1)),
+        theta_2=np.asarray(within_a_turn(whole.theta_2)),
+    )
 
 
 def _column(name: str, value: npt.ArrayLike, count: int) -> np.ndarray:

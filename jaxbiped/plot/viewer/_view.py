@@ -16,6 +16,7 @@ from jaxbiped.plot.viewer._rigid_recording import record_rigid_walk
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
 
@@ -105,7 +106,7 @@ def view(
         True
     """
     check_type("scene", scene, Scene, RedundantScene, RigidScene)
-    check_type("trajectory", trajectory, Trajectory)
+    check_scene_of(trajectory, scene)
     if isinstance(scene, RigidScene):
         return View((record_rigid_walk(scene, trajectory, start, name),))
     if start is not None:
