@@ -4,12 +4,12 @@ Runs gradient_truth.py and footstep_truth.py, writes the numbers of each beside 
 prints one table: error of the state and of the gradient, CPU time, and what each tool says.
 """
 
-import json
-
 import footstep_truth
 import gradient_truth
 from _options import parse
 from _truth_table import say_rows, versions
+
+from jaxbiped.cli import Report
 
 
 def main() -> None:
@@ -19,7 +19,7 @@ def main() -> None:
         "footstep_truth": footstep_truth.measured(options),
     }
     for name, numbers in found.items():
-        options.path(f"{name}.json").write_text(json.dumps(numbers, indent=1) + "\n")
+        Report(options.path(f"{name}.json")).finish(numbers)
     rows = [row for numbers in found.values() for row in numbers["rows"]]
     installed = versions()
     options.say("\nversions: " + ", ".join(f"{name} {each}" for name, each in installed.items()))

@@ -6,14 +6,13 @@ What is kept makes the next call faster and changes no number. `docs/memory.md` 
 import contextlib
 import functools
 import gc
-import os
 import threading
 import weakref
 from collections.abc import Callable, Hashable
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
-CACHE_BYTES_VARIABLE = "JAXBIPED_CACHE_BYTES"
-"""Environment variable: bytes for records of simulations and for buffers; 0 to keep none."""
+from jaxbiped._environment import CACHE_BYTES_VARIABLE, environment_number
+
 _CACHE_BYTES = 1 << 30
 PROGRAMS = 64
 """Compiled programs that each maker of such keeps; the one unused for longest goes first."""
@@ -87,8 +86,8 @@ def register_bytes(name: str, store: Store) -> None:
 
 def half_of_cache_bytes() -> int:
     """Bound of the records, and that of the buffers [bytes]."""
-    chosen = os.environ.get(CACHE_BYTES_VARIABLE, "")
-    return (int(chosen) if chosen.isdecimal() else _CACHE_BYTES) // 2
+    chosen = environment_number(CACHE_BYTES_VARIABLE)
+    return (_CACHE_BYTES if chosen is None else chosen) // 2
 
 
 class Once(Generic[_T]):

@@ -6,19 +6,17 @@ NumPy before one: the command line refuses without them.
 """
 
 import contextlib
-import errno
-import json
-import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
     import numpy as np
     from jaxtyping import ArrayLike
 
+MOST_ROOM = 1 << 27
+"""States that may be kept of one simulation: some ten gigabytes."""
 _Test: TypeAlias = "Callable[[Any], Any]"
 
 
@@ -31,16 +29,6 @@ class ResourceError(RuntimeError):
 
     The same call works once that is mended.
     """
-
-
-_WRONG_PATH = ("EACCES", "EPERM", "EROFS", "ENOENT", "EEXIST", "ENOTDIR", "EISDIR", "ENAMETOOLONG")
-"""Errors of a file system where another path would do; any other is the disk's own."""
-
-
-def failure_kind(error: OSError) -> type[ArgumentError] | type[ResourceError]:
-    """Whether a path that cannot be written is to blame itself, or what it lies on."""
-    wrong = errno.errorcode.get(error.errno or 0) in _WRONG_PATH
-    return ArgumentError if wrong else ResourceError
 
 
 def is_number(value: object) -> bool:
@@ -166,6 +154,12 @@ def check_count(name: str, value: "ArrayLike") -> None:
     _require(name, value, allowed, lambda x: (x > 0) & (x == np.floor(x)))
 
 
+def check_room(name: str, value: "ArrayLike") -> None:
+    """Raises `ArgumentError` unless `value` is a count of states that memory may have room for."""
+    check_count(name, value)
+    _require(name, value, f"at most {MOST_ROOM}", lambda x: x <= MOST_ROOM)
+
+
 def check_unbatched(name: str, value: object, one: str = "one number") -> None:
     """Raises `ArgumentError` where any leaf of `value` is an array instead of one number."""
     import jax
@@ -198,6 +192,23 @@ def check_at_least(name: str, value: object, bound_name: str, bound: object) -> 
         _require(name, value, allowed, lambda x: x >= floor)
 
 
+def check_pair(name: str, value: object, smaller_name: str, smaller: object) -> None:
+    """`check_at_least` of two arguments, either of which may be the one that is meant."""
+    try:
+        check_at_least(name, value, smaller_name, smaller)
+    except ArgumentError:
+        raise ArgumentError(
+            f"{name} = {_named(value)} and {smaller_name} = {_named(smaller)} are not allowed "
+            f"together: {name} must be at least {smaller_name}."
+        ) from None
+
+
+def _named(value: object) -> str:
+    import numpy as np
+
+    return f"{value:g}" if np.ndim(value) == 0 else f"an array of shape {np.shape(value)}"  # type: ignore[str-format]
+
+
 def check_below(name: str, value: object, bound: float, why: str) -> None:
     """Raises `ArgumentError` unless |value| < bound in every entry."""
     _require(name, value, f"between {-bound:g} and {bound:g} ({why})", lambda x: abs(x) < bound)
@@ -219,10 +230,23 @@ def check_within(
 def check_choice(name: str, value: object, allowed: Iterable[object]) -> None:
     """Raises `ArgumentError` unless `value` is one of the `allowed` names or numbers."""
     names = list(allowed)
-    if value not in names:
+    try:
+        known = value in names
+    except ValueError:  # an array, compared entry by entry
+        known = False
+    if not known:
         raise ArgumentError(
-            f"{name} = {value!r} is not known: choose one of {', '.join(map(str, names))}."
+            f"{name} = {value!r} is not known: choose one of {', '.join(map(str, names))}"
+            f"{near_miss(value, names)}."
         )
+
+
+def near_miss(value: object, names: Iterable[object]) -> str:
+    """Words that ask whether the nearest of some names was meant; none where none is near."""
+    import difflib
+
+    near = difflib.get_close_matches(str(value), map(str, names), 1)
+    return f" (perhaps {near[0]} is meant)" if near else ""
 
 
 def check_type(name: str, value: object, *kinds: type) -> None:
@@ -230,59 +254,6 @@ def check_type(name: str, value: object, *kinds: type) -> None:
     if not isinstance(value, kinds):
         allowed = " or a ".join(kind.__name__ for kind in kinds)
         raise ArgumentError(f"{name} = {value!r} is not allowed: it must be a {allowed}.")
-
-
-def user_path(path: str | Path) -> Path:
-    """A path as the user means it: "~" is the home folder.
-
-    Raises:
-        ArgumentError: no path, or a home folder that is not known.
-    """
-    try:
-        return Path(path).expanduser()
-    except (TypeError, RuntimeError) as error:
-        raise ArgumentError(f"path = {path!r} is not allowed: {error}.") from None
-
-
-def read_json(name: str, path: str | Path) -> Any:
-    """What a JSON file holds; raises `ArgumentError` for one that cannot be read or is no JSON."""
-    try:
-        return json.loads(user_path(path).read_text())
-    except OSError as error:
-        reason = (error.strerror or "unreadable").lower()
-        raise ArgumentError(f"{name} = {str(path)!r} cannot be read ({reason}).") from None
-    except ValueError as error:
-        raise ArgumentError(f"{name} = {str(path)!r} is not JSON ({error}).") from None
-
-
-def check_writable_directory(name: str, path: Path) -> None:
-    """Creates the directory if need be; raises where files cannot be written.
-
-    Raises:
-        ArgumentError: the path is not allowed.
-        ResourceError: its disk is full or fails.
-    """
-    allowed = "it must be a directory in which files can be written"
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = (error.strerror or "cannot be made").lower()
-        raise failure_kind(error)(
-            f"{name} = {str(path)!r} is not allowed ({reason}): {allowed}."
-        ) from None
-    if not os.access(path, os.W_OK | os.X_OK):
-        raise ArgumentError(f"{name} = {str(path)!r} is not allowed (not writable): {allowed}.")
-
-
-def check_writable_file(name: str, path: Path) -> None:
-    """Raises `ArgumentError` where a file of this name cannot be written."""
-    if path.is_dir():
-        raise ArgumentError(f"{name} = {str(path)!r} is a directory: it must be a file to write.")
-    parent = path.parent
-    if not parent.is_dir() or not os.access(path if path.exists() else parent, os.W_OK):
-        raise ArgumentError(
-            f"{name} = {str(path)!r} cannot be written: its folder must exist and be writable."
-        )
 
 
 def _in(unit: str) -> str:

@@ -177,7 +177,7 @@ def test_code_lives_as_long_as_a_thread_that_runs_it(monkeypatch):
     assert code() is None
 
 
-@pytest.mark.parametrize("limit", ["0", "100", "no number", ""])
+@pytest.mark.parametrize("limit", ["0", "100", ""])
 def test_the_environment_bounds_records_and_buffers(monkeypatch, limit):
     def attempt(given, carried):
         return carried + given, carried + given > 4.0

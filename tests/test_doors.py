@@ -75,7 +75,7 @@ def test_a_value_that_no_constructor_saw_is_refused_as_by_one(door, value):
 
 
 def test_a_rule_of_two_numbers_holds_at_a_door():
-    with pytest.raises(jb.ArgumentError, match=r"l = 0\.01 is not allowed"):
+    with pytest.raises(jb.ArgumentError, match=r"l = 0\.01 and r = 0\.08 are not allowed together"):
         short(put(SCENE, "l", 0.01))
     with pytest.raises(jb.ArgumentError, match="J = 0 is not allowed where hip_mass = 0"):
         short(put(SCENE, "J", 0))

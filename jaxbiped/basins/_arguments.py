@@ -10,7 +10,8 @@ from jaxbiped.basins._label import Label
 def check_whole(name: str, value: npt.ArrayLike, least: int) -> int:
     """A whole number of at least `least`; raises `ArgumentError` for anything else."""
     array = np.asarray(value)
-    if array.shape != () or array.dtype.kind not in "iu" or array < least:
+    whole = array.shape == () and array.dtype.kind in "iuf" and array == np.floor(array)
+    if not whole or not least <= array < np.inf:
         raise ArgumentError(
             f"{name} = {value!r} is not allowed: it must be a whole number of at least {least}."
         )

@@ -1,15 +1,19 @@
 """The command line: `jaxbiped COMMAND`."""
 
 import contextlib
+import dataclasses
 import io
 import os
 import sys
-from typing import Annotated, Protocol
+from pathlib import Path
+from typing import Annotated, Any, Protocol
 
 import tyro
 from tyro.conf import subcommand
 
 from jaxbiped._checks import ArgumentError, ResourceError
+from jaxbiped._environment import check_environment
+from jaxbiped._paths import user_path
 from jaxbiped._progress import tell_stages
 from jaxbiped.cli._refusal import one_sentence
 from jaxbiped.cli._report import Report as Report
@@ -62,7 +66,8 @@ def main(arguments: list[str] | None = None) -> None:
         try:
             _run(sys.argv[1:] if arguments is None else list(arguments))
         finally:
-            sys.stdout.flush()
+            if sys.stdout is not None:  # closed by who began it
+                sys.stdout.flush()
     except BrokenPipeError:  # who reads wants no more, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
@@ -77,13 +82,44 @@ def _run(given: list[str]) -> None:
         return
     tell_stages()
     try:
+        command = _with_home(command)
         command.check()
+        check_environment()
+        _check_platforms()
         sys.exit(command.run())
     except BrokenPipeError:
         raise
     except (ArgumentError, ResourceError, OSError) as error:
         print(f"jaxbiped: {error}", file=sys.stderr)
         sys.exit(2 if isinstance(error, ArgumentError) else 1)
+
+
+def _check_platforms() -> None:
+    """Raises `ArgumentError` where JAX is told to compute on what is not there."""
+    told = os.environ.get("JAX_PLATFORMS", "")
+    if not told:
+        return
+    import jax
+
+    try:
+        jax.devices()
+    except Exception as error:  # JAX's own, of several kinds
+        raise ArgumentError(
+            f"JAX_PLATFORMS = {told!r} in the environment is not allowed: JAX finds none of these "
+            f"here ({' '.join(str(error).split()) or 'no reason given'})."
+        ) from None
+
+
+def _with_home(options: Any) -> Any:
+    """Options, or a group of them, with "~" in their paths as the home folder."""
+    changed = {}
+    for field in dataclasses.fields(options):
+        value = getattr(options, field.name)
+        if isinstance(value, Path):
+            changed[field.name] = user_path(value, f"--{field.name.replace('_', '-')}")
+        elif dataclasses.is_dataclass(value):
+            changed[field.name] = _with_home(value)
+    return dataclasses.replace(options, **changed) if changed else options
 
 
 def _parse(arguments: list[str]) -> _Runnable | None:

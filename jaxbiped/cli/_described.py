@@ -24,7 +24,9 @@ from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator, Actuation
 from jaxbiped.scene.actuation._catalogue import ACTUATORS
+from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, AbstractNormalLaw
 from jaxbiped.scene.laws._catalogue import friction_law_like, normal_law_like
+from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 
 def described_scene(options: SceneOptions) -> Scene | RigidScene | RedundantScene:
@@ -39,23 +41,30 @@ def described_scene(options: SceneOptions) -> Scene | RigidScene | RedundantScen
 
 def _compliant(options: SceneOptions) -> Scene:
     own = seed_scene(**{name: getattr(options, name) for name in SEED})
-    normal = normal_law_like(
-        options.normal,
-        K=options.K,
-        c=options.c,
-        n=options.n,
-        # By NumPy: JAX would compile a program for each operation.
-        mass=jtu.tree_map(np.asarray, own.walker).total_mass,
-        g=options.g,
-    )
-    friction = friction_law_like(
-        options.friction,
-        mu_static=options.mu_static,
-        mu_kinetic=options.mu_kinetic,
-        v0=options.v0,
-        xi=options.xi,
-    )
+    # By NumPy: JAX would compile a program for each operation.
+    mass = jtu.tree_map(np.asarray, own.walker).total_mass
+    normal = _law_like(options, "normal", ("K", "c", "n"), mass=mass, g=options.g)
+    friction = _law_like(options, "friction", ("mu_static", "mu_kinetic", "v0", "xi"))
     return dataclasses.replace(own, normal=normal, friction=friction)
+
+
+def _law_like(
+    options: SceneOptions, kind: str, names: tuple[str, ...], **others: Any
+) -> AbstractNormalLaw | AbstractFrictionLaw | AbstractBristleLaw:
+    """A law matched to these parameters; raises `ArgumentError` for one that it has no use for."""
+    like: Any = normal_law_like if kind == "normal" else friction_law_like
+    values = {name: getattr(options, name) for name in names}
+    law = like(getattr(options, kind), **values, **others)
+    for name, value in values.items():
+        usual = SEED[name].value
+        if value != usual:
+            other = like(getattr(options, kind), **values | {name: usual}, **others)
+            if jtu.tree_all(jtu.tree_map(np.array_equal, law, other)):
+                raise ArgumentError(
+                    f"{name} = {value:g} is not allowed with {kind} = {getattr(options, kind)}: "
+                    f"that law has no use for it."
+                )
+    return law  # type: ignore[no-any-return]
 
 
 def _rigid(options: SceneOptions) -> RigidScene:

@@ -29,6 +29,7 @@ def one_sentence(box: str) -> str:
     parts = [_join_lines(message)]
     for block in others:
         flags = [line.split()[0] for line in block[1:] if line.startswith("--")]
+        flags = [flag for flag in flags if flag not in parts[0].split()]
         if block[0].startswith("Perhaps you meant") and flags:
             parts.append(f"perhaps you meant {' or '.join(dict.fromkeys(flags))}")
         elif block[0].startswith("Available subcommands"):

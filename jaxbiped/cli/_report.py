@@ -1,11 +1,12 @@
 """Reports for people and for programs."""
 
-import json
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from jaxbiped._strict_json import strict_json
 
 if TYPE_CHECKING:
     from jaxbiped._types import JsonObject
@@ -25,7 +26,7 @@ class Report:
 
     def finish(self, numbers: "JsonObject") -> None:
         """Writes the numbers."""
-        text = json.dumps(numbers, indent=2) + "\n"
+        text = strict_json(numbers, indent=2) + "\n"
         if self._only_json:
             _write(text)
         elif self._path is not None:

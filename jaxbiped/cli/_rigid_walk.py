@@ -58,7 +58,7 @@ def run_rigid_walk(
     elif solve.accuracy is not None:
         options["accuracy"] = solve.accuracy
     else:
-        options["rtol"] = solve.rtol
+        options["rtol"] = solve.relative
     prepared = time.perf_counter()
     with stage("compiling the simulation (first time for this kind of scene)"):
         _walk(scene, state, options)
@@ -138,7 +138,7 @@ def _tolerance(solve: SolveOptions, walk: Trajectory[RigidState]) -> float:
     """The relative tolerance that the walk was solved with."""
     if walk.error is not None:
         return walk.error.rtol
-    return solve.rtol if solve.accuracy is None else ACCURACIES[solve.accuracy].rigid_walk
+    return solve.relative if solve.accuracy is None else ACCURACIES[solve.accuracy].rigid_walk
 
 
 def _footsteps(scene: RigidScene, strikes: Arrivals[RigidState]) -> list[dict[str, float]]:

@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from jaxbiped._checks import (
     ArgumentError,
-    check_at_least,
     check_choice,
     check_count,
     check_finite,
+    check_pair,
     check_positive,
-    check_writable_directory,
-    check_writable_file,
 )
+from jaxbiped._paths import check_writable_directory, check_writable_file
 from jaxbiped.cli._actuation_options import ActuationOptions
 from jaxbiped.cli._choices import (
     CONSTRAINT_METHODS,
@@ -106,8 +105,14 @@ class SceneOptions:
         check_choice("friction", self.friction, friction_law_names())
         for name, parameter in SEED.items():
             parameter.info.check(name, getattr(self, name))
-        check_at_least("l", self.l, "r", self.r)
-        self.named_values()
+        check_pair("l", self.l, "r", self.r)
+        for name, value in self.named_values().items():
+            own = name.rpartition(".")[2]
+            if own in SEED and getattr(self, own) != SEED[own].value:
+                raise ArgumentError(
+                    f"{own} = {getattr(self, own):g} is not allowed with set = '{name}={value:g}': "
+                    "give one of them."
+                )
         self.driven.check()
         self._check_that_all_is_used()
 
@@ -227,8 +232,8 @@ class SolveOptions:
     """Name of a solver: ours (rodas3p, rodas4, rodas4p, rodas5p) or one of diffrax's."""
     accuracy: str | None = None
     """In place of tolerances: draft, balanced or tight; or a relative error, such as 1e-4."""
-    rtol: float = 1e-6
-    """Relative tolerance."""
+    rtol: float | None = None
+    """Relative tolerance; 1e-6 unless given."""
     atol: float | None = None
     """Absolute tolerance (SI units); a hundredth of the relative one unless given."""
     dt: float | None = None
@@ -242,11 +247,16 @@ class SolveOptions:
         check_choice("solver", self.solver, SOLVERS)
         check_accuracy(self.accuracy)
         check_engine(self.engine)
-        check_positive("rtol", self.rtol)
-        for name, unit in (("atol", ""), ("dt", "s")):
+        for name, unit in (("rtol", ""), ("atol", ""), ("dt", "s")):
             value = getattr(self, name)
             if value is not None:
                 check_positive(name, value, unit)
+        for name in ("accuracy", "dt") if self.rtol is not None else ():
+            if getattr(self, name) is not None:
+                raise ArgumentError(
+                    f"rtol = {self.rtol:g} is not allowed with {name} = {getattr(self, name)}: "
+                    "give one of them."
+                )
         self.most_steps()
 
     def wanted(self) -> float | None:
@@ -264,7 +274,12 @@ class SolveOptions:
             return {}
         if self.accuracy is not None:
             return {"accuracy": self.accuracy, "atol": self.atol}
-        return {"rtol": self.rtol, "atol": self.atol}
+        return {"rtol": self.relative, "atol": self.atol}
+
+    @property
+    def relative(self) -> float:
+        """The relative tolerance, where no accuracy is given."""
+        return 1e-6 if self.rtol is None else self.rtol
 
     def most_steps(self) -> int:
         """The cap on the solver's steps; raises `ArgumentError`."""

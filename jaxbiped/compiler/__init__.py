@@ -20,7 +20,6 @@ from jaxbiped.compiler.runtime._primitive import Recording as Recording
 from jaxbiped.compiler.runtime._primitive import deferred_checks as deferred_checks
 from jaxbiped.compiler.runtime._program import Program as Program
 from jaxbiped.compiler.runtime._recorded import Recorded as Recorded
-from jaxbiped.compiler.runtime._threads import THREADS_VARIABLE as THREADS_VARIABLE
 from jaxbiped.compiler.runtime._threads import default_threads as default_threads
 from jaxbiped.compiler.runtime._web_assembly import web_module as web_module
 

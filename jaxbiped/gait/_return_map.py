@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._checks import check_choice, check_positive
+from jaxbiped._checks import check_choice, check_count, check_positive
 from jaxbiped._types import Scalar, Time, as_float, select
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
@@ -95,7 +95,8 @@ def return_map(
     gradient = Forward() if gradient is None else gradient
     check_anywhere(gradient, "a return map")
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
-    check_positive("footsteps", footsteps)
+    check_count("footsteps", footsteps)
+    check_positive("max_time", max_time, "s")
     if system is None:
         args = check_scene(args, Scene, RigidScene, RedundantScene)
         state = check_leaves(state, "state")

@@ -64,7 +64,7 @@ def fit_gait(
     """
     scene = check_scene(scene, Scene, RigidScene)
     bounds = _check_bounds(scene, vary)
-    gaits = [measured] if isinstance(measured, MeasuredGait) else list(measured)
+    gaits = list(measured) if isinstance(measured, Sequence) else [measured]
     if not gaits:
         raise ArgumentError("measured = [] is not allowed: give one gait at least.")
     for each in gaits:

@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from jaxbiped._checks import ArgumentError, read_json
+from jaxbiped._checks import ArgumentError
+from jaxbiped._paths import read_json
 from jaxbiped._types import JsonObject
 from jaxbiped.identify._measured_gait import MEASURES, MeasuredAngles, MeasuredGait
 

@@ -13,6 +13,7 @@ from jaxbiped._checks import (
     check_finite,
     check_not_negative,
     check_positive,
+    check_type,
 )
 
 MEASURES = ("period", "step_length", "speed", "peak_normal")
@@ -40,6 +41,8 @@ class MeasuredAngles:
 
     def __post_init__(self) -> None:
         check_not_negative("times", self.times, "s")
+        if not np.size(self.times):
+            raise ArgumentError("times = [] is not allowed: give one at least.")
         check_positive("deviation", self.deviation, "rad")
         if not self.known:
             raise ArgumentError("theta_1 = None and theta_2 = None: give one of them at least.")
@@ -86,6 +89,8 @@ class MeasuredGait:
 
     def __post_init__(self) -> None:
         check_count("footsteps", self.footsteps)
+        check_type("measures", self.measures, Mapping)
+        check_type("conditions", self.conditions, Mapping)
         for name, pair in self.measures.items():
             check_choice("measures", name, MEASURES)
             if np.shape(pair) != (2,):

@@ -11,8 +11,8 @@ from jaxbiped._checks import (
     check_finite,
     check_not_negative,
     check_type,
-    user_path,
 )
+from jaxbiped._paths import user_path
 from jaxbiped._provenance import DECISIVE, provenance
 from jaxbiped._types import JsonObject
 from jaxbiped.continuation._nearest_bifurcation import range_of
@@ -174,7 +174,7 @@ def optimise_gait(
     measures = {*told, *(each.name for each in requirements)}
     evaluations = Evaluations()
     if store is not None:
-        path = user_path(store)
+        path = user_path(store, "store")
         own = _problem_settings(scene, vary, measures, settings, ensemble)
         evaluations = Evaluations(path, own)
     problem = DesignProblem(

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from jaxbiped._checks import check_positive
+from jaxbiped._paths import check_writable_file
 from jaxbiped.plot._samples import end_time, state_at
 from jaxbiped.plot._upright import Pose, poses, upright
 from jaxbiped.plot.style import GROUND_COLOUR, LEG_COLOURS, LEG_NAMES, LEG_STYLES, new_figure
@@ -73,8 +74,9 @@ def save_animation(animation: FuncAnimation, path: str | Path) -> Path:
     Returns:
         The path.
     """
-    animation.save(str(path), writer="pillow")
-    return Path(path)
+    where = check_writable_file("path", path)
+    animation.save(str(where), writer="pillow")
+    return where
 
 
 def animation_html(animation: FuncAnimation) -> str:

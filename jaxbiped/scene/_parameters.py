@@ -7,7 +7,7 @@ from typing import Any, TypeAlias, TypeVar
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._checks import check_choice
+from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._parameter import parameter_infos
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Parameter, Scalar
@@ -111,6 +111,11 @@ def select_parameters(
         ArgumentError: a name that the scene does not have.
     """
     by_leaf = _names_by_leaf(scene)
+    if isinstance(parameters, str):
+        raise ArgumentError(
+            f"parameters = {parameters!r} is not allowed: give a tuple of names, such as "
+            f"({parameters!r},)."
+        )
     names = parameter_names(scene) if parameters is None else tuple(parameters)
     for name in names:
         check_choice("parameters", name, by_leaf)

@@ -1,5 +1,8 @@
 """The seed paper's own scene."""
 
+import inspect
+
+from jaxbiped._checks import check_choice
 from jaxbiped.scene._clearance import StanceRotation
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._scene import Scene
@@ -25,6 +28,7 @@ def seed_scene(
     mu_kinetic: float = 0.40,
     v0: float = 1e-4,
     xi: float = 1000.0,
+    **unknown: float,
 ) -> Scene:
     """The paper's walker (section 2.3) on its slope, any parameter replaced by its paper name.
 
@@ -52,13 +56,16 @@ def seed_scene(
         clearance.
 
     Raises:
-        ArgumentError: a value that is not allowed; the message names it.
+        ArgumentError: a value that is not allowed, or a name that is not known; the message names
+            it.
 
     Examples:
         >>> import jaxbiped as jb
         >>> float(jb.seed_scene(slope=0.03).ground.slope)
         0.03
     """
+    for name in unknown:
+        check_choice("parameter", name, list(inspect.signature(seed_scene).parameters)[:-1])
     return Scene(
         walker=Walker(m=m, J=J, l=l, d=d, r=r, hip_mass=hip_mass),
         ground=Ground(slope=slope, g=g),

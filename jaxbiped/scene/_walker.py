@@ -5,7 +5,7 @@ import equinox as eqx
 from jaxbiped._checks import (
     ArgumentError,
     are_zero_together,
-    check_at_least,
+    check_pair,
 )
 from jaxbiped._parameter import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
@@ -38,7 +38,7 @@ class Walker(eqx.Module):
 
     def __check_init__(self) -> None:
         check_parameters(self)
-        check_at_least("l", self.l, "r", self.r)
+        check_pair("l", self.l, "r", self.r)
         for name in ("d", "hip_mass"):
             if are_zero_together(self.J, getattr(self, name)):
                 raise ArgumentError(

@@ -7,6 +7,7 @@ from jaxbiped._checks import (
     ArgumentError,
     check_count,
     check_positive,
+    check_room,
     check_unbatched,
     traced_rules,
 )
@@ -97,7 +98,7 @@ def rigid_walk(
     # Of a lane that is not allowed nothing is known from the start.
     state, duration = where_allowed(rules, state), where_allowed(rules, duration, 1.0)
     if max_arrivals:
-        check_count("max_arrivals", max_arrivals)
+        check_room("max_arrivals", max_arrivals)
     check_count("max_solver_steps", max_solver_steps)
     narrow = state.theta_1.dtype != jnp.float64
     chosen = engine_for(

@@ -12,7 +12,12 @@ def check_times(times: ArrayLike, duration: Scalar | float) -> None:
     """Raises `ArgumentError` unless they increase and lie within the duration [s]."""
     if isinstance(times, jax.core.Tracer) or isinstance(duration, jax.core.Tracer):
         return
-    values = np.asarray(times, dtype=float)
+    try:
+        values = np.asarray(times, dtype=float)
+    except (TypeError, ValueError):
+        raise ArgumentError(
+            f'save = {times!r} is not allowed: give "steps", "end", a section or increasing times.'
+        ) from None
     allowed = values.ndim == 1 and np.all(np.diff(values) >= 0.0)
     if not allowed or not np.all((values >= 0.0) & (values <= float(duration))):
         raise ArgumentError(

@@ -18,6 +18,8 @@ from jaxbiped._checks import (
     check_choice,
     check_count,
     check_positive,
+    check_room,
+    check_type,
     check_unbatched,
     traced_rules,
 )
@@ -130,11 +132,12 @@ class Simulation(eqx.Module):
             check_steps(method, dt, most_steps=max_solver_steps, duration=time)
         # Of a lane that is not allowed nothing is known from the start.
         state, time = where_allowed(rules, state), where_allowed(rules, time, 1.0)
+        check_type("watch", watch, tuple, list)
         for name in watch:
             check_choice("watch", name, WATCHES)
         if isinstance(save, str):
             check_choice("save", save, ("steps", "end"))
-        check_count("max_arrivals", max_arrivals)
+        check_room("max_arrivals", max_arrivals)
         section = save if isinstance(save, AbstractSection) else None
         timed = section is None and not isinstance(save, str)
         if timed:

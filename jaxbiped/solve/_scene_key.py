@@ -18,7 +18,9 @@ from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._identity import identity
 from jaxbiped._types import Scalar, as_array
-from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
 _ROUNDING = 1e4
@@ -46,7 +48,7 @@ def _sum(numpy: Any, values: Any, weights: np.ndarray) -> Any:
 
 def check_scene_of(trajectory: Any, scene: Any, name: str = "trajectory") -> None:
     """Raises `ArgumentError` for a scene other than the one that a motion was simulated with."""
-    check_type("scene", scene, AbstractScene)
+    check_type("scene", scene, Scene, RedundantScene, RigidScene)
     check_type(name, trajectory, Trajectory)
     kept = trajectory.scene_key
     if kept is None:

@@ -7,8 +7,9 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from typing import Any
 
 from jaxbiped._checks import ArgumentError, ResourceError, check_positive
+from jaxbiped._environment import THREADS_VARIABLE
 from jaxbiped.basins._arguments import check_whole
-from jaxbiped.compiler import THREADS_VARIABLE, default_threads
+from jaxbiped.compiler import default_threads
 
 _RETRIES = 3
 """Times that a chunk is labelled again where its worker died."""

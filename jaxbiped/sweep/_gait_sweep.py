@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import PyTree
 from tqdm import tqdm
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite, user_path
+from jaxbiped._checks import ArgumentError, check_choice, check_finite
+from jaxbiped._paths import user_path
 from jaxbiped._provenance import provenance
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
@@ -86,7 +87,7 @@ def gait_sweep(
     """
     scene = check_scene(scene, Scene, RigidScene, RedundantScene)
     values = _check_values(scene, over)
-    path = None if store is None else user_path(store)
+    path = None if store is None else user_path(store, "store")
     if path is not None:
         check_store(path)
     options: dict[str, Any] = dict(
@@ -165,8 +166,11 @@ def _find(scene: AnyScene, near: list[PyTree], options: dict[str, Any], *, alone
 def _check_values(
     scene: AnyScene, over: Mapping[str, Sequence[float] | np.ndarray]
 ) -> dict[str, np.ndarray]:
-    if not over:
-        raise ArgumentError("over = {} is not allowed: name at least one parameter.")
+    if not isinstance(over, Mapping) or not over:
+        raise ArgumentError(
+            f"over = {over!r} is not allowed: map one parameter's name or more to its values, "
+            'such as {"K": [1e6, 2e6]}.'
+        )
     values = {}
     for name, column in dict(over).items():
         check_choice("over", name, parameter_names(scene))

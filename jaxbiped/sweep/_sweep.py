@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from tqdm import tqdm
 
-from jaxbiped._checks import ArgumentError, check_type, user_path
+from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._paths import user_path
 from jaxbiped._provenance import provenance
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label import Label
@@ -87,7 +88,7 @@ def sweep(
     check_whole("workers", workers, 1)
     if not starts.size:
         raise ArgumentError("starts is empty: give at least one.")
-    path = None if store is None else user_path(store)
+    path = None if store is None else user_path(store, "store")
     if path is not None:
         check_store(path)
     began = time.perf_counter()

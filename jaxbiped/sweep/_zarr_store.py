@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, ResourceError, failure_kind
+from jaxbiped._checks import ArgumentError, ResourceError
 from jaxbiped._disk_cache import ABANDONED
+from jaxbiped._paths import failure_kind
 from jaxbiped._strict_json import strict_json
 from jaxbiped._types import JsonObject
 from jaxbiped.sweep._array_layout import Layout, empty_dataset

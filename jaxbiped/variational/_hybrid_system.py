@@ -131,8 +131,12 @@ def section_of(scene: object, section: AbstractSection | None) -> AbstractSectio
     """The section asked for, or the one that a scene's cycles begin at unless told otherwise.
 
     Raises:
-        ArgumentError: a section other than heel strike for a rigid walker.
+        ArgumentError: what is no section, or one other than heel strike for a rigid walker.
     """
+    if section is not None and not isinstance(section, AbstractSection):
+        raise ArgumentError(
+            f"section = {section!r} is not allowed: give MidStance(), HeelStrike() or a Section."
+        )
     if not is_rigid(scene):
         return MidStance() if section is None else section
     if section is not None and not isinstance(section, HeelStrike):

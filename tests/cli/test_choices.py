@@ -40,9 +40,8 @@ def test_the_chunk_is_the_sweep_s():
 
 
 def test_the_seed_s_parameters_are_those_of_its_scene():
-    usual = {
-        name: each.default for name, each in inspect.signature(jb.seed_scene).parameters.items()
-    }
+    named = inspect.signature(jb.seed_scene).parameters.items()
+    usual = {name: each.default for name, each in named if each.kind is each.KEYWORD_ONLY}
     assert {name: each.value for name, each in _choices.SEED.items()} == usual
     scene = jb.seed_scene()
     parts = (scene.walker, scene.ground, scene.normal, scene.friction)

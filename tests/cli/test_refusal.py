@@ -1,8 +1,13 @@
 """What the command line refuses, against one sentence on stderr and exit code 2."""
 
+import json
+from pathlib import Path
+
+import jax
+import numpy as np
 import pytest
 
-from jaxbiped.cli import main
+from jaxbiped.cli import Report, main
 from jaxbiped.cli._refusal import one_sentence
 
 
@@ -51,6 +56,13 @@ def test_what_the_parser_refuses(arguments, words, capsys):
         (["gait", "--footsteps", "-2"], ("footsteps = -2", "whole number above 0")),
         (["walk", "--model", "rigid", "--method", "index1"], ("method = index1", "rigid")),
         (["walk", "--method", "index1"], ("method = index1", "--formulation redundant")),
+        (["walk", "--r", "0.5"], ("l = 0.4 and r = 0.5", "l must be at least r")),
+        (["walk", "--set", "K=1e6", "--K", "2e6"], ("K = 2e+06", "set = 'K=1e+06'", "one of them")),
+        (["walk", "--accuracy", "draft", "--rtol", "1e-8"], ("rtol = 1e-08", "accuracy = draft")),
+        (["walk", "--dt", "1e-6", "--rtol", "1e-8"], ("rtol = 1e-08", "dt = 1e-06")),
+        (["walk", "--normal", "hertz", "--c", "1"], ("c = 1", "normal = hertz")),
+        (["gait", "--friction", "coulomb", "--xi", "9"], ("xi = 9", "friction = coulomb")),
+        (["walk", "--json", "~/no/such"], ("no/such' cannot be written",)),
         (["walk", "--hip-z", "0.2"], ("hip_z = 0.2", "0.196 m below the ground", "0.3956")),
         (["walk", "--hip-z", "0"], ("hip_z = 0", "below the ground")),
         (["walk", "--hip-z", "-5"], ("hip_z = -5", "below the ground")),
@@ -91,3 +103,38 @@ def test_what_is_no_box_still_says_something():
 def test_the_version(arguments, capsys):
     main(arguments)
     assert capsys.readouterr().out.strip().count(".") == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("JAXBIPED_THREADS", "two", "a whole number of threads above 0"),
+        ("JAXBIPED_THREADS", "0", "a whole number of threads above 0"),
+        ("JAXBIPED_VECTOR_BITS", "100", "128, 256 or 512"),
+        ("JAXBIPED_CACHE_BYTES", "1e9", "a whole number of bytes"),
+    ],
+)
+def test_an_environment_variable_that_is_not_understood(name, value, words, capsys, monkeypatch):
+    monkeypatch.setenv(name, value)
+    line = _refused(["walk", "--duration", "0.1"], capsys)
+    assert f"{name} = {value!r}" in line
+    assert words in line
+
+
+def test_a_platform_that_jax_does_not_find(capsys, monkeypatch):
+    def none():
+        raise RuntimeError("Unknown backend")
+
+    monkeypatch.setenv("JAX_PLATFORMS", "abacus")
+    monkeypatch.setattr(jax, "devices", none)
+    line = _refused(["walk", "--duration", "0.1"], capsys)
+    assert "JAX_PLATFORMS = 'abacus'" in line
+
+
+def test_numbers_are_strict_json(capsys):
+    """What is no finite number is null, as RFC 8259 has no word for it."""
+    Report(Path("-")).finish({"a": [np.nan, np.float64("inf"), 1], "b": np.arange(2.0)})
+    assert json.loads(capsys.readouterr().out, parse_constant=pytest.fail) == {
+        "a": [None, None, 1],
+        "b": [0.0, 1.0],
+    }

@@ -20,7 +20,7 @@ def test_masses_and_lengths_are_sums_of_its_own():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (dict(l=0.07), "l = 0.07 is not allowed"),
+        (dict(l=0.07), "l = 0.07 and r = 0.08 are not allowed together"),
         (dict(m=0.0), "m = 0 is not allowed"),
         (dict(l=0.0), "l = 0 is not allowed"),
         (dict(r=-0.01), "r = -0.01 is not allowed"),

@@ -14,7 +14,8 @@ import pytest
 import zarr
 
 import jaxbiped as jb
-from jaxbiped.compiler import THREADS_VARIABLE, default_threads
+from jaxbiped._environment import THREADS_VARIABLE
+from jaxbiped.compiler import default_threads
 from jaxbiped.sweep._array_layout import Layout
 from jaxbiped.sweep._workers import _AHEAD, compute_chunks
 from tests.compiler.fake_driver import install

@@ -1,11 +1,11 @@
 """Host CPU: the features that code is generated for."""
 
-import os
 from typing import NamedTuple
 
 import llvmlite.binding as llvm
 
 from jaxbiped._caches import bounded_cache
+from jaxbiped._environment import VECTOR_VARIABLE, environment_number
 
 
 class Host(NamedTuple):
@@ -25,10 +25,6 @@ class Host(NamedTuple):
     scales: bool
 
 
-VECTOR_VARIABLE = "JAXBIPED_VECTOR_BITS"
-"""Environment variable: 128, 256 or 512, the bits of a vector where the CPU has as many or more."""
-
-
 @bounded_cache(1)
 def host() -> Host:
     """This machine, or what `VECTOR_VARIABLE` leaves of it."""
@@ -39,15 +35,15 @@ def host() -> Host:
     if not features.get("avx2") and width == 4:
         width = 2
     text = features.flatten()
-    chosen = os.environ.get(VECTOR_VARIABLE, "")
-    if chosen in _WITHOUT and int(chosen) // 64 < width:
+    chosen = environment_number(VECTOR_VARIABLE)
+    if chosen in _WITHOUT and chosen // 64 < width:
         # What a feature implies goes with it.
-        width, text = int(chosen) // 64, f"{text},-{_WITHOUT[chosen]}"
+        width, text = chosen // 64, f"{text},-{_WITHOUT[chosen]}"
     if width == 8:
         # LLVM else keeps to half registers on some CPUs.
         text += ",-prefer-256-bit"
     return Host(llvm.get_default_triple(), llvm.get_host_cpu_name(), text, width, width == 8)
 
 
-_WITHOUT = {"128": "avx", "256": "avx512f"}
+_WITHOUT = {128: "avx", 256: "avx512f"}
 """The instruction set that gives more bits than these."""

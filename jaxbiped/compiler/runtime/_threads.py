@@ -6,17 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-THREADS_VARIABLE = "JAXBIPED_THREADS"
-"""Environment variable: threads to use, else as many as the process has cores."""
+from jaxbiped._environment import THREADS_VARIABLE, environment_number
+
 _POLL = 0.1
 """How long to wait before looking whether the user interrupts [s]."""
 
 
 def default_threads() -> int:
     """Threads to use where nobody says."""
-    chosen = os.environ.get(THREADS_VARIABLE, "")
-    if chosen.isdigit() and int(chosen) > 0:
-        return int(chosen)
+    chosen = environment_number(THREADS_VARIABLE)
+    if chosen is not None:
+        return chosen
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

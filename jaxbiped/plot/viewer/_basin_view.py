@@ -10,6 +10,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_count, check_type
+from jaxbiped._paths import check_writable_file
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._label import label_names
 from jaxbiped.plot._label_colours import in_order, label_colour
@@ -49,8 +50,9 @@ class BasinView:
 
     def save(self, path: str | Path) -> Path:
         """Writes that page, and returns its path."""
-        Path(path).write_text(self.html(), encoding="utf-8")
-        return Path(path)
+        where = check_writable_file("path", path)
+        where.write_text(self.html(), encoding="utf-8")
+        return where
 
     def _repr_html_(self) -> str:
         return frame_of(self.html(), self.basin["title"], 900)

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._redundant_state import CompliantState, minimal_state
@@ -48,6 +49,8 @@ def record_walk(
     Raises:
         ValueError: the trajectory was not saved step by step, or this is a batch.
     """
+    if end_time(trajectory) <= 0.0:
+        raise ArgumentError("trajectory ends where it begins: there is no motion to look at.")
     first = _first_times(scene, trajectory)
     started = evaluate_along(scene, state_at(trajectory, first[:1]), energies)
 

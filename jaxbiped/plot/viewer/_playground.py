@@ -10,6 +10,7 @@ import numpy as np
 
 from jaxbiped._checks import check_count, check_type
 from jaxbiped._ending import Ending
+from jaxbiped._paths import check_writable_file
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state import State
 from jaxbiped.plot.style import view_colours
@@ -85,8 +86,9 @@ class Playground:
 
     def save(self, path: str | Path) -> Path:
         """Writes that page, and returns its path."""
-        Path(path).write_text(self.html(), encoding="utf-8")
-        return Path(path)
+        where = check_writable_file("path", path)
+        where.write_text(self.html(), encoding="utf-8")
+        return where
 
     def _repr_html_(self) -> str:
         return frame_of(self.html(), "a walk that simulates itself", 1000)

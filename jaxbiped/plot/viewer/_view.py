@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._paths import check_writable_file
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.plot.style import view_colours
@@ -43,8 +44,9 @@ class View:
 
     def save(self, path: str | Path) -> Path:
         """Writes that page, and returns its path."""
-        Path(path).write_text(self.html(), encoding="utf-8")
-        return Path(path)
+        where = check_writable_file("path", path)
+        where.write_text(self.html(), encoding="utf-8")
+        return where
 
     def widget(self) -> Any:
         """The view as a widget of `anywidget` (`pip install jaxbiped[view]`).

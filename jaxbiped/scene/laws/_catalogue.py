@@ -53,10 +53,10 @@ FRICTION_LAWS: Mapping[str, type[AbstractFrictionLaw | AbstractBristleLaw]] = _b
 def normal_law_like(
     name: str,
     *,
-    K: Parameter,
-    c: Parameter,
-    n: Parameter,
-    mass: Parameter,
+    K: Parameter = 1e6,
+    c: Parameter = 1e7,
+    n: Parameter = 1.5,
+    mass: Parameter = 2.0,
     g: Parameter = 9.8,
 ) -> AbstractNormalLaw:
     """The normal law of a name that carries a mass as `RistowSchafer(K, c, n)` does.
@@ -65,7 +65,8 @@ def normal_law_like(
     at the same penetration under the weight, with the same damping ratio of small oscillations
     about it; Hertz's with the same penetration. Where a law has an exponent of its own to choose,
     it is n; the others keep theirs, so their linear stiffness there differs from the seed's by
-    the quotient of the exponents, and their linear damper by its root.
+    the quotient of the exponents, and their linear damper by its root. What is not given is the
+    seed's.
 
     Args:
         name: one of `NORMAL_LAWS`.
@@ -94,13 +95,19 @@ def _standing(law: RistowSchafer, mass: Scalar, g: Scalar) -> Standing:
 
 
 def friction_law_like(
-    name: str, *, mu_static: Parameter, mu_kinetic: Parameter, v0: Parameter, xi: Parameter
+    name: str,
+    *,
+    mu_static: Parameter = 0.5,
+    mu_kinetic: Parameter = 0.4,
+    v0: Parameter = 1e-4,
+    xi: Parameter = 1000.0,
 ) -> AbstractFrictionLaw | AbstractBristleLaw:
     """The friction law of a name that resembles `BengisuAkay` with these parameters.
 
     The seed's law rises from rest with the slope 2 mu_static/v0, peaks at v0 and falls to
     mu_kinetic over 1/xi beyond. The others follow it in what they have, as `like_seed` of each
-    tells; laws with one coefficient take the kinetic one, which most of a slide sees.
+    tells; laws with one coefficient take the kinetic one, which most of a slide sees. What is not
+    given is the seed's.
 
     Args:
         name: one of `FRICTION_LAWS`.

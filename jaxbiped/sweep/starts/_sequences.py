@@ -9,6 +9,8 @@ from jaxbiped._caches import bounded_cache
 
 SAMPLINGS = ("uniform", "latin-hypercube", "sobol", "halton")
 """Ways to draw samples."""
+MOST_SOBOL = 1 << 30
+"""Points of SciPy's Sobol sequence."""
 
 
 def sequence_points(

@@ -23,7 +23,7 @@ from jaxbiped.sweep.starts._coordinates import (
     place_states,
     state_at,
 )
-from jaxbiped.sweep.starts._sequences import SAMPLINGS, sequence_points
+from jaxbiped.sweep.starts._sequences import MOST_SOBOL, SAMPLINGS, sequence_points
 
 Completion: TypeAlias = Callable[[Any, PyTree], PyTree]
 """Completes starts: of a scene and its states, leaves (n,)."""
@@ -244,6 +244,10 @@ def sample(
     check_whole("count", count, 1)
     check_whole("seed", seed, 0)
     check_choice("method", method, SAMPLINGS)
+    if method == "sobol" and count > MOST_SOBOL:
+        raise ArgumentError(
+            f"count = {count} is not allowed for sobol: its sequence has {MOST_SOBOL} points."
+        )
     if not bounds:
         raise ArgumentError("bounds = {} is empty: name at least one coordinate.")
     for name, pair in bounds.items():

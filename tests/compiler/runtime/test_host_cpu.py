@@ -6,8 +6,10 @@ import sys
 
 import pytest
 
+from jaxbiped._checks import ArgumentError
+from jaxbiped._environment import VECTOR_VARIABLE
 from jaxbiped.compiler.runtime import _host_cpu
-from jaxbiped.compiler.runtime._host_cpu import VECTOR_VARIABLE, host
+from jaxbiped.compiler.runtime._host_cpu import host
 
 _ASKED = """
 import jax, jax.numpy as jnp, jaxbiped as jb, numpy as np
@@ -32,11 +34,17 @@ def _host():
     return host.__wrapped__()
 
 
-@pytest.mark.parametrize("bits", ["", "64", "1e3", "many", "4096"])
-def test_what_is_no_width_of_vectors_changes_nothing(monkeypatch, bits):
+@pytest.mark.parametrize("bits", ["64", "1e3", "many", "4096"])
+def test_what_is_no_width_of_vectors_is_refused(monkeypatch, bits):
+    monkeypatch.setenv(VECTOR_VARIABLE, bits)
+    with pytest.raises(ArgumentError, match=f"{VECTOR_VARIABLE} = '{bits}' .* 128, 256 or 512"):
+        _host()
+
+
+def test_an_empty_width_of_vectors_changes_nothing(monkeypatch):
     monkeypatch.delenv(VECTOR_VARIABLE, raising=False)
     plain = _host()
-    monkeypatch.setenv(VECTOR_VARIABLE, bits)
+    monkeypatch.setenv(VECTOR_VARIABLE, "")
     assert _host() == plain
 
 
@@ -44,7 +52,7 @@ def test_narrower_vectors_do_without_the_wider_ones_instructions(monkeypatch):
     monkeypatch.setenv(VECTOR_VARIABLE, "128")
     assert _host().width == 2
     assert _host().scales is False
-    assert _host().features.endswith(f"-{_host_cpu._WITHOUT['128']}")
+    assert _host().features.endswith(f"-{_host_cpu._WITHOUT[128]}")
 
 
 @pytest.mark.slow

@@ -1,0 +1,73 @@
+"""Paths that a user gives: read and checked, "~" expanded, one clear sentence each."""
+
+import errno
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from jaxbiped._checks import ArgumentError, ResourceError
+
+_WRONG_PATH = ("EACCES", "EPERM", "EROFS", "ENOENT", "EEXIST", "ENOTDIR", "EISDIR", "ENAMETOOLONG")
+"""Errors of a file system where another path would do; any other is the disk's own."""
+
+
+def failure_kind(error: OSError) -> type[ArgumentError] | type[ResourceError]:
+    """Whether a path that cannot be written is to blame itself, or what it lies on."""
+    wrong = errno.errorcode.get(error.errno or 0) in _WRONG_PATH
+    return ArgumentError if wrong else ResourceError
+
+
+def user_path(path: str | Path, name: str = "path") -> Path:
+    """A path as the user means it: "~" is the home folder.
+
+    Raises:
+        ArgumentError: no path, or a home folder that is not known.
+    """
+    try:
+        return Path(path).expanduser()
+    except (TypeError, RuntimeError) as error:
+        raise ArgumentError(f"{name} = {path!r} is not allowed: {error}.") from None
+
+
+def read_json(name: str, path: str | Path) -> Any:
+    """What a JSON file holds; raises `ArgumentError` for one that cannot be read or is no JSON."""
+    try:
+        return json.loads(user_path(path, name).read_text())
+    except OSError as error:
+        reason = (error.strerror or "unreadable").lower()
+        raise ArgumentError(f"{name} = {str(path)!r} cannot be read ({reason}).") from None
+    except ValueError as error:
+        raise ArgumentError(f"{name} = {str(path)!r} is not JSON ({error}).") from None
+
+
+def check_writable_directory(name: str, path: Path) -> None:
+    """Creates the directory if need be; raises where files cannot be written.
+
+    Raises:
+        ArgumentError: the path is not allowed.
+        ResourceError: its disk is full or fails.
+    """
+    allowed = "it must be a directory in which files can be written"
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = (error.strerror or "cannot be made").lower()
+        raise failure_kind(error)(
+            f"{name} = {str(path)!r} is not allowed ({reason}): {allowed}."
+        ) from None
+    if not os.access(path, os.W_OK | os.X_OK):
+        raise ArgumentError(f"{name} = {str(path)!r} is not allowed (not writable): {allowed}.")
+
+
+def check_writable_file(name: str, path: str | Path) -> Path:
+    """The path, "~" expanded; raises `ArgumentError` where no such file can be written."""
+    path = user_path(path, name)
+    if path.is_dir():
+        raise ArgumentError(f"{name} = {str(path)!r} is a directory: it must be a file to write.")
+    parent = path.parent
+    if not parent.is_dir() or not os.access(path if path.exists() else parent, os.W_OK):
+        raise ArgumentError(
+            f"{name} = {str(path)!r} cannot be written: its folder must exist and be writable."
+        )
+    return path
