@@ -17,6 +17,7 @@ import numpy as np
 from jaxbiped import _caches
 from jaxbiped._caches import Once, register_programs
 from jaxbiped._compiled_store import CompiledCall, Skeleton, read_call, trace_call
+from jaxbiped._debug_switches import without_switches
 from jaxbiped._disk_cache import cache_folder
 from jaxbiped._fingerprint import fingerprint, settings
 from jaxbiped._jax_versions import nothing_is_traced
@@ -55,6 +56,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         self._lock = threading.Lock()
         register_programs(function, self._count, self.clear)
 
+    @without_switches
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Runs the function, compiled."""
         arguments = arguments_of((args, kwargs))
@@ -69,6 +71,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
             found = program(arguments.arrays)
         return found
 
+    @without_switches
     def begin(self, *args: _P.args, **kwargs: _P.kwargs) -> Callable[[], object]:
         """Traces the function, where no process did; what then compiles it, in any thread."""
         arguments = arguments_of((args, kwargs))
@@ -81,10 +84,12 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
             return functools.partial(once, lambda: kept)
         return functools.partial(once, self._trace(arguments, key))
 
+    @without_switches
     def lower(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
         """The function, ready to be compiled for these arguments; see `equinox.filter_jit`."""
         return self._jitted.lower(*args, **kwargs)
 
+    @without_switches
     def result_shape(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
         """Its result with shapes instead of arrays."""
         arguments = arguments_of((args, kwargs))
@@ -152,6 +157,7 @@ def kept_alone(function: Callable[_P, _T]) -> Callable[_P, _T]:
     """
     kept = cached_jit(function)
 
+    @without_switches
     @functools.wraps(function)
     def called(*args: _P.args, **kwargs: _P.kwargs) -> _T:
         if not nothing_is_traced():

@@ -198,15 +198,10 @@ def check_pair(name: str, value: object, smaller_name: str, smaller: object) -> 
         check_at_least(name, value, smaller_name, smaller)
     except ArgumentError:
         raise ArgumentError(
-            f"{name} = {_named(value)} and {smaller_name} = {_named(smaller)} are not allowed "
-            f"together: {name} must be at least {smaller_name}."
+            f"{name} = {_numbers(name, value)} and {smaller_name} = "
+            f"{_numbers(smaller_name, smaller)} are not allowed together: {name} must be at least "
+            f"{smaller_name}."
         ) from None
-
-
-def _named(value: object) -> str:
-    import numpy as np
-
-    return f"{value:g}" if np.ndim(value) == 0 else f"an array of shape {np.shape(value)}"  # type: ignore[str-format]
 
 
 def check_below(name: str, value: object, bound: float, why: str) -> None:

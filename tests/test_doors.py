@@ -114,6 +114,13 @@ def test_traced_it_fails_in_its_own_lane_alone():
     ends(lambda t: short(SCENE, duration=t, **lanes), [0.02, -1.0, np.nan])
     ends(lambda r: short(SCENE, rtol=r, **lanes), [1e-5, -1.0, np.nan])
     ends(lambda w: short(SCENE, START._replace(omega_1=w), **lanes), [-0.0052, np.nan, np.inf])
+    redundant = jb.RedundantScene(SCENE)
+    of_legs = eqx.tree_at(lambda s: s.scene.walker.d, redundant, 0.1)
+    assert short(of_legs, **lanes).outcome is jb.Ending.WALKING
+    ends(
+        lambda d: short(eqx.tree_at(lambda s: s.scene.walker.d, redundant, d), **lanes),
+        [0.1, -0.1, np.nan],
+    )
     ends(lambda d: jb.rigid_walk(put(RIGID, "d", d), ROLLING, footsteps=1), [0.1, -0.1, np.nan])
     ends(lambda t: jb.rigid_walk(RIGID, ROLLING, duration=t), [0.1, -0.1, np.nan])
 

@@ -24,9 +24,7 @@ from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator, Actuation
 from jaxbiped.scene.actuation._catalogue import ACTUATORS
-from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, AbstractNormalLaw
 from jaxbiped.scene.laws._catalogue import friction_law_like, normal_law_like
-from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
 
 
 def described_scene(options: SceneOptions) -> Scene | RigidScene | RedundantScene:
@@ -48,9 +46,7 @@ def _compliant(options: SceneOptions) -> Scene:
     return dataclasses.replace(own, normal=normal, friction=friction)
 
 
-def _law_like(
-    options: SceneOptions, kind: str, names: tuple[str, ...], **others: Any
-) -> AbstractNormalLaw | AbstractFrictionLaw | AbstractBristleLaw:
+def _law_like(options: SceneOptions, kind: str, names: tuple[str, ...], **others: Any) -> Any:
     """A law matched to these parameters; raises `ArgumentError` for one that it has no use for."""
     like: Any = normal_law_like if kind == "normal" else friction_law_like
     values = {name: getattr(options, name) for name in names}
@@ -64,7 +60,7 @@ def _law_like(
                     f"{name} = {value:g} is not allowed with {kind} = {getattr(options, kind)}: "
                     f"that law has no use for it."
                 )
-    return law  # type: ignore[no-any-return]
+    return law
 
 
 def _rigid(options: SceneOptions) -> RigidScene:

@@ -14,6 +14,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped._checks import check_choice, check_count, check_unbatched
+from jaxbiped._debug_switches import without_switches
 from jaxbiped._progress import stage
 from jaxbiped.compiler import deferred_checks, host_jit
 from jaxbiped.dynamics._bristle_state import state_for
@@ -51,6 +52,7 @@ _RESIDUAL_SHARE = 0.3
 """Residual that counts as none, in units of the state's tolerance."""
 
 
+@without_switches
 def find_gait(
     scene: Scene | RigidScene | RedundantScene,
     guess: WalkerState | LegsState | None = None,

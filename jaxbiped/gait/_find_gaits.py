@@ -9,6 +9,7 @@ import numpy as np
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
+from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._state import State
@@ -40,6 +41,7 @@ class Gaits(NamedTuple):
     ending: Scalar
 
 
+@without_switches
 def find_gaits(scene: Scene | RigidScene, starts: State | RigidState, **options: Any) -> Gaits:
     """Searches a periodic gait from each of many starts, all at once, and tells them apart.
 

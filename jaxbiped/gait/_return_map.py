@@ -9,6 +9,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice, check_count, check_positive
+from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Scalar, Time, as_float, select
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
@@ -51,6 +52,7 @@ class Return(NamedTuple):
     code: Scalar
 
 
+@without_switches
 def return_map(
     args: PyTree,
     state: PyTree,

@@ -11,6 +11,7 @@ from jaxbiped._checks import (
     check_unbatched,
     traced_rules,
 )
+from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import as_float, by_numpy
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import check_state
@@ -29,6 +30,7 @@ _PATIENCE = 50.0
 """Time allowed for each footstep, in units of √(l/g)."""
 
 
+@without_switches
 def rigid_walk(
     scene: RigidScene,
     state: RigidState,

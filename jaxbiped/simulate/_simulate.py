@@ -6,6 +6,7 @@ from typing import Literal
 import diffrax
 from jaxtyping import Array, PyTree
 
+from jaxbiped._debug_switches import without_switches
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.scene._scene import Scene
@@ -17,6 +18,7 @@ from jaxbiped.solve._ending import WATCHES
 from jaxbiped.solve._trajectory import Trajectory
 
 
+@without_switches
 def simulate(
     scene: Scene | RedundantScene,
     state: PyTree,

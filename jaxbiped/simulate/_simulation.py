@@ -125,11 +125,16 @@ class Simulation(eqx.Module):
         check_count("max_solver_steps", max_solver_steps)
         with traced_rules() as rules:
             scene = check_scene(scene, Scene, RedundantScene)
-            state, correction = start_for(scene, state)
+            if not scene.redundant:
+                state, correction = start_for(scene, state)
             check_positive("duration", time, "s")
             relative, absolute = tolerances(accuracy, rtol, atol, scene)
             method = solver_named(solver)
             check_steps(method, dt, most_steps=max_solver_steps, duration=time)
+        if (
+            scene.redundant
+        ):  # outside: what it compiles makes parts of its own, of which none is given
+            state, correction = start_for(scene, state)
         # Of a lane that is not allowed nothing is known from the start.
         state, time = where_allowed(rules, state), where_allowed(rules, time, 1.0)
         check_type("watch", watch, tuple, list)

@@ -7,6 +7,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError, check_count, check_finite, check_positive, check_type
+from jaxbiped._debug_switches import without_switches
 from jaxbiped._ending import Ending
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
@@ -25,6 +26,7 @@ from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.controllers._wrapped_control import StepControl
 
 
+@without_switches
 def swing(
     scene: LinkageScene,
     state: LinkageState,

@@ -8,6 +8,7 @@ from typing import Any, Generic, ParamSpec, TypeVar
 from jaxbiped import _caches
 from jaxbiped._cached_jit import Arguments, arguments_of, cached_jit
 from jaxbiped._caches import Once, register_programs
+from jaxbiped._debug_switches import without_switches
 from jaxbiped.compiler.host_code._host_program import (
     HostProgram,
     read_host_program,
@@ -31,6 +32,7 @@ class HostJit(Generic[_P, _T]):
         self._lock = threading.Lock()
         register_programs(self, lambda: len(self._programs), self.clear)
 
+    @without_switches
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Runs the function."""
         arguments = self._arguments(*args, **kwargs)
@@ -40,12 +42,14 @@ class HostJit(Generic[_P, _T]):
         found: _T = program(arguments.arrays, _as_given if self._within else _of_jax)
         return found
 
+    @without_switches
     def begin(self, *args: _P.args, **kwargs: _P.kwargs) -> Callable[[], object]:
         """Writes the function, where no process did; or what compiles it, in any thread."""
         if self._written(*args, **kwargs) is None:
             return self._compiled.begin(*args, **kwargs)
         return lambda: None
 
+    @without_switches
     def result_shape(self, *args: _P.args, **kwargs: _P.kwargs) -> Any:
         """Its result with shapes instead of arrays."""
         program = self._written(*args, **kwargs)

@@ -10,6 +10,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.compiler.ir._elementwise_primitives import KINDS, Array, array_of, convert
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
@@ -98,6 +99,7 @@ class Graph(NamedTuple):
         return [*carried, self.done, *self.outputs, *notes]
 
 
+@without_switches
 def outline_of(program: Program, inputs: PyTree) -> Outline:
     """Of a program for inputs of these shapes and dtypes."""
     carried = jax.eval_shape(program.start, inputs)
@@ -109,6 +111,7 @@ def outline_of(program: Program, inputs: PyTree) -> Outline:
     return Outline(outputs, sum(int(np.prod(value.shape)) for value in values))
 
 
+@without_switches
 def graph_of(program: Program, inputs: PyTree) -> Graph:
     """Traces a program for inputs of these shapes and dtypes."""
     prepare = Block(invariant=True)
