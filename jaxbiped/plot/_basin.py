@@ -1,6 +1,6 @@
 """Basin picture in two coordinates of the start."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,16 +21,19 @@ from jaxbiped.plot._label_colours import GAIT_SUFFIX, in_order, label_colour
 from jaxbiped.plot._symbols import axis_label
 from jaxbiped.plot.style import axes_or_new, figure_of
 
+if TYPE_CHECKING:
+    import xarray
+
 _HATCH = "////"
 """Over what is pending, so that it reads as missing in print without colour too."""
 
 
 def basin(
-    labels: npt.ArrayLike,
-    x: npt.ArrayLike,
-    y: npt.ArrayLike,
+    labels: "npt.ArrayLike | xarray.DataArray | xarray.Dataset",
+    x: npt.ArrayLike | None = None,
+    y: npt.ArrayLike | None = None,
     *,
-    names: tuple[str | Quantity, str | Quantity],
+    names: tuple[str | Quantity, str | Quantity] | None = None,
     units: tuple[str, str] = ("", ""),
     cycle_footsteps: npt.ArrayLike | None = None,
     gait: npt.ArrayLike | None = None,
@@ -41,9 +44,11 @@ def basin(
     """Draws labels of starts on a grid, each in its own colour, and says the fraction of each.
 
     Args:
-        labels: codes of `Label` or names (`label_names`), shape (ny, nx); row by row along y.
+        labels: codes of `Label` or names (`label_names`), shape (ny, nx); row by row along y. Or a
+            labelled array, which is drawn along the axes that `names` or `x` and `y` name, its
+            first one along x unless they do; or the dataset of a `sweep`, which needs no more.
         x, y: coordinates along the two axes, increasing: centres, shape (nx,) and (ny,), or edges
-            of the cells, one more.
+            of the cells, one more. Those of a labelled array unless given.
         names, units: what the axes are, as ("angle of the stance leg", …) and ("rad", …). A
             coordinate's or a parameter's own name, as "theta_swing", says it all by itself; so
             does a `jaxbiped.laws.Quantity`, as those of `jaxbiped.starts.coordinate_quantities`.
@@ -60,6 +65,19 @@ def basin(
     Raises:
         ArgumentError: shapes that do not fit, an empty grid, coordinates that do not increase.
     """
+    if hasattr(labels, "data_vars"):
+        data: Any = labels
+        labels, cycle_footsteps, gait = data.label, data.cycle_footsteps, data.gait
+    if hasattr(labels, "dims"):
+        along = _axes_of(labels, x, y, names)
+        names = along if names is None else names
+        x, y = (labels[n] if c is None else c for n, c in zip(along, (x, y), strict=True))
+        labels, cycle_footsteps, gait = (
+            each.transpose(*along[::-1]) if hasattr(each, "dims") else each
+            for each in (labels, cycle_footsteps, gait)
+        )
+    if x is None or y is None or names is None:
+        raise ArgumentError("x, y and names are needed: these labels do not know their axes.")
     words = names_of(labels, cycle_footsteps, gait)
     x_edges, y_edges = _edges("x", x, words.shape[1]), _edges("y", y, words.shape[0])
     ax = axes_or_new(ax, 7.2, 4.4)
@@ -68,8 +86,25 @@ def basin(
     return figure_of(ax)
 
 
+def _axes_of(labels: Any, x: Any, y: Any, names: Any) -> tuple[str, str]:
+    """The dimensions of labelled labels along x and y.
+
+    Raises:
+        ArgumentError: more or fewer than two.
+    """
+    if len(labels.dims) != 2:
+        raise ArgumentError(
+            f"labels has the axes {', '.join(map(str, labels.dims))}: choose two of them, and one "
+            "place of each other."
+        )
+    first, second = labels.dims
+    told = (getattr(x, "name", None), None if names is None else names[0])
+    as_given = x is not None and first not in told
+    return (second, first) if second in told or as_given else (first, second)
+
+
 def names_of(
-    labels: npt.ArrayLike,
+    labels: Any,
     cycle_footsteps: npt.ArrayLike | None = None,
     gait: npt.ArrayLike | None = None,
 ) -> np.ndarray:

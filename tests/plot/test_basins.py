@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray
 from matplotlib.collections import PolyCollection, QuadMesh
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
@@ -21,6 +22,10 @@ def _colours(ax):
     mesh.update_scalarmappable()
     shape = np.shape(mesh.get_array())
     return np.array([to_hex(c).upper() for c in mesh.get_facecolors()]).reshape(shape)
+
+
+def _colours_of(figure):
+    return _colours(figure.axes[0])
 
 
 def _legend(ax):
@@ -243,3 +248,23 @@ def test_a_boundary_of_three_dimensions_is_refused():
     )
     with pytest.raises(jb.ArgumentError, match="3 dimensions"):
         refined_basin(refined, **AXES)
+
+
+@pytest.mark.parametrize("shape", [(3, 3), (3, 4)])
+def test_labelled_labels_are_drawn_along_their_own_axes(shape):
+    """Against the same grid as a plain array, which is (ny, nx)."""
+    codes = np.arange(np.prod(shape)).reshape(shape) % 5
+    axes = {"omega_swing": np.arange(shape[0]) + 0.0, "theta_swing": np.arange(shape[1]) + 0.0}
+    fields = {name: (tuple(axes), codes) for name in ("label", "gait", "cycle_footsteps")}
+    data = xarray.Dataset(fields, axes)
+    x, y = axes.values()
+    plain = _colours_of(basin(codes.T, x, y, names=tuple(axes)))
+    of_array = basin(data.label, data.omega_swing, data.theta_swing, names=tuple(axes))
+    np.testing.assert_array_equal(_colours_of(of_array), plain)
+    np.testing.assert_array_equal(_colours_of(basin(data.label)), plain)
+    turned = _colours_of(basin(data.label, names=("theta_swing", "omega_swing")))
+    np.testing.assert_array_equal(turned, _colours_of(basin(codes, y, x, names=tuple(axes)[::-1])))
+    whole = basin(data).axes[0]
+    assert (whole.get_xlim(), whole.get_ylim()) == ((-0.5, shape[0] - 0.5), (-0.5, shape[1] - 0.5))
+    with pytest.raises(jb.ArgumentError, match="x, y and names are needed"):
+        basin(codes)

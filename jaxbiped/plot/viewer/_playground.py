@@ -39,7 +39,7 @@ class _Slider(NamedTuple):
 _SLIDERS = (
     _Slider(".scene.ground.slope", "Slope", "rad", 0.02),
     _Slider(".scene.normal.K", "Stiffness K", "N/mⁿ", 1.0, factor=True),
-    _Slider(".scene.normal.c", "Damping c", "N s/mⁿ⁺¹", 1.0, factor=True),
+    _Slider(".scene.normal.c", "Damping c", "N s/m²", 1.0, factor=True),
     _Slider(".state.theta_1", "Swing leg angle", "rad", 0.15),
     _Slider(".state.omega_1", "Swing leg rate", "rad/s", 1.5),
 )
