@@ -37,10 +37,12 @@ def run(options: Fit) -> int:
     report.say(table(head, rows, most=64))
     report.say(
         f"{fit.ending} after {fit.evaluations} scenes; chi squared {fit.chi_squared:.3g} at "
-        f"{fit.freedom} degrees of freedom"
+        f"{fit.freedom} degrees of freedom (p = {fit.p_value:.2g})"
     )
     if fit.undetermined:
         report.say(f"these data do not tell {', '.join(fit.undetermined)}")
+    if fit.at_bounds:
+        report.say(f"held by a bound: {', '.join(fit.at_bounds)}")
     report.finish(fit_numbers(fit))
     return 0 if fit.ending is FitEnding.CONVERGED else 1
 
@@ -60,9 +62,11 @@ def fit_numbers(fit: GaitFit) -> JsonObject:
         },
         "correlation": [[known(float(each)) for each in row] for row in fit.correlation],
         "undetermined": list(fit.undetermined),
+        "at_bounds": list(fit.at_bounds),
         "residuals": [known(float(each)) for each in fit.residuals],
         "chi_squared": known(fit.chi_squared),
         "freedom": fit.freedom,
+        "p_value": known(fit.p_value),
         "evaluations": fit.evaluations,
     }
 

@@ -1,11 +1,12 @@
 """Fit of a scene's parameters to measured gaits: estimates and what the data tell of them."""
 
 import enum
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-_LOOSE = 1.0
+LOOSE = 1.0
 """Standard error, in units of a parameter's own size, from which data do not tell it."""
 _NULL = 1e-9
 """Singular value, as a share of the largest, that counts as none."""
@@ -30,44 +31,50 @@ class FitEnding(enum.IntEnum):
 
 
 class Information(NamedTuple):
-    """What n residuals tell of k parameters, in units of the parameters' sizes.
+    """What n residuals tell of k parameters jointly, in units of the parameters' sizes.
 
     Attributes:
-        covariance: shape (k, k); NaN in rows and columns of what is undetermined.
+        covariance: shape (k, k), of each parameter while all others are free; NaN in rows and
+            columns of what is undetermined.
         undetermined: whether the data do not tell a parameter, shape (k,).
+        resolved: whether a parameter's derivatives exceed their own errors, shape (k,).
+        rank: how many combinations of parameters are told.
     """
 
     covariance: np.ndarray
     undetermined: np.ndarray
+    resolved: np.ndarray
+    rank: int
 
 
 def information(slopes: np.ndarray, slope_errors: np.ndarray) -> Information:
     """From derivatives of residuals, in their standard deviations, and these derivatives' errors.
 
     A parameter is undetermined where its derivatives do not exceed their own errors, where others
-    can make up for it, or where its standard error exceeds its size.
+    can make up for it as far as these errors show, or where its standard error in the joint fit
+    exceeds its size.
     """
     k = slopes.shape[1]
-    told = np.linalg.norm(slopes, axis=0) > 2.0 * np.linalg.norm(slope_errors, axis=0)
-    covariance = np.full((k, k), np.nan)
-    while told.any():
-        kept = slopes[:, told]
-        scale = np.linalg.norm(kept, axis=0)
-        _, singular, rows = np.linalg.svd(kept / scale)
-        singular = np.append(singular, np.zeros(len(rows) - len(singular)))
-        null = singular <= _NULL * singular[0]
-        variances = np.where(null, 0.0, 1.0 / np.where(null, 1.0, singular) ** 2)
-        found = (rows.T * variances) @ rows / np.outer(scale, scale)
-        free = np.linalg.norm(rows[null], axis=0) > 1e-6
-        loose = free | (np.sqrt(np.diag(found)) > _LOOSE)
-        if not loose.any():
-            covariance[np.ix_(told, told)] = found
-            break
-        # Without the loosest the others may be told.
-        size = np.where(free, np.inf, np.sqrt(np.diag(found)) / _LOOSE)
-        drop = free if free.any() else size == np.max(size)
-        told[np.flatnonzero(told)[drop]] = False
-    return Information(covariance, ~told)
+    sizes, sizes_of_errors = (np.linalg.norm(each, axis=0) for each in (slopes, slope_errors))
+    resolved = sizes > 2.0 * sizes_of_errors
+    covariance, undetermined = np.full((k, k), np.nan), np.ones(k, bool)
+    if not resolved.any():
+        return Information(covariance, undetermined, resolved, 0)
+    scale = sizes[resolved]
+    _, singular, rows = np.linalg.svd(slopes[:, resolved] / scale)
+    singular = np.append(singular, np.zeros(len(rows) - len(singular)))
+    noise = np.linalg.norm((slope_errors[:, resolved] / scale) @ np.abs(rows.T), axis=0)
+    null = singular <= np.maximum(_NULL * singular[0], 2.0 * noise)
+    variances = np.where(null, 0.0, 1.0 / np.where(null, 1.0, singular) ** 2)
+    found = (rows.T * variances) @ rows / np.outer(scale, scale)
+    # Errors of the derivatives turn the directions that nothing is told of, too.
+    turned = 1e-6 + 2.0 * float(np.max(noise)) / np.min(singular[~null], initial=np.inf)
+    free = np.linalg.norm(rows[null], axis=0) > turned
+    loose = free | (np.sqrt(np.diag(found)) > LOOSE)
+    undetermined[resolved] = loose
+    kept = ~undetermined
+    covariance[np.ix_(kept, kept)] = found[np.ix_(~loose, ~loose)]
+    return Information(covariance, undetermined, resolved, int(np.sum(~null)))
 
 
 class GaitFit(NamedTuple):
@@ -76,11 +83,17 @@ class GaitFit(NamedTuple):
     Attributes:
         ending: how the fit ended.
         estimates: by name, SI units; of what is undetermined the value that the search left it at.
-        standard_errors: by name, SI units; NaN for what is undetermined.
-        intervals: by name the ends of the 95 % interval; NaN for what is undetermined.
+        standard_errors: by name, SI units, in the joint fit; NaN for what is undetermined or at a
+            bound.
+        intervals: by name the ends of the 95 % interval: farther out no value of all other
+            parameters, within their bounds, makes up for this one. NaN for what is undetermined or
+            at a bound.
         correlation: of the estimates' errors, shape (k, k).
         undetermined: names of the parameters that the data do not tell.
+        at_bounds: names of the parameters that a bound of theirs holds: the data want them beyond.
         residuals: (predicted − measured) over standard deviation, shape (n,).
+        freedom: degrees of freedom: numbers measured less combinations of parameters, and clocks of
+            angles, that are told by them.
         evaluations: how many scenes were searched for gaits.
     """
 
@@ -90,7 +103,9 @@ class GaitFit(NamedTuple):
     intervals: dict[str, tuple[float, float]]
     correlation: np.ndarray
     undetermined: tuple[str, ...]
+    at_bounds: tuple[str, ...]
     residuals: np.ndarray
+    freedom: int
     evaluations: int
 
     @property
@@ -99,6 +114,8 @@ class GaitFit(NamedTuple):
         return float(np.sum(self.residuals**2))
 
     @property
-    def freedom(self) -> int:
-        """Degrees of freedom: numbers measured less parameters told by them."""
-        return len(self.residuals) - len(self.estimates) + len(self.undetermined)
+    def p_value(self) -> float:
+        """Probability of a chi squared at least as large where the model is right; NaN for none."""
+        from scipy.stats import chi2
+
+        return float(chi2.sf(self.chi_squared, self.freedom)) if self.freedom > 0 else math.nan

@@ -14,21 +14,30 @@ from jaxbiped._checks import (
     check_not_negative,
     check_positive,
     check_type,
+    holds_somewhere,
 )
 
 MEASURES = ("period", "step_length", "speed", "peak_normal")
 """Measures of a gait that may be given, as in `Measures`."""
 ANGLES = ("theta_1", "theta_2")
+CLOCKS = ("mid-stance", None)
+_LONGEST = 20.0
+"""Time beyond which a footstep is taken for milliseconds [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class MeasuredAngles:
-    """Leg angles over the first footstep of a cycle.
+    """Leg angles over time, from a footstep on. Entries that are masked count as missing.
+
+    Each angle is that of one leg throughout: `theta_2` is the angle of the leg that stands at the
+    beginning, and swings in the next footstep.
 
     Attributes:
-        times: since mid-stance [s], shape (n,).
+        times: on the data's own clock [s], shape (n,).
         deviation: standard deviation of every angle [rad].
         theta_1, theta_2: angles of the legs as in `State` [rad], shape (n,); None where unknown.
+        since: "mid-stance" if the clock reads zero when the standing leg (leg 2) passes the slope's
+            normal, of any model. None: the clock is unknown, and its zero is fitted along.
 
     Raises:
         ArgumentError: numbers or shapes that are not allowed.
@@ -38,26 +47,65 @@ class MeasuredAngles:
     deviation: float
     theta_1: npt.ArrayLike | None = None
     theta_2: npt.ArrayLike | None = None
+    since: str | None = None
 
     def __post_init__(self) -> None:
-        check_not_negative("times", self.times, "s")
+        check_not_negative("times", _filled(self.times), "s")
         if not np.size(self.times):
             raise ArgumentError("times = [] is not allowed: give one at least.")
+        _check_seconds("times", _filled(self.times))
         check_positive("deviation", self.deviation, "rad")
+        check_choice("since", self.since, CLOCKS)
         if not self.known:
             raise ArgumentError("theta_1 = None and theta_2 = None: give one of them at least.")
         for name, values in self.known.items():
-            check_finite(name, values)
             if np.ndim(values) != 1 or np.shape(values) != np.shape(self.times):
                 raise ArgumentError(
                     f"{name} has the shape {np.shape(values)}: it must be (n,), that of times, "
                     f"which is {np.shape(self.times)}."
                 )
+            check_finite(name, _filled(values))
+            if holds_somewhere(np.abs(_filled(values)) > 2.0 * np.pi):
+                raise ArgumentError(
+                    f"{name} holds {np.max(np.abs(_filled(values))):g}, which is beyond a whole "
+                    "turn: it must be in radians; are these degrees?"
+                )
+        if not any(np.any(each) for each in self.seen.values()):
+            raise ArgumentError("theta_1 and theta_2 hold no angle that is known: give one.")
 
     @property
     def known(self) -> dict[str, npt.ArrayLike]:
         """The angles that are known, by name."""
         return {name: each for name in ANGLES if (each := getattr(self, name)) is not None}
+
+    @property
+    def seen(self) -> dict[str, np.ndarray]:
+        """By name which of the angles are known, and when (booleans), shape (n,)."""
+        timed = ~np.ma.getmaskarray(np.ma.asarray(self.times))
+        return {
+            name: timed & ~np.ma.getmaskarray(np.ma.asarray(each))
+            for name, each in self.known.items()
+        }
+
+    @property
+    def values(self) -> np.ndarray:
+        """The angles that are known, one leg behind the other."""
+        return np.concatenate(
+            [np.asarray(_filled(self.known[n]))[at] for n, at in self.seen.items()]
+        )
+
+
+def _filled(values: npt.ArrayLike) -> npt.ArrayLike:
+    """Zeros where masked."""
+    return np.ma.filled(values, 0.0) if isinstance(values, np.ma.MaskedArray) else values
+
+
+def _check_seconds(name: str, values: npt.ArrayLike) -> None:
+    if holds_somewhere(np.asarray(values) > _LONGEST):
+        raise ArgumentError(
+            f"{name} = {np.max(values):g} s is longer than any footstep ({_LONGEST:g} s): it must "
+            "be in seconds; are these milliseconds?"
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +114,7 @@ class MeasuredGait:
 
     Attributes:
         measures: by name (period [s], step_length [m], speed [m/s], peak_normal [N]) the value and
-            its standard deviation.
+            its standard deviation; masked ones count as missing.
         conditions: parameters that are known and were others than the scene's, by name, such as the
             slope.
         angles: leg angles over time, if any.
@@ -91,6 +139,8 @@ class MeasuredGait:
         check_count("footsteps", self.footsteps)
         check_type("measures", self.measures, Mapping)
         check_type("conditions", self.conditions, Mapping)
+        known = {name: pair for name, pair in self.measures.items() if not _is_masked(pair)}
+        object.__setattr__(self, "measures", known)
         for name, pair in self.measures.items():
             check_choice("measures", name, MEASURES)
             if np.shape(pair) != (2,):
@@ -100,6 +150,8 @@ class MeasuredGait:
                 )
             check_finite(f"measures[{name!r}]", pair[0])
             check_positive(f"the standard deviation of {name}", pair[1])
+            if name == "period":
+                _check_seconds(name, pair[0])
         if not self.measures and self.angles is None:
             raise ArgumentError("measures = {} is not allowed: give a measure or angles.")
 
@@ -109,15 +161,25 @@ class MeasuredGait:
         return np.concatenate(
             [
                 [value for value, _ in self.measures.values()],
-                *([] if self.angles is None else self.angles.known.values()),
+                [] if self.angles is None else self.angles.values,
             ]
         )
+
+    @property
+    def clocks(self) -> int:
+        """Clocks whose zero is fitted along: 1 where that of the angles is unknown."""
+        return int(self.angles is not None and self.angles.since is None)
 
     @property
     def deviations(self) -> np.ndarray:
         """Their standard deviations, shape (n,)."""
         parts = [np.array([deviation for _, deviation in self.measures.values()])]
         if self.angles is not None:
-            size = np.size(self.angles.times) * len(self.angles.known)
-            parts.append(np.full(size, self.angles.deviation))
+            parts.append(np.full(len(self.angles.values), self.angles.deviation))
         return np.concatenate(parts)
+
+
+def _is_masked(pair: object) -> bool:
+    """Whether a value or its deviation is masked."""
+    entries = pair if isinstance(pair, tuple | list | np.ndarray) else (pair,)
+    return any(np.ma.is_masked(each) for each in (pair, *entries))

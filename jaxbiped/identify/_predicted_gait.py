@@ -7,20 +7,19 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.identify._measured_gait import MeasuredAngles, MeasuredGait
+from jaxbiped.identify._measured_gait import MeasuredGait
+from jaxbiped.identify._predicted_angles import AnglesInTime, clock_zero
 from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
 AnyScene: TypeAlias = Scene | RigidScene
 _DIFFERENCE = 3e-3
-"""Relative change of a parameter for the derivatives of angles over time. Their part that is the
-solve's error is then below 1e-4 of an angle's elasticity."""
+"""Relative change of a parameter for the derivatives of angles over time."""
 
 
 class Prediction(NamedTuple):
@@ -92,64 +91,55 @@ def predict(
     )
     slopes, errors = (part.reshape(-1, len(names)) * sizes for part in (slopes, errors))
     if measured.angles is not None and found:
-        over_time = measured.angles
-        along = _slopes_of_angles(gait_at, gait, over_time, parameters, sizes)
-        values = np.append(values, angles_at(gait, over_time))
+        along, along_errors, at = _angles_along(gait_at, gait, measured, parameters, sizes)
+        values = np.append(values, at)
         slopes = np.concatenate([slopes, along])
-        errors = np.concatenate([errors, np.zeros_like(along)])
+        errors = np.concatenate([errors, along_errors])
     state = gait.measures.state
     state_slopes = jtu.tree_map(lambda leaf: np.asarray(leaf) * sizes, gait.sensitivities.state)
     return Prediction(values, slopes, errors, state, state_slopes, found)
 
 
-def angles_at(gait: Gait, angles: MeasuredAngles) -> np.ndarray:
-    """The leg angles that were measured, of a gait: between its solver's steps by cubics.
-
-    Raises:
-        ArgumentError: times beyond the first footstep.
-    """
-    from scipy.interpolate import CubicHermiteSpline
-
-    times, states = gait.orbit
-    clock = np.asarray(times)[0]
-    known = np.isfinite(clock)
-    last = float(np.max(clock[known]))
-    latest = float(np.max(np.asarray(angles.times)))
-    if latest > 1.05 * last:
-        raise ArgumentError(
-            f"times = {latest:g} is not allowed: the footstep of this gait lasts {last:g} s."
-        )
-    columns = []
-    for name in angles.known:
-        rate = getattr(states, name.replace("theta", "omega"))
-        spline = CubicHermiteSpline(
-            clock[known], np.asarray(getattr(states, name))[0][known], np.asarray(rate)[0][known]
-        )
-        columns.append(spline(np.asarray(angles.times)))
-    return np.concatenate(columns)
-
-
-def _slopes_of_angles(
+def _angles_along(
     gait_at: Callable[[dict[str, float], PyTree, tuple[str, ...]], Gait],
     gait: Gait,
-    angles: MeasuredAngles,
+    measured: MeasuredGait,
     parameters: dict[str, float],
     sizes: np.ndarray,
-) -> np.ndarray:
-    """Central differences of the angles at fixed times, NaN where a gait is lost."""
-    columns = []
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Derivatives of the measured angles, these' errors, and the angles.
+
+    Derivatives are central differences, one-sided where one of the two gaits is lost, with infinite
+    errors where both are; errors are otherwise what the second differences make of them. A clock
+    that is fitted along is projected out (variable projection: Golub and Pereyra 1973, as Kaufman
+    1975 shortens it).
+    """
+    seen = measured.angles
+    assert seen is not None
+    here = AnglesInTime.of(gait)
+    shift = clock_zero(here, seen)
+    own, rates = here.at(seen, shift)
+    slopes, errors = [], []
     for k, (name, size) in enumerate(zip(parameters, sizes, strict=True)):
         ends = []
         for sign in (1.0, -1.0):
             moved = np.zeros(len(sizes))
             moved[k] = sign * _DIFFERENCE
-            slopes = gait.sensitivities.state
+            ahead = jtu.tree_map(np.asarray, gait.sensitivities.state)
             near = jtu.tree_map(
                 lambda leaf, slope, moved=moved: as_float(leaf + float(slope @ (sizes * moved))),
                 gait.measures.state,
-                jtu.tree_map(np.asarray, slopes),
+                ahead,
             )
             values = parameters | {name: parameters[name] + sign * _DIFFERENCE * size}
-            ends.append(angles_at(gait_at(values, near, ()), angles))
-        columns.append((ends[0] - ends[1]) / (2.0 * _DIFFERENCE))
-    return np.stack(columns, axis=-1)
+            there = AnglesInTime.of(gait_at(values, near, ()))
+            ends.append(there.at(seen, shift if measured.clocks else there.mid_stance)[0])
+        lost = [not np.all(np.isfinite(each)) for each in ends]
+        up, down = (own if gone else each for each, gone in zip(ends, lost, strict=True))
+        width = _DIFFERENCE * (2 - sum(lost))
+        slopes.append((up - down) / width if width else np.zeros_like(own))
+        errors.append(np.abs(up - 2.0 * own + down) / width if width else np.full_like(own, np.inf))
+    along = np.stack(slopes, axis=-1)
+    if measured.clocks:
+        along -= np.outer(rates, rates @ along) / (rates @ rates)
+    return along, np.stack(errors, axis=-1), own

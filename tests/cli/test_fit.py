@@ -35,6 +35,8 @@ def test_a_table_and_its_numbers(file, tmp_path, capsys):
     truth = float(jb.parameter_values(jb.ladder()["rigid"])["J"])
     assert held["estimates"]["J"] == pytest.approx(truth, rel=1e-5)
     assert set(held) >= {"estimates", "standard_errors", "undetermined"}
+    assert held["at_bounds"] == []
+    assert held["p_value"] is None  # as many numbers as parameters
     assert "kg m^2" in shown
     assert "converged" in shown
 

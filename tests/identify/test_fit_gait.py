@@ -3,6 +3,8 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
 
 import jaxbiped as jb
 from jaxbiped.identify import FitEnding, MeasuredAngles, MeasuredGait
@@ -106,6 +108,54 @@ def test_angles_over_time(rigid, gaits):
     assert fit.standard_errors["J"] < 0.01 * truth
 
 
+@pytest.mark.parametrize("share", [0.5, 1.5])
+def test_angles_are_fitted_from_half_as_much_off_on_whatever_clock(rigid, gaits, share):
+    """From 30 ms after the strike on and through the next: SciPy's cubics of the orbit itself."""
+    period, curves = _motion(gaits[0])
+    times = np.linspace(0.0, 1.2, 25) * period
+    both = [_leg(curves, period, leg, times + 0.03) for leg in (0, 1)]
+    angles = MeasuredAngles(times, 1e-4, *both)
+    seen = MeasuredGait({}, conditions={"slope": SLOPES[0]}, angles=angles)
+    truth = float(jb.parameter_values(rigid)["J"])
+    fit = jb.fit_gait(jb.with_parameters(rigid, {"J": share * truth}), ("J",), seen)
+    assert fit.estimates["J"] == pytest.approx(truth, rel=1e-4)
+    assert fit.freedom == 48
+
+
+def test_the_clock_reads_zero_at_mid_stance_of_every_model(rigid):
+    """Against a root of the rigid walker's orbit, and the compliant cycle's beginning."""
+    for scene, name in ((rigid, "J"), (jb.seed_scene(), "d")):
+        gait = jb.find_gait(scene, parameters=(), radius_sensitivities=False)
+        period, curves = _motion(gait)
+        stands = curves[1]
+        begin = brentq(stands, 0.1 * period, 0.9 * period) if stands(0.0) > 1e-6 else 0.0
+        times = np.linspace(0.0, 0.95, 20) * period
+        both = [_leg(curves, period, leg, times + begin) for leg in (0, 1)]
+        angles = MeasuredAngles(times, 1e-4, *both, since="mid-stance")
+        truth = float(jb.parameter_values(scene)[name])
+        start = jb.with_parameters(scene, {name: 1.05 * truth})
+        fit = jb.fit_gait(start, (name,), MeasuredGait({}, angles=angles), engine="lanes")
+        assert fit.estimates[name] == pytest.approx(truth, rel=1e-4)
+        assert fit.chi_squared < 0.1
+
+
+def _motion(gait):
+    """A footstep's duration, and both angles over it."""
+    clock, states = np.asarray(gait.orbit[0][0]), gait.orbit[1]
+    known = np.isfinite(clock)
+    rows = [
+        [np.asarray(getattr(states, f"{kind}_{leg}")[0])[known] for kind in ("theta", "omega")]
+        for leg in (1, 2)
+    ]
+    return clock[known][-1], [CubicHermiteSpline(clock[known], *both) for both in rows]
+
+
+def _leg(curves, period, leg, times):
+    """One leg's angle: it takes the other's part in the next footstep."""
+    own, other = curves[leg](times % period), curves[1 - leg](times % period)
+    return np.where(times // period % 2 == 0, own, other)
+
+
 def test_a_start_without_a_gait_is_told(gaits):
     steep = jb.with_parameters(jb.ladder()["rigid"], {"slope": 1.0})
     fit = jb.fit_gait(steep, ("J",), MeasuredGait({"period": (0.44, 1e-3)}))
@@ -117,7 +167,9 @@ def test_a_start_without_a_gait_is_told(gaits):
 def test_bounds_are_kept(rigid, gaits):
     value = float(jb.parameter_values(rigid)["J"])
     start = jb.with_parameters(rigid, {"J": 1.2 * value})
-    fit = jb.fit_gait(start, {"J": (1.1 * value, 1.5 * value)}, _measured(gaits))
+    with pytest.warns(RuntimeWarning, match="does not fit"):
+        fit = jb.fit_gait(start, {"J": (1.1 * value, 1.5 * value)}, _measured(gaits))
+    assert fit.at_bounds == ("J",)
     assert fit.estimates["J"] == pytest.approx(1.1 * value, rel=1e-3)
     assert fit.estimates["J"] >= 1.1 * value
 

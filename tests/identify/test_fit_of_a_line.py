@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.identify import _fit_gait, _predicted_gait
+from jaxbiped.identify import _descent, _predicted_gait
 from jaxbiped.identify._predicted_gait import Prediction, predict
 
 SCENE = jb.ladder()["rigid"]
@@ -35,7 +35,7 @@ def test_a_linear_model_has_the_covariance_of_least_squares(vary, monkeypatch):
     """(AᵀA)⁻¹ of the weighed slopes, and intervals of 1.96 standard errors in the logarithm."""
     matrix = np.array([[0.3, -0.1], [0.1, 0.4], [0.2, 0.3]])[:, : len(vary)]
     off = np.array([0.02, -0.01, 0.03])
-    monkeypatch.setattr(_fit_gait, "predict", linear(matrix, SEEN.values + off))
+    monkeypatch.setattr(_descent, "predict", linear(matrix, SEEN.values + off))
     fit = jb.fit_gait(SCENE, vary, SEEN)
     weighed = matrix / SEEN.deviations[:, None]
     covariance = np.linalg.inv(weighed.T @ weighed)
@@ -59,18 +59,82 @@ def test_a_linear_model_has_the_covariance_of_least_squares(vary, monkeypatch):
 
 def test_two_parameters_that_make_up_for_each_other_are_told(monkeypatch):
     matrix = np.outer([0.3, 0.1, 0.2], [1.0, -2.0])
-    monkeypatch.setattr(_fit_gait, "predict", linear(matrix, SEEN.values))
+    monkeypatch.setattr(_descent, "predict", linear(matrix, SEEN.values))
     fit = jb.fit_gait(SCENE, ("J", "d"), SEEN)
     assert fit.undetermined == ("J", "d")
     assert np.isnan(fit.standard_errors["J"])
-    assert fit.freedom == 3
+    assert fit.freedom == 2  # one combination of both is told
+
+
+def test_a_bound_that_holds_a_parameter_is_named_and_takes_its_interval(monkeypatch):
+    """The other's interval is the profile within the bounds: the end where none is held."""
+    matrix = np.array([[0.3, -0.1], [0.1, 0.4], [0.2, 0.3]])
+    monkeypatch.setattr(_descent, "predict", linear(matrix, SEEN.values))
+    own = {name: float(jb.parameter_values(SCENE)[name]) for name in ("J", "d")}
+    start = jb.with_parameters(SCENE, {"J": 1.1 * own["J"]})
+    bounds = {"J": (1.05 * own["J"], 2.0 * own["J"]), "d": (0.5 * own["d"], 2.0 * own["d"])}
+    fit = jb.fit_gait(start, bounds, SEEN)
+    assert fit.at_bounds == ("J",)
+    assert fit.undetermined == ()
+    assert np.isnan(fit.intervals["J"]).all()
+    weighed = matrix / SEEN.deviations[:, None]
+    at = np.array([np.log(1.05), np.log(fit.estimates["d"] / own["d"])])
+    square = np.sum((weighed @ at) ** 2) + 1.959964**2
+    tried = np.linspace(np.log(0.5), np.log(2.0), 400001)
+    for end, place in zip(fit.intervals["d"], (0, -1), strict=True):
+        # The best J for each d, at its bound at least.
+        best = -tried * (weighed[:, 0] @ weighed[:, 1]) / (weighed[:, 0] @ weighed[:, 0])
+        best = np.maximum(best, np.log(1.05))
+        squares = np.sum((np.outer(best, weighed[:, 0]) + np.outer(tried, weighed[:, 1])) ** 2, 1)
+        assert np.log(end / own["d"]) == pytest.approx(tried[squares <= square][place], abs=1e-4)
+
+
+def test_an_interval_follows_the_profile_where_the_model_bends(monkeypatch):
+    """y = K (1 − e^(−c)) measured once well and c badly: the profile's ends, found on a grid."""
+
+    def curve(k, c):
+        return np.array([k * (1.0 - np.exp(-c)), c, 0.0 * k])
+
+    def predicted(scene, measured, values, sizes, guess, **how):
+        k, c = (values[name] / float(jb.parameter_values(SCENE)[name]) for name in ("J", "d"))
+        slopes = np.array([[k * (1 - np.exp(-c)), k * c * np.exp(-c)], [0.0, c], [0.0, 0.0]])
+        return Prediction(curve(k, c), slopes, 0.0 * slopes, (), (), True)
+
+    monkeypatch.setattr(_descent, "predict", predicted)
+    seen = jb.identify.MeasuredGait(
+        {"period": (0.632, 0.01), "step_length": (1.0, 0.35), "speed": (0.0, 1.0)}
+    )
+    fit = jb.fit_gait(SCENE, ("J", "d"), seen)
+    own = jb.parameter_values(SCENE)
+    c = np.linspace(0.05, 2.5, 200001)
+    tried = np.linspace(0.5, 2.5, 4001)
+    profile = np.array([
+        np.min(((k * (1.0 - np.exp(-c)) - 0.632) / 0.01) ** 2 + ((c - 1.0) / 0.35) ** 2)
+        for k in tried
+    ])  # fmt: skip
+    inside = tried[profile <= 1.959964**2]
+    found = np.array(fit.intervals["J"]) / float(own["J"])
+    assert found == pytest.approx([inside[0], inside[-1]], rel=0.01)
+    # The linearised ends are off by a tenth and more.
+    spread = fit.standard_errors["J"] / float(own["J"])
+    assert abs(np.exp(1.959964 * spread) / inside[-1] - 1.0) > 0.05
+
+
+def test_a_fit_that_does_not_fit_says_so(monkeypatch):
+    matrix = np.array([[0.3], [0.1], [0.2]])
+    off = np.array([0.1, -0.1, 0.0])
+    monkeypatch.setattr(_descent, "predict", linear(matrix, SEEN.values + off))
+    with pytest.warns(RuntimeWarning, match="the model does not fit the data: chi squared is"):
+        fit = jb.fit_gait(SCENE, ("J",), SEEN)
+    # Of two degrees of freedom the tail is exp(−χ²/2).
+    assert fit.p_value == pytest.approx(np.exp(-0.5 * fit.chi_squared))
 
 
 def test_without_a_gait_nothing_is_fitted(monkeypatch):
     def lost(*_, **__):
         return Prediction(SEEN.values, np.ones((3, 1)), np.zeros((3, 1)), (), (), False)
 
-    monkeypatch.setattr(_fit_gait, "predict", lost)
+    monkeypatch.setattr(_descent, "predict", lost)
     fit = jb.fit_gait(SCENE, ("J",), SEEN)
     assert fit.ending is jb.identify.FitEnding.NO_GAIT
     assert fit.evaluations == 1

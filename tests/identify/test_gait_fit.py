@@ -19,8 +19,23 @@ def test_what_others_make_up_for_is_undetermined():
     slopes[:, 2] = 2.0 * slopes[:, 1]
     found = information(slopes, EXACT)
     np.testing.assert_array_equal(found.undetermined, [False, True, True])
-    alone = slopes[:, 0]
-    assert np.isclose(found.covariance[0, 0], 1.0 / (alone @ alone))
+    assert found.rank == 2
+    # Whatever the other two are together, the first is told beside them.
+    both = slopes[:, :2]
+    assert np.isclose(found.covariance[0, 0], np.linalg.inv(both.T @ both)[0, 0])
+
+
+def test_what_noise_determines_is_undetermined():
+    """Two columns that differ by less than their own errors, one that stands apart."""
+    random = np.random.default_rng(4)
+    slopes = 100.0 * random.standard_normal((6, 3))
+    slopes[:, 2] = slopes[:, 1] + 0.01 * random.standard_normal(6)
+    errors = EXACT.copy()
+    assert not information(1e6 * slopes, errors).undetermined.any()
+    errors[:, 1:] = 0.02
+    np.testing.assert_array_equal(
+        information(1e6 * slopes, 1e6 * errors).undetermined, [False, True, True]
+    )
 
 
 def test_a_derivative_below_its_own_error_tells_nothing():

@@ -66,8 +66,29 @@ def test_a_missing_file_is_refused(tmp_path):
         (lambda: MeasuredAngles([0.1], 0.1), "give one of them"),
         (lambda: MeasuredAngles([0.1], 0.1, [0.1, 0.2]), "theta_1 has the shape"),
         (lambda: MeasuredAngles([-0.1], 0.1, [0.1]), "times = -0.1"),
+        (lambda: MeasuredAngles([0.1], 0.1, [12.0]), "are these degrees"),
+        (lambda: MeasuredAngles([441.0], 0.1, [0.1]), "are these milliseconds"),
+        (lambda: MeasuredGait({"period": (441.0, 1.0)}), "are these milliseconds"),
+        (lambda: MeasuredAngles([0.1], 0.1, [0.1], since="noon"), "since = 'noon'"),
+        (lambda: MeasuredAngles([0.1], 0.1, np.ma.array([0.1], mask=True)), "no angle"),
+        (lambda: MeasuredGait({"period": np.ma.array([1.0, 0.1], mask=True)}), "give a measure"),
     ],
 )
 def test_what_cannot_be_measured_is_refused(make, said):
     with pytest.raises(jb.ArgumentError, match=said):
         make()
+
+
+def test_masked_entries_are_missing(tmp_path):
+    """As if they had not been there: in times, angles, measures, and as null in a file."""
+    times = np.ma.array([0.0, 0.1, -9.0, 0.3], mask=[False, False, True, False])
+    theta_1 = np.ma.array([0.1, -9999.0, 0.3, 0.4], mask=[False, True, False, False])
+    angles = MeasuredAngles(times, 0.01, theta_1, [0.5, 0.6, 0.7, 0.8])
+    np.testing.assert_array_equal(angles.values, [0.1, 0.4, 0.5, 0.6, 0.8])
+    gait = MeasuredGait({"period": (np.ma.masked, 0.1), "speed": (0.4, 0.1)}, angles=angles)
+    np.testing.assert_array_equal(gait.values, [0.4, 0.1, 0.4, 0.5, 0.6, 0.8])
+    assert len(gait.deviations) == 6
+    held = GAIT["angles"] | {"theta_1_rad": [None, 0.2], "since": "mid-stance"}
+    (read,) = read_measured(_written(tmp_path, {"gaits": [GAIT | {"angles": held}]}))
+    np.testing.assert_array_equal(read.angles.values, [0.2])
+    assert (gait.clocks, read.clocks) == (1, 0)

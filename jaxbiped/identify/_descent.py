@@ -1,0 +1,228 @@
+"""Descent of a fit: from predictions of measured gaits to estimates and their intervals."""
+
+import numpy as np
+from jaxtyping import PyTree
+from tqdm import tqdm
+
+from jaxbiped._checks import ArgumentError
+from jaxbiped.identify._gait_fit import LOOSE, FitEnding, GaitFit, information
+from jaxbiped.identify._measured_gait import MeasuredGait
+from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
+from jaxbiped.identify._profile import interval_end, linear_step
+from jaxbiped.scene._parameters import parameter_values, with_parameters
+
+_WITHIN = 1.959963984540054
+"""Standard errors to each end of a 95 % interval."""
+_LINEAR = 0.02
+"""Standard error of every parameter, in units of its size, up to which a model counts as linear."""
+_FITS = 3
+"""Descents, at most: a better fit that an interval's end comes upon begins another."""
+
+
+class Descent:
+    """A fit under way. Variables are log(p/p₀), or where p₀ is 0 a share of the bounds' width."""
+
+    def __init__(
+        self,
+        scene: AnyScene,
+        bounds: dict[str, tuple[float, float]],
+        measured: list[MeasuredGait],
+        accuracy: str,
+        engine: str,
+        bar: tqdm,
+    ) -> None:
+        own = parameter_values(scene)
+        self.scene, self.measured, self.bar = scene, measured, bar
+        self.names, self.first = tuple(bounds), np.array([float(own[name]) for name in bounds])
+        self.limits = np.array(list(bounds.values())).T
+        self.widths = np.where(self.first == 0.0, self.limits[1] - self.limits[0], 1.0)
+        self.how = dict(accuracy=accuracy, engine=engine)
+        self.values = np.concatenate([gait.values for gait in measured])
+        self.deviations = np.concatenate([gait.deviations for gait in measured])
+        self.best: tuple[float, np.ndarray, list[Prediction]] | None = None
+        self.last: tuple[np.ndarray, list[Prediction] | None] | None = None
+        self.evaluations, self.searching = 0, True
+
+    def run(self, most: int) -> GaitFit:
+        """Minimises; tells what was found."""
+        if self.predictions(np.zeros(len(self.names))) is None:
+            return self.described(FitEnding.NO_GAIT)
+        for _ in range(_FITS):
+            ending = FitEnding.INTERRUPTED
+            try:
+                ending = self.minimise(most)
+                best = self.best
+                fit = self.described(ending)
+            except KeyboardInterrupt:
+                return self.described(FitEnding.INTERRUPTED)
+            if self.best is best or ending is not FitEnding.CONVERGED:
+                break
+        return fit
+
+    def minimise(self, most: int) -> FitEnding:
+        """Descends from the best that is known."""
+        self.searching = True
+        from scipy.optimize import least_squares
+
+        assert self.best is not None
+        found = least_squares(
+            self.residuals,
+            self.best[1],
+            self.slopes,
+            bounds=tuple(map(self.variables, self.limits)),
+            max_nfev=most,
+            xtol=1e-9,
+            ftol=1e-12,
+            gtol=1e-10,
+        )
+        return FitEnding.CONVERGED if found.success else FitEnding.OUT_OF_EVALUATIONS
+
+    def parameters(self, at: np.ndarray) -> dict[str, float]:
+        """The parameters' values at these variables."""
+        values = np.where(self.first == 0.0, at * self.widths, self.first * np.exp(at))
+        return dict(zip(self.names, values.tolist(), strict=True))
+
+    def variables(self, values: np.ndarray) -> np.ndarray:
+        """The variables at these values."""
+        zero = self.first == 0.0
+        ratios = np.where(zero, 1.0, values) / np.where(zero, 1.0, self.first)
+        with np.errstate(divide="ignore"):
+            return np.where(zero, values / self.widths, np.log(ratios))
+
+    def sizes(self, at: np.ndarray) -> np.ndarray:
+        """Derivatives of the parameters with respect to the variables."""
+        values = np.array(list(self.parameters(at).values()))
+        return np.where(self.first == 0.0, self.widths, values)
+
+    def predictions(self, at: np.ndarray) -> list[Prediction] | None:
+        """Of every measured gait; None where one is lost."""
+        if self.last is not None and np.array_equal(self.last[0], at):
+            return self.last[1]
+        found: list[Prediction] | None = []
+        for k, each in enumerate(self.measured):
+            one = self._predict(at, each, k)
+            if one is None or not one.found:
+                found = None
+                break
+            assert found is not None
+            found.append(one)
+        self.evaluations += 1
+        self.bar.update()
+        self.last = (at.copy(), found)
+        if found is not None:
+            square = float(np.sum(self._weighted(found) ** 2))
+            if self.best is None or square < self.best[0]:
+                self.best = (square, at.copy(), found)
+        return found
+
+    def _predict(self, at: np.ndarray, each: MeasuredGait, k: int) -> Prediction | None:
+        guess: PyTree | None = None
+        if self.best is not None:
+            guess = self.best[2][k].state_at(at - self.best[1])
+        values, sizes = self.parameters(at), self.sizes(at)
+        try:
+            with_parameters(self.scene, values)
+        except ArgumentError:
+            return None  # such as static friction below kinetic
+        one = predict(self.scene, each, values, sizes, guess, **self.how)
+        if not one.found and guess is not None and self.searching:
+            one = predict(self.scene, each, values, sizes, None, **self.how)
+        return one
+
+    def residuals(self, at: np.ndarray) -> np.ndarray:
+        """In standard deviations; infinite where a gait is lost, which shortens the step."""
+        found = self.predictions(at)
+        return np.full(len(self.values), np.inf) if found is None else self._weighted(found)
+
+    def slopes(self, at: np.ndarray) -> np.ndarray:
+        """Derivatives of the residuals."""
+        found = self.predictions(at)
+        assert found is not None  # no step ends without its gaits
+        return np.concatenate([each.slopes for each in found]) / self.deviations[:, None]
+
+    def _weighted(self, found: list[Prediction]) -> np.ndarray:
+        predicted = np.concatenate([each.values for each in found])
+        return (predicted - self.values) / self.deviations
+
+    def described(self, ending: FitEnding) -> GaitFit:
+        """The fit as far as it came."""
+        k, names = len(self.names), np.array(self.names)
+        at, found = np.zeros(k), None
+        if self.best is not None:
+            _, at, found = self.best
+        covariance, undetermined = np.full((k, k), np.nan), np.ones(k, bool)
+        held, residuals, freedom = np.zeros(k, bool), np.full(len(self.values), np.nan), 0
+        ends = np.full((2, k), np.nan)
+        if found is not None:
+            slopes, errors = (
+                np.concatenate([getattr(each, part) for each in found]) / self.deviations[:, None]
+                for part in ("slopes", "slope_errors")
+            )
+            residuals = self._weighted(found)
+            told = information(slopes, errors)
+            held = self._held(at, residuals, slopes) & told.resolved
+            free = information(slopes[:, ~held], errors[:, ~held])
+            undetermined[held], undetermined[~held] = False, free.undetermined
+            covariance[np.ix_(~held, ~held)] = free.covariance
+            clocks = sum(each.clocks for each in self.measured)
+            freedom = len(self.values) - free.rank - clocks
+            wide = told.undetermined.any() or bool(
+                np.nanmax(np.diag(told.covariance), initial=0.0) > _LINEAR**2
+            )
+            follow = wide and ending is FitEnding.CONVERGED
+            for which in np.flatnonzero(~undetermined & ~held).tolist():
+                self.searching = False  # a profile follows gaits from one to the next
+                ends[:, which] = self._interval(at, which, residuals, slopes, told.resolved, follow)
+            lost = ~(ends[1] - ends[0] < 2.0 * _WITHIN * LOOSE) & ~held
+            undetermined |= lost
+            ends[:, lost] = np.nan
+            covariance[lost] = covariance[:, lost] = np.nan
+        spread = np.sqrt(np.diag(covariance))
+        low, high = (self.parameters(end) for end in ends)
+        return GaitFit(
+            ending=ending,
+            estimates=self.parameters(at),
+            standard_errors=dict(zip(self.names, (spread * self.sizes(at)).tolist(), strict=True)),
+            intervals={n: (min(low[n], high[n]), max(low[n], high[n])) for n in self.names},
+            correlation=covariance / np.outer(spread, spread),
+            undetermined=tuple(names[undetermined].tolist()),
+            at_bounds=tuple(names[held].tolist()),
+            residuals=residuals,
+            freedom=freedom,
+            evaluations=self.evaluations,
+        )
+
+    def _held(self, at: np.ndarray, residuals: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+        """Which parameters lie at a bound, within a thousandth of their error, and push there."""
+        low, high = map(self.variables, self.limits)
+        near = 1e-3 / np.maximum(np.linalg.norm(slopes, axis=0), 1.0)
+        push = -slopes.T @ residuals
+        return ((at - low <= near) & (push < 0.0)) | ((high - at <= near) & (push > 0.0))
+
+    def _interval(
+        self,
+        at: np.ndarray,
+        which: int,
+        residuals: np.ndarray,
+        slopes: np.ndarray,
+        used: np.ndarray,
+        follow: bool,
+    ) -> tuple[float, float]:
+        """Both ends in the variable; by the linearised model, or followed where it bends."""
+        limits = np.stack([self.variables(each) for each in self.limits])
+        square = float(np.sum(residuals**2)) + _WITHIN**2
+
+        if not follow:
+            low, high = (
+                linear_step(residuals, slopes * used, square, which, sign, limits - at)[which]
+                for sign in (-1.0, 1.0)
+            )
+            return at[which] + low, at[which] + high
+
+        def model(variables: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+            if self.predictions(variables) is None:
+                return None
+            return self.residuals(variables), self.slopes(variables) * used
+
+        low, high = (interval_end(model, at, square, which, s, limits) for s in (-1.0, 1.0))
+        return low, high
