@@ -11,7 +11,11 @@ from jaxbiped._types import JsonObject
 from jaxbiped.cli._gait import finite, parts
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli.commands._optimise import Optimise
-from jaxbiped.continuation._nearest_bifurcation import NearestBifurcation
+from jaxbiped.continuation._nearest_bifurcation import (
+    NearestBifurcation,
+    farthest_allowed,
+    range_of,
+)
 from jaxbiped.optimise._certificate import Certificate, certify
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.optimise._optimise_gait import Optimum, optimise_gait
@@ -33,6 +37,7 @@ def run(options: Optimise) -> int:
     along = [n.strip() for n in options.bifurcations.split(",") if n.strip() not in ("", "none")]
     for name in along:
         check_choice("bifurcations", name, parameter_names(scene))
+        range_of(scene, name)
     found = optimise_gait(
         scene,
         vary=_bounds(scene, options.vary),
@@ -80,7 +85,9 @@ def _bounds(scene: Scene | RigidScene, text: str) -> dict[str, tuple[float, floa
                 raise ArgumentError(
                     f"vary = {name} needs bounds, as its value is {value:g}: write {name}=low:high."
                 )
-            found[name] = (value / _USUAL_RANGE, value * _USUAL_RANGE)
+            ends = (value / _USUAL_RANGE, value * _USUAL_RANGE)
+            least, most = (farthest_allowed(scene, name, end) for end in ends)
+            found[name] = (least, most)
             continue
         low, colon, high = bounds.partition(":")
         try:
@@ -156,6 +163,7 @@ def certificate_numbers(certificate: Certificate) -> JsonObject:
             }
             for each in certificate.nearest_bifurcations
         ],
+        "failed": certificate.failed,
     }
 
 
@@ -234,6 +242,7 @@ def _certificate_lines(certificate: Certificate) -> list[str]:
         back = "back to the gait" if walk.returned else "NOT back to the gait"
         lines.append(f"walk from a push of {walk.push:g}: {walk.footsteps} footsteps, {back}")
     lines += [_bifurcation_line(each) for each in certificate.nearest_bifurcations]
+    lines += [f"{name}: not known ({why})" for name, why in certificate.failed.items()]
     if other is not None:
         lines.append(
             f"engine {other.engine}: period differs by {other.period_difference:.1e}, length by "

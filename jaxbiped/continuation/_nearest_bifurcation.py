@@ -16,8 +16,8 @@ FACTOR = 8.0
 """How far a parameter is followed to both sides of its own value."""
 STEEPEST = 0.1
 """How far the slope is followed to both sides of level ground [rad]."""
-_FINEST = 1e-9
-"""Share of a range to which the end of what is allowed is found."""
+_NEAR = 1e-12
+"""Relative distance to which the end of what a walker allows is found."""
 
 
 class NearestBifurcation(NamedTuple):
@@ -41,7 +41,9 @@ class NearestBifurcation(NamedTuple):
 
 
 def range_of(scene: Scene | RigidScene, along: str, factor: float = FACTOR) -> tuple[float, float]:
-    """The range in which a gait is followed from a parameter's own value, as far as it is allowed.
+    """The range in which a gait is followed from a parameter's own value.
+
+    It ends where the walker allows no more, as a foot's radius at the leg's length.
 
     Raises:
         ArgumentError: a parameter other than the slope that is zero.
@@ -49,26 +51,28 @@ def range_of(scene: Scene | RigidScene, along: str, factor: float = FACTOR) -> t
     own = float(parameter_values(scene)[along])
     if own == 0.0 and along != "slope":
         raise ArgumentError(f"along = {along!r} is not allowed where {along} is 0: no factor fits.")
-    ends = (own / factor, own * factor) if own else (-STEEPEST, STEEPEST)
-    low, high = (_furthest(scene, along, own, end) for end in ends)
+    ends = (own / factor, own * factor) if own != 0.0 else (-STEEPEST, STEEPEST)
+    low, high = (farthest_allowed(scene, along, end) for end in ends)
     return low, high
 
 
-def _furthest(scene: Scene | RigidScene, along: str, own: float, end: float) -> float:
-    """The value nearest to an end of which the parts of the scene allow all on the way."""
-    allowed = 0.0
-    share, step = 1.0, 1.0
-    while step > _FINEST:
+def farthest_allowed(scene: Scene | RigidScene, name: str, end: float) -> float:
+    """The value of a parameter nearest to an end that the walker allows, seen from its own."""
+
+    def allowed(value: float) -> bool:
         try:
-            with_parameters(scene, {along: own + share * (end - own)})
-            allowed = share
+            with_parameters(scene, {name: value})
         except ArgumentError:
-            pass
-        if allowed == 1.0:
-            break
-        step *= 0.5
-        share = allowed + step
-    return end if allowed == 1.0 else own + allowed * (end - own)
+            return False
+        return True
+
+    if allowed(end):
+        return end
+    inside, outside = float(parameter_values(scene)[name]), end
+    while abs(outside - inside) > _NEAR * abs(inside):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (middle, outside) if allowed(middle) else (inside, middle)
+    return inside
 
 
 def nearest_bifurcation(
@@ -80,8 +84,8 @@ def nearest_bifurcation(
         scene: the gait's.
         gait: where to begin.
         along: the parameter's name (see `parameter_names`).
-        factor: how far to follow it: from its own value over this to its own times this, or as far
-            as the scene allows; the slope of level ground by 0.1 rad to both sides.
+        factor: how far to follow it: from its own value over this to its own times this, or to
+            where the walker allows no more; the slope of level ground by 0.1 rad to both sides.
 
     Returns:
         The one whose value differs by the smallest factor.

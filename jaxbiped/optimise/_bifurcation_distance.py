@@ -103,7 +103,8 @@ def bifurcation_distance(
         gait: where to begin.
         kind: "fold" or "period-doubling".
         along: the parameter's name (see `parameter_names`). It is followed from an eighth to eight
-            times its own value, the slope of level ground by 0.1 rad to both sides.
+            times its own value, or to where the walker allows no more, the slope of level ground by
+            0.1 rad to both sides.
         accuracy: "balanced" or "tight".
 
     Returns:

@@ -1,8 +1,9 @@
 """Certificate of an optimum: what speaks for it besides the optimiser's word."""
 
-import contextlib
-from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple, cast
+import functools
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from tqdm import tqdm
@@ -41,6 +42,9 @@ _SETTLED = 1e-4
 """Relative difference between a walk's last footstep and the gait's that counts as none."""
 _FATAL = 1e-4
 """Scaled distance to which the smallest fatal push is bisected."""
+
+
+_Found = TypeVar("_Found")
 
 
 class Walked(NamedTuple):
@@ -86,6 +90,7 @@ class Certificate(NamedTuple):
         walk: a walk from a pushed start.
         other_engine: the gait by the other engine.
         nearest_bifurcations: in each parameter asked for, what the gait comes to first.
+        failed: why a part that was asked for is not known, by its name.
     """
 
     optimality: Optimality
@@ -99,6 +104,7 @@ class Certificate(NamedTuple):
     walk: Walked | None
     other_engine: OtherEngine | None
     nearest_bifurcations: tuple[NearestBifurcation, ...]
+    failed: dict[str, str]
 
 
 def certify(
@@ -127,16 +133,17 @@ def certify(
         other_engine: whether to find the gait by the other engine, too, which compiles for minutes
             where that is XLA.
         bifurcations_along: parameters in each of which the gait is followed to its nearest
-            bifurcation, from an eighth to eight times the value (from level ground by 0.1 rad to
-            both sides); each compiles a program.
+            bifurcation, from an eighth to eight times the value, as far as the walker allows (from
+            level ground by 0.1 rad to both sides); each compiles a program.
         seed: of the starts.
         progress: whether to show on stderr which part it is at.
 
     Returns:
-        The certificate.
+        The certificate. A part that cannot be told, or that Ctrl-C cuts off, takes no other with
+        it: see `failed`.
 
     Raises:
-        ArgumentError: an argument that is not allowed.
+        ArgumentError: an argument that is not allowed, before anything is tested.
     """
     check_type("optimum", optimum, Optimum)
     check_not_negative("starts", starts)
@@ -151,52 +158,75 @@ def certify(
     undecided = bool(np.any(np.abs(sizes - 1.0) <= errors))
     labels = bool(starts or fatal_push)
     wanted = (True, labels, starts, fatal_push, footsteps, other_engine, *bifurcations_along)
-    knows = basin = push_found = walk = other = None
     with tqdm(total=sum(map(bool, wanted)), unit="parts", disable=not progress) as bar:
-        with _part(bar, "gait sensitivity norm"):
-            norm = jacobian_functionals(
+        parts = _Parts(bar)
+        norm = parts.find(
+            "gait sensitivity norm",
+            lambda: jacobian_functionals(
                 scene, gait.measures.state, ("sensitivity_norm",), engine=gait.engine
-            )
+            ),
+        )
+        knows = basin = push_found = walk = other = None
         if labels:
-            with _part(bar, "gaits that starts may come to"):
-                knows = _labelling(scene, gait)
+            knows = parts.find("gaits that starts may come to", lambda: _labelling(scene, gait))
         if knows is not None and starts:
-            with _part(bar, f"basin of {starts} starts"):
-                basin = _basin(knows, gait, int(starts), scatter, seed)
+            basin = parts.find(
+                f"basin of {starts} starts", lambda: _basin(knows, gait, int(starts), scatter, seed)
+            )
         if knows is not None and fatal_push:
-            with _part(bar, "smallest fatal push"):
-                push_found = _fatal_push(knows)
+            push_found = parts.find("smallest fatal push", lambda: _fatal_push(knows))
         if footsteps:
-            with _part(bar, f"walk of {footsteps} footsteps"):
-                walk = _walk(scene, gait, int(footsteps), push)
+            walk = parts.find(
+                f"walk of {footsteps} footsteps", lambda: _walk(scene, gait, int(footsteps), push)
+            )
         if other_engine:
-            with _part(bar, "gait by the other engine"):
-                other = _by_other(scene, gait)
-        nearest = []
-        for name in bifurcations_along:
-            with _part(bar, f"nearest bifurcation along {name}"):
-                nearest.append(nearest_bifurcation(scene, gait, name))
+            other = parts.find("gait by the other engine", lambda: _by_other(scene, gait))
+        nearest = [
+            parts.find(
+                f"nearest bifurcation along {name}",
+                functools.partial(nearest_bifurcation, scene, gait, name),
+            )
+            for name in bifurcations_along
+        ]
     return Certificate(
         optimality=optimum.optimality,
         multipliers=np.asarray(gait.multipliers),
         multiplier_errors=errors,
         unit_multiplier_error=float(gait.unit_multiplier_error),
         stable=None if undecided else bool(np.all(sizes < 1.0)),
-        sensitivity_norm=(np.asarray(norm.values).item(), np.asarray(norm.errors).item()),
+        sensitivity_norm=(math.nan, math.nan)
+        if norm is None
+        else (np.asarray(norm.values).item(), np.asarray(norm.errors).item()),
         basin=basin,
         fatal_push=push_found,
         walk=walk,
         other_engine=other,
-        nearest_bifurcations=tuple(nearest),
+        nearest_bifurcations=tuple(each for each in nearest if each is not None),
+        failed=parts.failed,
     )
 
 
-@contextlib.contextmanager
-def _part(bar: tqdm, name: str) -> Iterator[None]:
-    """A part of the certificate, which the bar names while it lasts."""
-    bar.set_description_str(f"certificate, {name}")
-    yield
-    bar.update()
+class _Parts:
+    """Parts of a certificate, which a bar names while they last; each fails by itself."""
+
+    def __init__(self, bar: tqdm) -> None:
+        self.bar, self.failed, self.interrupted = bar, dict[str, str](), False
+
+    def find(self, name: str, part: Callable[[], _Found]) -> _Found | None:
+        """What is found, or None where that fails, or the user has had enough."""
+        self.bar.set_description_str(f"certificate, {name}")
+        found = None
+        try:
+            if not self.interrupted:
+                found = part()
+        except KeyboardInterrupt:
+            self.interrupted = True
+        except Exception as error:  # whatever it is, the optimum is not lost for it
+            self.failed[name] = f"{type(error).__name__}: {error}"
+        if self.interrupted:
+            self.failed[name] = "interrupted"
+        self.bar.update()
+        return found
 
 
 def _labelling(scene: Scene | RigidScene, gait: Gait) -> Labelling | None:
