@@ -25,7 +25,7 @@ from jaxbiped.scene._parameters import with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
-_KEPT = 1e-6
+KEPT = 1e-6
 """Part of its bound by which a requirement may be missed and still counts as kept, at least."""
 _HALVINGS = 5
 """How often a step to a design is halved before its gait is given up."""
@@ -75,6 +75,11 @@ class DesignProblem:
         self.latest: Design | None = None
         self.asked: list[Design] = []
         self.lost = self.unmeasured = 0
+
+    @property
+    def has_cluster(self) -> bool:
+        """Whether multipliers are those of one gait, and not means over an ensemble."""
+        return self.ensemble is None or self.ensemble.criterion != "mean"
 
     def begin(self, u: np.ndarray) -> Design:
         """The first design; its gait is found from nothing, or followed from the scene's own.
@@ -150,7 +155,7 @@ class DesignProblem:
             for bound in (each.low, each.high)
             if bound is not None
         ]
-        return max([_KEPT, *sizes])
+        return max([KEPT, *sizes])
 
     def from_guess(self, u: np.ndarray, guess: np.ndarray) -> Evaluation | None:
         """What is known of a design whose gait is near a guess, shape (m,)."""

@@ -98,7 +98,8 @@ def jacobian_functionals(
     Args:
         scene: the walker.
         state: of its gait, on the section.
-        names: which of `JACOBIAN_FUNCTIONALS`; each costs adjoint solves of its own.
+        names: which of `JACOBIAN_FUNCTIONALS`, or of `CLUSTER`; each costs adjoint solves of its
+            own.
         footsteps: how many a cycle has.
         accuracy: "balanced" or "tight".
         engine: "xla" or "lanes".

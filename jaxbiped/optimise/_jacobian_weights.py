@@ -15,6 +15,11 @@ from jaxbiped.linalg._small_matrices import Eigensystem, eigenpairs, eigensystem
 
 MODULI = ("spectral_radius", "modulus_2", "modulus_3")
 """Moduli that are told apart: of a pair of conjugate multipliers once."""
+SYMMETRIC = ("symmetric_1", "symmetric_2", "symmetric_3")
+"""Elementary symmetric functions λ₁ + λ₂ + λ₃, … of a cluster: the three leading multipliers, of
+which no conjugate lies outside. They are smooth where its multipliers meet."""
+CLUSTER = ("spectral_radius", *SYMMETRIC, "next_modulus")
+"""What the spectral radius is bounded by: the cluster, and the largest modulus outside of it."""
 CLEARANCE_NORMS = ("clearance_sensitivity", "floor_clearance_sensitivity")
 """Norms of the swinging foot's clearance, by a push and by a step in the ground."""
 SQUARINGS = 6
@@ -74,6 +79,48 @@ def _modulus(k: int, rows: Scalar, length: Scalar, leading: Scalar) -> Weighed:
     shares = jnp.zeros_like(eigen.values).at[place].set(jnp.conj(eigen.values[place]) / divisor)
     value = jnp.where(known, size, 0.0)
     return Weighed(value, _by_entries(eigen, shares), 2, jnp.zeros_like(length))
+
+
+def _cluster(values: Scalar) -> tuple[Scalar, Scalar]:
+    """Which multipliers the cluster has, and which is the largest outside (booleans, (m,)).
+
+    Multipliers are taken by size while they fit in, a conjugate pair at once.
+    """
+    sizes = jnp.abs(values)
+    order = jnp.argsort(-sizes - 1e-9 * jnp.sign(values.imag))
+    inside, room = jnp.zeros(len(values), bool), jnp.asarray(len(SYMMETRIC))
+    for k in range(len(values)):
+        at = order[k]
+        paired, follows = values[at].imag != 0.0, values[at].imag < 0.0
+        mate = inside[order[max(k - 1, 0)]]
+        fits = jnp.where(follows, mate, room >= jnp.where(paired, 2, 1)) & (sizes[at] > 0.0)
+        inside = inside.at[at].set(fits)
+        room = room - fits.astype(int)
+    outside = jnp.argmax(jnp.where(inside, -1.0, sizes))
+    return inside, jnp.arange(len(values)) == outside
+
+
+def _symmetric(k: int, rows: Scalar, length: Scalar) -> Weighed:
+    """The k-th of the cluster: its derivatives are those of its multipliers, which add up."""
+    eigen = _eigen(rows[2:])
+    inside, _ = _cluster(eigen.values)
+    own = jnp.where(inside, eigen.values, 0.0)
+    first, second, third = (jnp.sum(own**power) for power in (1, 2, 3))
+    product = 0.5 * (first * first - second)
+    values = (first, product, (first**3 - 3.0 * first * second + 2.0 * third) / 6.0)
+    shares = (jnp.ones_like(own), first - own, product - own * (first - own))
+    by_rows = _by_entries(eigen, jnp.where(inside, shares[k], 0.0))
+    return Weighed(values[k].real, by_rows, len(SYMMETRIC), jnp.zeros_like(length))
+
+
+def _next_modulus(rows: Scalar, length: Scalar) -> Weighed:
+    eigen = _eigen(rows[2:])
+    _, outside = _cluster(eigen.values)
+    size = jnp.sum(jnp.where(outside, jnp.abs(eigen.values), 0.0))
+    known = outside & (size > 0.0)
+    divisor = jnp.where(size > 0.0, size, 1.0).astype(eigen.values.dtype)
+    shares = jnp.where(known, jnp.conj(eigen.values) / divisor, 0.0)
+    return Weighed(size, _by_entries(eigen, shares), 2, jnp.zeros_like(length))
 
 
 def _divergence(rows: Scalar, length: Scalar) -> Weighed:
@@ -152,4 +199,8 @@ def weighed(name: str, y: PyTree, rows: Scalar, length: Scalar, leading: Scalar)
         return _clearance_norm(rows, length)
     if name == "strike_divergence":
         return _divergence(rows, length)
+    if name in SYMMETRIC:
+        return _symmetric(SYMMETRIC.index(name), rows, length)
+    if name == "next_modulus":
+        return _next_modulus(rows, length)
     return _modulus(MODULI.index(name), rows, length, leading)

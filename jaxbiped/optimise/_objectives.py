@@ -14,7 +14,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
 from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
-from jaxbiped.optimise._jacobian_weights import CLEARANCE_NORMS, MODULI
+from jaxbiped.optimise._jacobian_weights import CLEARANCE_NORMS, CLUSTER, SYMMETRIC
 from jaxbiped.scene._parameters import parameter_names, parameter_values
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
@@ -126,8 +126,6 @@ _DISTANCES = {
 }
 _WHOLE = ("sensitivity_norm", "floor_sensitivity", *CLEARANCE_NORMS)
 """What the whole sensitivity is made of: step length, step time and clearance, by both."""
-CLUSTER = MODULI
-"""What is evaluated for the spectral radius: it, and the next moduli."""
 
 
 class Evaluation(NamedTuple):
@@ -196,7 +194,10 @@ def evaluate(
         # The orbit's own error moves the Jacobian, too, as its multipliers tell.
         shares = np.asarray(gait.multiplier_errors) / float(gait.measures.spectral_radius)
         rows |= {
-            name: row._replace(error=max(row.error, abs(row.value) * float(shares[0])))
+            # Symmetric functions do not move as multipliers that meet do.
+            name: row
+            if name in SYMMETRIC
+            else row._replace(error=max(row.error, abs(row.value) * float(shares[0])))
             for name, row in zip(of_jacobian, _rows_of(first), strict=True)
         }
     if "whole_sensitivity" in wanted:

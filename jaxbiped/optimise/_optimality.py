@@ -5,13 +5,20 @@ from typing import NamedTuple
 import numpy as np
 import scipy  # its submodules are imported where they are first used
 
-from jaxbiped.optimise._design_problem import Design, DesignProblem, scale_of
-from jaxbiped.optimise._optimisers import Row, rows_of
+from jaxbiped.optimise._design_problem import Design, DesignProblem
+from jaxbiped.optimise._objectives import Evaluation
+from jaxbiped.optimise._optimisers import AnyRow, cluster_rows, rows_of
 
-_ACTIVE = 1e-4
-"""Largest part of its bound by which an active requirement is missed or kept too well."""
+OPTIMAL = 1e-3
+"""Residual of the conditions of optimality from which a design counts as an optimum."""
+_NEAR = 1e-4
+"""Distance in u within which other designs' derivatives count where a design has a corner."""
 _AT_BOUND = 1e-6
 """Distance in u at which a variable is at its bound."""
+_VANISHING = 1e-3
+"""Size of a normal, as a share of the largest, below which it counts as none."""
+_SURE = 1e3
+"""Weight with which designs' shares add up to one, in least squares."""
 
 
 class Held(NamedTuple):
@@ -55,54 +62,148 @@ class Optimality(NamedTuple):
 
 
 class _Normal(NamedTuple):
-    """Inward normal of an active requirement or bound, its error, and its multiplier's limits."""
+    """Inward normal of an active requirement or bound, its error, and its multiplier's limit.
+
+    `by_radius` is what the radius in the sum, where it is a variable of its own, adds to it.
+    """
 
     gradient: np.ndarray
     error: np.ndarray
     least: float
+    by_radius: float = 0.0
+
+
+def smooth_weights(problem: DesignProblem) -> tuple[dict[str, float], float]:
+    """Weights of the sum but for the spectral radius's, which comes behind them.
+
+    Minimised, the radius is a variable of its own, which the conditions on its cluster bound.
+    """
+    weights = dict(problem.weights)
+    if problem.has_cluster and weights.get("spectral_radius", 0.0) > 0.0:
+        return weights, weights.pop("spectral_radius")
+    return weights, 0.0
+
+
+class _Balance(NamedTuple):
+    """The gradient of the sum, and multipliers of what holds it (q,), in the least-squares sense.
+
+    Attributes:
+        left: what no multiplier balances, (k,), or with the radius's weight (k + 1,).
+        gradient_error: its error, (k,).
+        active: rows that hold it, of requirements first, then of the radius in the sum.
+        normals: theirs, and those of the variables at a bound.
+        multipliers: of all these.
+    """
+
+    left: np.ndarray
+    gradient_error: np.ndarray
+    active: list[tuple[AnyRow, bool]]
+    normals: list[_Normal]
+    multipliers: np.ndarray
+
+
+def _smooth_gradient(problem: DesignProblem, design: Design) -> np.ndarray:
+    """Of the sum but for the spectral radius's part."""
+    weights, _ = smooth_weights(problem)
+    slopes = [w * design.known.slopes[name] for name, w in weights.items()]
+    return problem.gradient(design.u, np.sum(slopes, axis=0)) if slopes else 0.0 * design.u
+
+
+def _balance(
+    problem: DesignProblem, design: Design, others: list[Design], scale: float
+) -> _Balance:
+    u, known = design
+    weights, of_radius = smooth_weights(problem)
+    every = [design, *others]
+    gradients = [_smooth_gradient(problem, each) / scale for each in every]
+    spreads = [abs(w) * known.slope_errors[name] for name, w in weights.items()]
+    error = problem.gradient(u, np.sum(spreads, axis=0)) / scale if spreads else 0.0 * u
+    radius = known.values["spectral_radius"] if of_radius else np.inf
+    rows = [(row, False) for row in rows_of(problem)]
+    rows += [(row, True) for row in (cluster_rows(problem, radius) if of_radius else ())]
+    pairs = [
+        (row, in_sum, _of_row(problem, each, row, in_sum))
+        for each in every
+        for row, in_sum in rows
+        if row.is_active(each.known)
+    ]
+    sizes = [float(np.linalg.norm([*each.gradient, each.by_radius])) for _, _, each in pairs]
+    # Where multipliers pass through each other a condition's gradient vanishes, and tells nothing.
+    pairs = [p for p, size in zip(pairs, sizes, strict=True) if size > _VANISHING * max(sizes)]
+    active = [(row, in_sum) for row, in_sum, _ in pairs]
+    normals = [each for _, _, each in pairs]
+    normals += [_of_bound(u, place, side) for place, side in _at_bounds(u)]
+    # Columns: shares of the designs, which add up to one, and the multipliers.
+    columns = [np.append(each, [of_radius / scale, _SURE]) for each in gradients]
+    columns += [np.append(-each.gradient, [-each.by_radius, 0.0]) for each in normals]
+    matrix, right = np.stack(columns, axis=1), np.append(np.zeros(len(u) + 1), _SURE)
+    limits = np.append(np.zeros(len(every)), [each.least for each in normals])
+    found = scipy.optimize.lsq_linear(matrix, right, (limits, np.inf), method="bvls").x
+    left = (matrix @ found)[: len(u) + bool(of_radius)]
+    return _Balance(left, np.abs(error), active, normals, found[len(every) :])
+
+
+def lagrangian_change(
+    problem: DesignProblem, here: Design, there: Design, scale: float
+) -> np.ndarray:
+    """How the gradient of the scaled Lagrangian changes, with the multipliers of `there`."""
+    found = _balance(problem, there, [], scale)
+    ends = []
+    for each in (there, here):
+        own = _smooth_gradient(problem, each) / scale
+        for (row, _), multiplier in zip(found.active, found.multipliers, strict=False):
+            own = own - multiplier * problem.gradient(each.u, row.slopes(each.known))
+        ends.append(own)
+    return ends[0] - ends[1]
 
 
 def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
-    """Multipliers that balance the gradient best, in the least-squares sense, with right signs."""
+    """Multipliers that balance the gradient best, in the least-squares sense, with right signs.
+
+    Where they leave more than `OPTIMAL`, gradients of designs within 1e-4 may have a share in it: a
+    combination that balances says that no direction is better (Clarke's ε-subdifferential).
+    """
     u, known = design
-    value, slopes, _ = problem.objective(known)
-    scale = max(abs(value), 1e-300)
-    gradient = problem.gradient(u, slopes) / scale
-    spread = sum(abs(w) * known.slope_errors[name] for name, w in problem.weights.items())
-    gradient_error = np.abs(problem.gradient(u, np.asarray(spread))) / scale
-    rows = rows_of(problem)
-    active = [row for row in rows if row.equality or row.value(known) <= _ACTIVE]
-    normals = [_of_row(problem, design, row) for row in active]
-    at_bound = _at_bounds(u)
-    normals += [_of_bound(u, place, side) for place, side in at_bound]
-    multipliers, errors = np.zeros(len(normals)), np.zeros(len(normals))
-    left = gradient
-    if normals:
-        matrix = np.stack([each.gradient for each in normals], axis=1)
-        limits = np.asarray([each.least for each in normals])
-        multipliers = scipy.optimize.lsq_linear(matrix, gradient, bounds=(limits, np.inf)).x
-        left = gradient - matrix @ multipliers
-        spreads = np.stack([each.error for each in normals], axis=1) @ np.abs(multipliers)
-        gradient_error = gradient_error + spreads
+    scale = max(abs(problem.objective(known)[0]), 1e-300)
+    found = _balance(problem, design, [], scale)
+    if np.max(np.abs(found.left)) > OPTIMAL:
+        near = [e for e in problem.asked if 0.0 < np.max(np.abs(e.u - u)) <= _NEAR]
+        found = _balance(problem, design, near, scale) if near else found
+    errors = np.zeros(len(found.normals))
+    gradient_error = found.gradient_error
+    if found.normals:
+        matrix = np.stack([each.gradient for each in found.normals], axis=1)
+        spreads = np.stack([each.error for each in found.normals], axis=1)
+        gradient_error = gradient_error + spreads @ np.abs(found.multipliers)
         errors = np.abs(np.linalg.pinv(matrix)) @ gradient_error
-    found = {row: (m, e) for row, m, e in zip(active, multipliers, errors, strict=False)}
-    at = zip(at_bound, multipliers[len(active) :], errors[len(active) :], strict=True)
-    sized = problem.sense * scale
+    held: dict[tuple[str, float, float], list[float]] = {}
+    each_active = zip(found.active, found.multipliers, errors, strict=False)
+    for (row, in_sum), multiplier, error in each_active:
+        if not in_sum:
+            size = scale * row.by_bound(known)
+            sums = held.setdefault(row[:3], [0.0, 0.0])
+            sums[0] -= multiplier * size
+            sums[1] += error * abs(size)
+    at_bound, count = _at_bounds(u), len(found.active)
+    at = zip(at_bound, found.multipliers[count:], errors[count:], strict=True)
     return Optimality(
-        residual=float(np.max(np.abs(left))),
+        residual=float(np.max(np.abs(found.left))),
         error=float(np.max(gradient_error)),
         excess=problem.excess(known),
-        requirements=tuple(_held(row, design, sized, found.get(row)) for row in rows),
-        bounds=tuple(_held_bound(problem, u, sized, *each) for each in at),
+        requirements=tuple(
+            _held(problem, row, known, held.get(row[:3]))
+            for row in dict((row[:3], row) for row in rows_of(problem)).values()
+        ),
+        bounds=tuple(_held_bound(problem, u, problem.sense * scale, *each) for each in at),
     )
 
 
-def _of_row(problem: DesignProblem, design: Design, row: Row) -> _Normal:
+def _of_row(problem: DesignProblem, design: Design, row: AnyRow, in_sum: bool) -> _Normal:
     u, known = design
-    error = known.slope_errors[row.name] / scale_of(row.bound)
-    least = -np.inf if row.equality else 0.0
     own = problem.gradient(u, row.slopes(known))
-    return _Normal(own, np.abs(problem.gradient(u, error)), least)
+    error = np.abs(problem.gradient(u, row.slope_errors(known)))
+    least = -np.inf if row.equality else 0.0
+    return _Normal(own, error, least, row.by_bound(known) if in_sum else 0.0)
 
 
 def _at_bounds(u: np.ndarray) -> list[tuple[int, float]]:
@@ -117,19 +218,19 @@ def _of_bound(u: np.ndarray, place: int, side: float) -> _Normal:
     return _Normal(unit, np.zeros_like(u), 0.0)
 
 
-def _held(row: Row, design: Design, scale: float, found: tuple[float, float] | None) -> Held:
-    """Multipliers in the units of objective and measure: of tightening the bound upwards."""
-    size = scale / scale_of(row.bound)
+def _held(
+    problem: DesignProblem, row: AnyRow, known: Evaluation, found: list[float] | None
+) -> Held:
+    """Multipliers in the units of objective and measure: of moving the bound upwards."""
     multiplier, error = (0.0, 0.0) if found is None else found
-    known = design.known
     return Held(
         name=row.name,
         bound=row.bound,
         value=known.values[row.name],
         error=known.errors[row.name],
         active=found is not None,
-        multiplier=float(row.sign * multiplier * size),
-        multiplier_error=float(error * abs(size)),
+        multiplier=float(problem.sense * multiplier),
+        multiplier_error=float(error),
     )
 
 

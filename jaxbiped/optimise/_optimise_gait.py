@@ -20,7 +20,8 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._design_problem import Design, DesignProblem
 from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, ensemble_of
 from jaxbiped.optimise._evaluations import Evaluations
-from jaxbiped.optimise._objectives import CLUSTER, Evaluation, check_objective
+from jaxbiped.optimise._jacobian_weights import CLUSTER
+from jaxbiped.optimise._objectives import Evaluation, check_objective
 from jaxbiped.optimise._optimality import Optimality, optimality_of
 from jaxbiped.optimise._optimisers import OPTIMISERS, Ended
 from jaxbiped.optimise._requirements import Requirement, SubjectTo, requirements_of

@@ -6,7 +6,7 @@ back towards it.
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -15,11 +15,14 @@ import scipy  # its submodules are imported where they are first used
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.optimise._design_problem import DesignProblem, scale_of
-from jaxbiped.optimise._objectives import CLUSTER, Evaluation
+from jaxbiped.optimise._multiplier_cluster import CONDITIONS, ClusterRow, cluster_of
+from jaxbiped.optimise._objectives import Evaluation
 
 if TYPE_CHECKING:
     import optax
 
+_ACTIVE = 1e-4
+"""Largest part of its bound by which an active requirement is missed or kept too well."""
 OPTIMISERS = ("trust-region", "slsqp", "trust-constr", "optax")
 _RAISED = 10.0
 """By how much the scaled objective is raised where there is no gait."""
@@ -56,13 +59,29 @@ class Row(NamedTuple):
         """Its derivatives with respect to all parameters."""
         return self.sign * known.slopes[self.name] / scale_of(self.bound)
 
+    def slope_errors(self, known: Evaluation) -> np.ndarray:
+        """Their estimated errors."""
+        return known.slope_errors[self.name] / scale_of(self.bound)
 
-def rows_of(problem: DesignProblem) -> tuple[Row, ...]:
-    """The requirements one by one; an upper bound of the spectral radius holds the next moduli too.
+    def by_bound(self, known: Evaluation) -> float:
+        """Its derivative with respect to the bound."""
+        return -self.sign / scale_of(self.bound)
 
-    So an optimum where several moduli are equal has no corner.
+    def is_active(self, known: Evaluation) -> bool:
+        """Whether it holds the design."""
+        return self.equality or self.value(known) <= _ACTIVE
+
+
+AnyRow: TypeAlias = Row | ClusterRow
+
+
+def rows_of(problem: DesignProblem) -> tuple[AnyRow, ...]:
+    """The requirements one by one.
+
+    An upper bound of the spectral radius is the conditions on the cluster of leading multipliers,
+    and one on the next modulus: all of them are smooth where multipliers meet.
     """
-    rows = []
+    rows: list[AnyRow] = []
     for each in problem.requirements:
         if each.low is not None and each.low == each.high:
             rows.append(Row(each.name, each.low, 1.0, True))
@@ -70,9 +89,21 @@ def rows_of(problem: DesignProblem) -> tuple[Row, ...]:
         if each.low is not None:
             rows.append(Row(each.name, each.low, 1.0, False))
         if each.high is not None:
-            names = CLUSTER if each.name == "spectral_radius" else (each.name,)
-            rows += [Row(name, each.high, -1.0, False) for name in names]
+            if each.name == "spectral_radius" and problem.has_cluster:
+                rows += cluster_rows(problem, each.high)
+            else:
+                rows.append(Row(each.name, each.high, -1.0, False))
     return tuple(rows)
+
+
+def cluster_rows(problem: DesignProblem, bound: float) -> list[AnyRow]:
+    """An upper bound of the spectral radius."""
+    errors = tuple(cluster_of(problem.asked[0].known).errors.tolist())
+    every: list[AnyRow] = [
+        ClusterRow("spectral_radius", bound, -1.0, False, place, errors)
+        for place in range(CONDITIONS)
+    ]
+    return [*every, Row("next_modulus", bound, -1.0, False)]
 
 
 class Functions:
@@ -89,12 +120,12 @@ class Functions:
         value, slopes, _ = self.problem.objective(known)
         return value / self.scale + raised, self.problem.gradient(u, slopes) / self.scale
 
-    def spare(self, u: np.ndarray, rows: tuple[Row, ...]) -> np.ndarray:
+    def spare(self, u: np.ndarray, rows: tuple[AnyRow, ...]) -> np.ndarray:
         """Values of the requirements."""
         known, _ = self._known(u)
         return np.asarray([row.value(known) for row in rows])
 
-    def spare_gradients(self, u: np.ndarray, rows: tuple[Row, ...]) -> np.ndarray:
+    def spare_gradients(self, u: np.ndarray, rows: tuple[AnyRow, ...]) -> np.ndarray:
         """Their gradients, one a row."""
         known, _ = self._known(u)
         return np.stack([self.problem.gradient(u, row.slopes(known)) for row in rows])

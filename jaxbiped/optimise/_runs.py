@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from jaxbiped.optimise._design_problem import Design, DesignProblem
-from jaxbiped.optimise._optimality import optimality_of
+from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
+from jaxbiped.optimise._optimality import OPTIMAL, optimality_of
 from jaxbiped.optimise._optimisers import (
     Ended,
     Functions,
@@ -19,9 +19,6 @@ from jaxbiped.optimise._trust_region import run_trust_region
 
 if TYPE_CHECKING:
     import optax
-
-_OPTIMAL = 1e-3
-"""Residual of the conditions of optimality from which a design counts as an optimum."""
 
 
 class Outcome(enum.IntEnum):
@@ -124,7 +121,7 @@ class Runs:
             return Outcome.INFEASIBLE
         if any(self.problem.weights.get(name) for name in self.best.known.beyond_range):
             return Outcome.BEYOND_RANGE
-        optimal = told.residual <= _OPTIMAL
+        optimal = told.residual <= OPTIMAL
         if not self.ended.converged:
             return Outcome.UNFINISHED
         return Outcome.CONVERGED if optimal else Outcome.CORNER
@@ -146,5 +143,4 @@ class Runs:
     def _rank(self, design: Design) -> tuple[float, float]:
         """Designs nearer to the requirements come first, and of those that keep them the better."""
         excess = self.problem.excess(design.known)
-        kept = excess <= self.problem.allowance(design.known)
-        return 0.0 if kept else excess, self.problem.objective(design.known)[0]
+        return 0.0 if excess <= KEPT else excess, self.problem.objective(design.known)[0]

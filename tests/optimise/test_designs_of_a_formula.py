@@ -22,11 +22,12 @@ from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, _by_nominal, _together, ensemble_of
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._jacobian_weights import leading_multipliers, weighed
+from jaxbiped.optimise._local_model import Local
 from jaxbiped.optimise._objectives import Evaluation, _cost_of_transport, _root_of_squares, _Row
 from jaxbiped.optimise._optimality import optimality_of
 from jaxbiped.optimise._requirements import requirements_of
 from jaxbiped.optimise._runs import Outcome, Runs
-from jaxbiped.optimise._trust_region import _Local, _updated, run_trust_region
+from jaxbiped.optimise._trust_region import _updated, run_trust_region
 from jaxbiped.optimise._variables import variables_of
 
 SCENE = jb.ladder()["rigid"]
@@ -36,13 +37,16 @@ NAMES = jb.parameter_names(SCENE)
 def formulas(d, slope):
     """Measures of a design; d and slope about 0.1 m and 0.02 rad."""
     x, y = jnp.log(d / 0.1), jnp.log(slope / 0.02)
+    a, b, c = 0.5 + x + 0.1 * y * y, -(0.5 - x + 0.1 * y * y), 0.1
     return {
         "speed": 1.0 - (x - 0.2) ** 2 - 2.0 * (y - 0.1) ** 2,
         "step_length": 0.2 + 0.1 * x + 0.05 * y,
         "period": 0.5 + 0.1 * y,
-        "spectral_radius": 0.5 + x + 0.1 * y * y,
-        "modulus_2": 0.5 - x + 0.1 * y * y,
-        "modulus_3": 0.1 + 0.0 * x,
+        "spectral_radius": jnp.maximum(a, -b),
+        "symmetric_1": a + b + c,
+        "symmetric_2": a * b + a * c + b * c,
+        "symmetric_3": a * b * c,
+        "next_modulus": 0.1 + 0.0 * x,
     }
 
 
@@ -128,9 +132,8 @@ def test_a_variable_at_its_bound_is_held_by_it(high, side):
 def test_moduli_that_meet_make_a_corner_in_which_the_radius_is_least():
     made = problem(BOTH, {"spectral_radius": 1.0}, 1.0)
     optimum(made)
-    largest = min(max(each.known.values[name] for name in ("spectral_radius", "modulus_2"))
-                  for each in made.asked)  # fmt: skip
-    assert largest == pytest.approx(0.5, abs=1e-4)
+    least = min(each.known.values["spectral_radius"] for each in made.asked)
+    assert least == pytest.approx(0.5, abs=1e-6)
 
 
 def test_requirements_that_are_missed_are_told_in_units_of_their_bounds():
@@ -402,13 +405,17 @@ def test_a_pushed_walk_returns_to_the_gait_or_does_not(last, count, returned, mo
 
 
 def test_the_merit_of_a_design_counts_what_it_misses():
-    """An equality by its size, an inequality where it is below zero, the largest of the moduli."""
+    """An equality by its size, an inequality where it is below zero, the radius by its weight."""
     none = np.zeros((3, 2))
-    here = _Local(np.zeros(2), 1.0, np.zeros(2), np.array([0.25, 0.5]), np.zeros((2, 2)),
-                  np.array([-0.5, 0.25, -0.125]), none, np.array([False, False, True]))  # fmt: skip
-    assert here.sum == 1.5
-    np.testing.assert_array_equal(here.missed, [0.5, 0.0, 0.125])
-    assert here.merit(8.0) == 1.5 + 8.0 * 0.625
+    here = Local(np.zeros(2), 1.0, np.zeros(2), np.array([-0.5, 0.25, -0.125]), none,
+                 np.array([False, False, True]))  # fmt: skip
+    assert here.merit(8.0) == 1.0 + 8.0 * 0.625
+    # Multipliers of 0.5, 0.25 and none, of which the largest may be 0.4.
+    three = dict(
+        cluster=np.array([0.75, 0.125, 0.0]), cluster_gradients=none, next_gradient=none[0]
+    )
+    assert here._replace(weight=2.0, **three).merit(8.0) == pytest.approx(2.0 + 8.0 * 0.625)
+    assert here._replace(bound=0.4, **three).merit(8.0) == pytest.approx(1.0 + 8.0 * 0.875)
 
 
 @pytest.mark.parametrize("optimiser", ["slsqp", "trust-constr"])
@@ -433,17 +440,11 @@ def test_an_optimum_that_misses_a_requirement_is_infeasible():
 def test_curvature_is_learnt_from_two_gradients():
     """The secant condition B s = y of a quadratic, and Powell's damping where it curves down."""
     hessian = np.array([[2.0, 0.5], [0.5, 1.0]])
-    none, step = np.zeros((0, 2)), np.array([0.1, -0.3])
-
-    def local(u, matrix):
-        empty = np.zeros(0)
-        return _Local(u, 0.0, matrix @ u, empty, none, empty, none, np.zeros(0, bool))
-
-    here = np.array([0.2, 0.4])
-    learnt = _updated(np.eye(2), local(here, hessian), local(here + step, hessian))
+    step = np.array([0.1, -0.3])
+    learnt = _updated(np.eye(2), step, hessian @ step)
     np.testing.assert_allclose(learnt @ step, hessian @ step)
     assert np.linalg.eigvalsh(learnt).min() > 0.0
-    damped = _updated(np.eye(2), local(here, -hessian), local(here + step, -hessian))
+    damped = _updated(np.eye(2), step, -hessian @ step)
     assert step @ damped @ step == pytest.approx(0.2 * step @ step)
 
 

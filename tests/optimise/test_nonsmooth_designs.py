@@ -1,0 +1,274 @@
+"""Optima at ridges, corners and meeting multipliers, against designs all round and closed forms."""
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+import jaxbiped as jb
+from jaxbiped.optimise._design_problem import DesignProblem
+from jaxbiped.optimise._ensemble import GaitSettings
+from jaxbiped.optimise._evaluations import Evaluations
+from jaxbiped.optimise._multiplier_cluster import conditions, radius_of
+from jaxbiped.optimise._objectives import Evaluation
+from jaxbiped.optimise._optimality import optimality_of
+from jaxbiped.optimise._requirements import requirements_of
+from jaxbiped.optimise._runs import Outcome, Runs
+from jaxbiped.optimise._variables import variables_of
+
+SCENE = jb.ladder()["rigid"]
+NAMES = jb.parameter_names(SCENE)
+BOX = {"d": (0.05, 0.2), "J": (0.003, 0.02), "r": (0.04, 0.12), "m": (1.0, 3.0), "g": (9.0, 10.0)}
+
+
+class Drawn(DesignProblem):
+    """Measures and their gradients in u by a function, instead of a walker's."""
+
+    def _follow(self, u):
+        told, rates = self.function(u), self.variables.rates(u)
+        slopes = {name: np.zeros(len(NAMES)) for name in told}
+        for name, (_, gradient) in told.items():
+            slopes[name][self.variables.places] = np.asarray(gradient) / rates
+        values = {name: float(value) for name, (value, _) in told.items()}
+        small = {name: 1e-12 for name in told}, {name: 0.0 * row for name, row in slopes.items()}
+        nothing = np.zeros(4), np.zeros((4, len(NAMES)))
+        known = Evaluation(values, small[0], slopes, small[1], *nothing)
+        self.evaluations.add(u, known)
+        return known
+
+
+def solved(count, function, goal="speed", subject_to=None):
+    vary = dict(list(BOX.items())[:count])
+    made = Drawn(
+        SCENE, variables_of(SCENE, vary), {goal: 1.0}, 1.0, requirements_of(SCENE, subject_to),
+        GaitSettings(), Evaluations(None, {}),
+    )  # fmt: skip
+    made.function = function
+    made.at(np.full(count, 0.3))
+    runs = Runs(made, 300, "trust-region", False)
+    runs.run(made.latest)
+    return made, runs
+
+
+def gained(made, best):
+    """By how much the best of the allowed designs all round is better, at three distances."""
+    random, own, gain = np.random.default_rng(1), made.objective(best.known)[0], 0.0
+    for distance in (1e-4, 1e-3, 1e-2):
+        for _ in range(200):
+            aside = random.standard_normal(len(best.u))
+            u = np.clip(best.u + distance * aside / np.linalg.norm(aside), 0.0, 1.0)
+            values = {name: float(value) for name, (value, _) in made.function(u).items()}
+            if made.excess(best.known._replace(values=values)) <= 1e-6:
+                gain = max(gain, own - sum(w * values[n] for n, w in made.weights.items()))
+    return gain
+
+
+def ridge(steep):
+    """A sharp valley across which |Σ − u₁| rises; least at its foot on the way to the centre."""
+
+    def function(u):
+        x = u - 0.5
+        across = np.append(-1.0, np.ones(len(u) - 1))
+        s = float(across @ x)
+        gradient = x + 0.3 * np.eye(len(u))[0] + steep * np.sign(s) * across
+        return {"speed": (5.0 + steep * abs(s) + 0.5 * x @ x + 0.3 * x[0], gradient)}
+
+    return function
+
+
+def largest_of(count, many, seed):
+    """The largest of bowls that lie apart."""
+    random = np.random.default_rng(seed)
+    tilts, centres = random.standard_normal((many, count)), random.uniform(0.2, 0.8, (many, count))
+    heights = random.uniform(0.0, 0.3, many)
+
+    def function(u):
+        away = u - centres
+        values = heights + np.sum(tilts * away, axis=1) + 1.5 * np.sum(away * away, axis=1)
+        k = int(np.argmax(values))
+        return {"speed": (5.0 + values[k], tilts[k] + 3.0 * away[k])}
+
+    return function
+
+
+def curved(u):
+    """Rosenbrock's valley with a sharp bottom."""
+    s = u[1] - 2.0 * (u[0] - 0.2) ** 2 - 0.3
+    by_first = 2.0 * (u[0] - 0.7) - 4.0 * np.sign(s) * (u[0] - 0.2)
+    return {"speed": (2.0 + (u[0] - 0.7) ** 2 + abs(s), [by_first, np.sign(s)])}
+
+
+def rooted(u):
+    """A valley whose one side rises like a root, as a modulus does from where multipliers meet."""
+    s, away = u[0] - u[1], u - 0.6
+    steep = 0.5 / np.sqrt(s) if s > 0.0 else -0.5
+    value = 2.0 + (np.sqrt(s) if s > 0.0 else -0.5 * s) + away @ away + 0.2 * u[0]
+    return {"speed": (value, 2.0 * away + [0.2 + steep, -steep])}
+
+
+@pytest.mark.parametrize(
+    ("count", "function"),
+    [
+        *((k, ridge(steep)) for k in (2, 3, 5) for steep in (1.0, 30.0)),
+        *((k, largest_of(k, n, s)) for k, n, s in ((2, 3, 0), (2, 6, 1), (3, 5, 0), (4, 8, 1))),
+        (2, curved),
+        (2, rooted),
+    ],
+)
+def test_no_design_round_the_end_is_better(count, function):
+    made, runs = solved(count, function)
+    assert runs.outcome() in (Outcome.CONVERGED, Outcome.CORNER)
+    assert gained(made, runs.best) < 2e-6
+
+
+def test_a_ridge_ends_at_its_foot():
+    """On u₁ = u₂ the derivative along it is that of (u₁ − ½)² + 0.3 (u₁ − ½)."""
+    _, runs = solved(2, ridge(1.0))
+    assert runs.best.u == pytest.approx([0.35, 0.35], abs=2e-3)
+    assert runs.outcome() is Outcome.CONVERGED
+
+
+@pytest.mark.parametrize("kind", ["real", "conjugate"])
+def test_the_conditions_hold_where_all_three_multipliers_lie_inside(kind):
+    random = np.random.default_rng(2)
+    for _ in range(500):
+        three = random.uniform(-0.6, 0.6, 3).astype(complex)
+        if kind == "conjugate":
+            three[1] = random.uniform(0.1, 0.6) * np.exp(1j * random.uniform(0.0, np.pi))
+            three[2] = np.conj(three[1])
+        symmetric = np.real(np.poly(three))[1:] * [-1.0, 1.0, -1.0]
+        told = conditions(symmetric, 0.4)
+        assert (np.min(told.values) > 0.0) == (np.max(np.abs(three)) < 0.4)
+        assert radius_of(symmetric) == pytest.approx(np.max(np.abs(three)), rel=1e-6)
+        h, along = 1e-6, random.standard_normal(3)
+        ends = [conditions(symmetric + s * h * along, 0.4).values for s in (1.0, -1.0)]
+        np.testing.assert_allclose(
+            told.by_symmetric @ along, (ends[0] - ends[1]) / (2 * h), atol=1e-7
+        )
+        ends = [conditions(symmetric, 0.4 + s * h).values for s in (1.0, -1.0)]
+        np.testing.assert_allclose(told.by_radius, (ends[0] - ends[1]) / (2 * h), atol=1e-6)
+
+
+def companion(trace, product, third):
+    """Measures of a gait with λ² − trace λ + product and a third multiplier, gradients in u."""
+
+    def function(u):
+        (t, by_t), (q, by_q), (c, by_c) = trace(u), product(u), third(u)
+        values = np.append(np.roots([1.0, -t, q]), c)
+        one = (t + c, by_t + by_c)
+        two = (q + t * c, by_q + t * by_c + c * by_t)
+        three = (q * c, q * by_c + c * by_q)
+        told = dict(
+            zip(("symmetric_1", "symmetric_2", "symmetric_3"), (one, two, three), strict=True)
+        )
+        radius = (float(np.max(np.abs(values))), np.full(len(u), np.nan))
+        speed = (1.0 + u[0] + 0.5 * u[1], np.append([1.0, 0.5], np.zeros(len(u) - 2)))
+        return told | {
+            "spectral_radius": radius, "next_modulus": (0.0, np.zeros(len(u))), "speed": speed
+        }  # fmt: skip
+
+    return function
+
+
+def test_a_radius_is_least_where_two_multipliers_meet():
+    """λ = 0.6 ± √(u₁ − ½ + (u₂ − ½)²) + (u₂ − 0.7)²: least, 0.6, at u₂ = 0.7 on the parabola."""
+
+    def trace(u):
+        return 2.0 * (0.6 + (u[1] - 0.7) ** 2), np.array([0.0, 4.0 * (u[1] - 0.7)])
+
+    def product(u):
+        mean = 0.6 + (u[1] - 0.7) ** 2
+        inside = u[0] - 0.5 + (u[1] - 0.5) ** 2
+        by_second = 4.0 * mean * (u[1] - 0.7) - 2.0 * (u[1] - 0.5)
+        return mean**2 - inside, np.array([-1.0, by_second])
+
+    function = companion(trace, product, lambda u: (0.1, np.zeros(2)))
+    _, runs = solved(2, function, "spectral_radius")
+    # A conjugate pair's modulus is √(mean² − inside): it is least where `inside` is zero.
+    assert runs.best.known.values["spectral_radius"] == pytest.approx(0.6, abs=1e-4)
+    assert runs.best.u == pytest.approx([0.46, 0.7], abs=0.02)
+    assert runs.outcome() is Outcome.CONVERGED
+
+
+def test_a_bound_holds_at_a_triple_multiplier_to_a_millionth():
+    """(λ − ½)³, all three coefficients free: the best design within |λ| ≤ ½ is the vertex."""
+
+    def function(u):
+        w = u - 0.5  # of (λ − ½)³ − w₁ (λ − ½)² − w₂ (λ − ½) − w₃
+        three = np.roots([1.0, -w[0], -w[1], -w[2]]) + 0.5
+        one = (1.5 + w[0], np.array([1.0, 0.0, 0.0]))
+        two = (0.75 + w[0] - w[1], np.array([1.0, -1.0, 0.0]))
+        last = (0.125 + 0.25 * w[0] - 0.5 * w[1] + w[2], np.array([0.25, -0.5, 1.0]))
+        return {
+            "symmetric_1": one, "symmetric_2": two, "symmetric_3": last,
+            "spectral_radius": (float(np.max(np.abs(three))), np.full(3, np.nan)),
+            "next_modulus": (0.0, np.zeros(3)),
+            "speed": (2.0 - w[0] - 0.5 * w[1] - 0.2 * w[2], np.array([-1.0, -0.5, -0.2])),
+        }  # fmt: skip
+
+    made, runs = solved(3, function, "speed", "spectral_radius<0.5")
+    assert runs.best.known.values["spectral_radius"] <= 0.5 * (1.0 + 1e-6)
+    assert runs.best.known.values["speed"] == pytest.approx(2.0, abs=0.01)
+    told = optimality_of(made, runs.best)
+    assert told.residual < 1e-3
+    # The vertex moves with the bound ρ as λ = ρ does: w = (3, 0, 0) (ρ − ½) to first order.
+    (held, _) = told.requirements
+    assert held.multiplier == pytest.approx(-3.0, rel=0.05)
+
+
+@pytest.mark.nightly
+def test_a_walkers_radius_is_least_on_the_ridge_where_its_multipliers_meet():
+    """No design round it is better by what the radius there is known to."""
+    best = jb.optimise_gait(
+        SCENE, vary={"d": (0.05, 0.2), "J": (0.003, 0.02)}, minimise="spectral_radius"
+    )
+    assert best.outcome is Outcome.CONVERGED
+    assert best.objective < 0.180696  # of a grid of 61 by 121 designs about it
+    assert best.optimality.residual < 1e-3
+    d, J = best.variables["d"], best.variables["J"]
+    for size in (1e-4, 1e-3, 1e-2):
+        for angle in np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False):
+            there = {
+                "d": d * 4.0 ** (size * np.cos(angle)),
+                "J": J * (20.0 / 3.0) ** (size * np.sin(angle)),
+            }
+            gait = jb.find_gait(
+                jb.with_parameters(SCENE, there), best.gait.measures.state,
+                parameters=(), radius_sensitivities=False,
+            )  # fmt: skip
+            assert float(gait.measures.spectral_radius) > best.objective * (1.0 - 1e-5)
+
+
+@pytest.mark.nightly
+def test_a_walkers_bound_is_kept_where_three_multipliers_meet():
+    """Its certificate by central differences of the multipliers' symmetric functions."""
+    scene = jb.seed_scene()
+    own = {name: float(jb.parameter_values(scene)[name]) for name in ("d", "r", "J")}
+    best = jb.optimise_gait(
+        scene,
+        vary={name: (0.5 * value, 2.0 * value) for name, value in own.items()},
+        maximise="speed",
+        subject_to="spectral_radius<0.4",
+    )
+    assert best.outcome is Outcome.CONVERGED
+    assert best.known.values["spectral_radius"] <= 0.4 * (1.0 + 1e-6)
+    assert best.optimality.residual < 1e-3
+    tight = jb.find_gait(best.scene, best.gait.measures.state, accuracy="tight", parameters=())
+    assert float(tight.measures.spectral_radius) <= 0.4 * (1.0 + 1e-6)
+    names, step = list(own), 1e-3
+
+    def told(shift):
+        values = {n: best.variables[n] * np.exp(x) for n, x in zip(names, shift, strict=True)}
+        gait = jb.find_gait(
+            jb.with_parameters(scene, values), best.gait.measures.state, accuracy="tight",
+            parameters=(), radius_sensitivities=False,
+        )  # fmt: skip
+        three = np.sort_complex(np.asarray(gait.multipliers))[::-1]
+        three = three[np.argsort(-np.abs(three))][:3]
+        return np.append(np.real(np.poly(three))[1:] * [-1, 1, -1], float(gait.measures.speed))
+
+    slopes = np.stack([(told(e) - told(-e)) / (2.0 * step) for e in step * np.eye(3)], axis=1)
+    centre = conditions(told(np.zeros(3))[:3], 0.4)
+    # Multipliers of the conditions, at least zero, balance the speed.
+    left = lsq_linear((centre.by_symmetric @ slopes[:3]).T, -slopes[3], (0.0, np.inf))
+    assert np.max(np.abs(left.fun)) < 1e-3
+    assert left.x @ (centre.values < 1.0) == pytest.approx(left.x.sum())
