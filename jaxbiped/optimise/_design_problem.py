@@ -16,7 +16,12 @@ from jaxbiped.gait._explain_search import explain_search
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, evaluate_ensemble
+from jaxbiped.optimise._ensemble import (
+    Ensemble,
+    GaitSettings,
+    evaluate_ensemble,
+    with_worse_members,
+)
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._objectives import Evaluation, evaluate
 from jaxbiped.optimise._requirements import Requirement
@@ -108,6 +113,23 @@ class DesignProblem:
                     f"there is {known.values[name]:g}, and it has no derivatives."
                 )
         return self._note(u, known)
+
+    def worse_ensemble(self, design: Design, seed: int) -> Ensemble | None:
+        """The ensemble with members that are worse at a design; None where none are found."""
+        if self.ensemble is None or self.ensemble.criterion == "mean":
+            return None
+        known = design.known
+        return with_worse_members(
+            self.ensemble, self.scene_at(design.u), known, self.wanted, self.settings, seed
+        )
+
+    def begin_again(self, design: Design, ensemble: Ensemble) -> Design:
+        """That design with another ensemble, and no other; raises as `begin`."""
+        count = self.evaluations.count
+        self.ensemble, self.asked = ensemble, []
+        self.evaluations = Evaluations(None, {})
+        self.evaluations.count = count
+        return self.begin(design.u)
 
     def at(self, u: np.ndarray) -> Evaluation | None:
         """What is known of a design; None where no gait was found on the way from the latest."""

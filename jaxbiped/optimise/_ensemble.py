@@ -1,5 +1,6 @@
 """Ensembles: one design under scatter of parameters, its gaits found as one batch by lanes."""
 
+import itertools
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -17,12 +18,19 @@ from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
+from jaxbiped.optimise._jacobian_weights import CLUSTER
 from jaxbiped.optimise._objectives import Evaluation, evaluate, functionals_for
 from jaxbiped.scene._parameters import parameter_names, parameter_values, with_parameters
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 
 CRITERIA = ("mean", "worst")
+_CORNERS = 6
+"""Scattered parameters up to which the worst case is sought at all corners of their box."""
+_WIDTHS = (1.0, 0.5, 0.25, 0.1)
+"""Half-widths, as shares of the box's, about the worst member so far in which others are tried."""
+_WORSE = 1e-4
+"""Relative difference by which another member counts as worse."""
 
 
 class GaitSettings(NamedTuple):
@@ -39,14 +47,24 @@ class Ensemble(NamedTuple):
     Attributes:
         names: of the parameters.
         factors: shape (n, k).
-        criterion: "mean" or "worst".
+        criterion: "mean" of the members, which are a sample; or "worst" of the box, whose corners
+            are the last of them.
         larger_is_worse: of each measure that plays a part, for "worst".
+        spread: half-widths of the box, shape (k,).
     """
 
     names: tuple[str, ...]
     factors: np.ndarray
     criterion: str
     larger_is_worse: dict[str, bool]
+    spread: np.ndarray
+
+    @property
+    def words(self) -> str:
+        """What a worst case is the worst of."""
+        k = len(self.names)
+        corners = f"the {2**k} corners" if k <= _CORNERS else f"no corners, which are {2**k},"
+        return f"Worst of the box of {k} scattered parameters: {corners}, a sample and a search."
 
 
 def ensemble_of(
@@ -58,6 +76,8 @@ def ensemble_of(
     seed: int,
 ) -> Ensemble:
     """Members evenly spread over factors 1 − s to 1 + s of each parameter.
+
+    For the worst case the corners of this box come along.
 
     Raises:
         ArgumentError: an unknown parameter or criterion, one that is zero, or a scatter not
@@ -75,9 +95,45 @@ def ensemble_of(
             raise ArgumentError(
                 f"scatter of {name} is not allowed: it is relative, and {name} = 0."
             )
-    spread = 2.0 * qmc.Sobol(len(scatter), seed=seed).random(int(members)) - 1.0
-    factors = 1.0 + spread * np.asarray(list(scatter.values()))
-    return Ensemble(tuple(scatter), factors, criterion, larger_is_worse)
+    k, spread = len(scatter), np.asarray(list(scatter.values()))
+    shares = 2.0 * qmc.Sobol(k, seed=seed).random(int(members)) - 1.0
+    if criterion == "worst" and k <= _CORNERS:
+        shares = np.concatenate([shares, list(itertools.product((-1.0, 1.0), repeat=k))])
+    return Ensemble(tuple(scatter), 1.0 + shares * spread, criterion, larger_is_worse, spread)
+
+
+def with_worse_members(
+    ensemble: Ensemble,
+    scene: Scene | RigidScene,
+    nominal: Evaluation,
+    wanted: tuple[str, ...],
+    settings: GaitSettings,
+    seed: int,
+) -> Ensemble | None:
+    """The ensemble with worse members than it has, which a search in its box comes upon.
+
+    They take the places of members that are sampled. None where nothing worse is found.
+    """
+    random, found = np.random.default_rng(seed), []
+    low, high = 1.0 - ensemble.spread, 1.0 + ensemble.spread
+    for name in wanted:
+        sign = 1.0 if ensemble.larger_is_worse.get(name, True) else -1.0
+        factors, worst, centre = ensemble.factors, [-np.inf], ensemble.factors[0]
+        for width in (*_WIDTHS, 0.0):
+            tried = ensemble._replace(factors=factors)
+            each = evaluate_members(tried, scene, nominal, wanted, settings)
+            # A member without a gait is worse than any that has one.
+            values = [np.inf if known is None else sign * known.values[name] for known in each]
+            place = int(np.argmax(values))
+            if values[place] > worst[-1]:
+                worst, centre = [*worst, values[place]], factors[place]
+            aside = random.uniform(-1.0, 1.0, factors.shape)
+            factors = np.clip(centre + width * ensemble.spread * aside, low, high)
+        if worst[-1] > worst[1] + _WORSE * abs(worst[1]):
+            found.append(centre)
+    if not found:
+        return None
+    return ensemble._replace(factors=np.concatenate([ensemble.factors[len(found) :], found]))
 
 
 def evaluate_ensemble(
@@ -91,6 +147,19 @@ def evaluate_ensemble(
 
     None where any of them has no gait.
     """
+    each = evaluate_members(ensemble, scene, nominal, wanted, settings)
+    known = [one for one in each if one is not None]
+    return _together(ensemble, nominal, known) if len(known) == len(each) else None
+
+
+def evaluate_members(
+    ensemble: Ensemble,
+    scene: Scene | RigidScene,
+    nominal: Evaluation,
+    wanted: tuple[str, ...],
+    settings: GaitSettings,
+) -> list[Evaluation | None]:
+    """Of each member the measures wanted; None where it has no gait."""
     names, own = parameter_names(scene), parameter_values(scene)
     count, places = len(ensemble.factors), [names.index(name) for name in ensemble.names]
     values = np.asarray([float(own[name]) for name in ensemble.names]) * ensemble.factors
@@ -101,19 +170,21 @@ def evaluate_ensemble(
             scene, {name: jnp.asarray(values[:, i]) for i, name in enumerate(ensemble.names)}
         )
     except ArgumentError:  # parameters that do not go together
-        return None
+        return [None] * count
     scenes = jtu.tree_map(lambda leaf: jnp.broadcast_to(jnp.asarray(leaf), (count,)), scenes)
     starts = state_type(scene)(jnp.zeros(count), *map(jnp.asarray, points.T))
     found = jax.device_get(_members(scenes, starts, wanted, settings))
     gaits: Gait = found[0]
-    if not np.all((gaits.ending == int(Search.FOUND)) & gaits.sound):
-        return None
-    each = []
+    walks = (gaits.ending == int(Search.FOUND)) & gaits.sound
+    each: list[Evaluation | None] = []
     for k in range(count):
         scene_k, (gait, *functionals) = jtu.tree_map(lambda leaf, k=k: leaf[k], (scenes, found))
-        known = evaluate(scene_k, gait, wanted, settings.accuracy, tuple(functionals))
-        each.append(_by_nominal(known, ensemble.factors[k], places))
-    return _together(ensemble, nominal, each)
+        known = None
+        if walks[k]:
+            known = evaluate(scene_k, gait, wanted, settings.accuracy, tuple(functionals))
+            known = _by_nominal(known, ensemble.factors[k], places)
+        each.append(known)
+    return each
 
 
 @cached_jit
@@ -154,11 +225,13 @@ def _by_nominal(known: Evaluation, factors: np.ndarray, places: list[int]) -> Ev
 def _together(ensemble: Ensemble, nominal: Evaluation, each: list[Evaluation]) -> Evaluation:
     chosen = {name: each for name in each[0].values}
     if ensemble.criterion == "worst":
-        for name in chosen:
+        for name in [name for name in chosen if name not in CLUSTER[1:]]:
             values = [known.values[name] for known in each]
             larger = ensemble.larger_is_worse.get(name, True)
             place = int(np.argmax(values) if larger else np.argmin(values))
             chosen[name] = [each[place]]
+            if name == CLUSTER[0]:  # one member's multipliers
+                chosen |= {other: chosen[name] for other in CLUSTER[1:] if other in chosen}
 
     def number(name: str, field: str) -> float:
         return float(np.mean([getattr(known, field)[name] for known in chosen[name]]))

@@ -20,7 +20,6 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._design_problem import Design, DesignProblem
 from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, ensemble_of
 from jaxbiped.optimise._evaluations import Evaluations
-from jaxbiped.optimise._jacobian_weights import CLUSTER
 from jaxbiped.optimise._objectives import Evaluation, check_objective
 from jaxbiped.optimise._optimality import Optimality, optimality_of
 from jaxbiped.optimise._optimisers import OPTIMISERS, Ended
@@ -37,6 +36,8 @@ from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 if TYPE_CHECKING:
     import optax
 
+_ROUNDS = 3
+"""Searches for worse members than an ensemble has, each with another run, at most."""
 Goal: TypeAlias = str | Mapping[str, float] | None
 """A measure by name, or weights of several."""
 
@@ -123,8 +124,10 @@ def optimise_gait(
             whose gaits are sought as one batch.
         scatter: relative half-widths by parameter; every design is then an ensemble whose members
             differ by factors within these, and measures are taken over all members.
-        members: how many.
-        criterion: "mean" for the expectation, "worst" for the worst member of each measure.
+        members: how many are sampled.
+        criterion: "mean" for the sample's mean, "worst" for the worst case of each measure over
+            the whole box: the sample, up to 64 corners, and what a search comes upon about the
+            best design, which is then optimised anew.
         seed: of scattered designs and of members.
         footsteps: how many a cycle has.
         accuracy: "balanced" or "tight".
@@ -189,6 +192,11 @@ def optimise_gait(
             if restarts:
                 for each in scattered_designs(problem, begin, int(restarts), int(seed)):
                     runs.run(each)
+            for _ in range(_ROUNDS):
+                harder = problem.worse_ensemble(runs.best, int(seed))
+                if harder is None:
+                    break
+                runs.run(problem.begin_again(runs.best, harder))
         except KeyboardInterrupt:
             runs.ended, runs.interrupted = Ended(False, "Interrupted."), True
     return _optimum(problem, runs)
@@ -236,8 +244,7 @@ def _larger_is_worse(
                 f"{name} is bounded and sought from both sides: its worst member is not defined; "
                 'choose criterion = "mean".'
             )
-    worse = {name: both.pop() for name, both in sides.items()}
-    return worse | dict.fromkeys(CLUSTER, worse.get("spectral_radius", True))
+    return {name: both.pop() for name, both in sides.items()}
 
 
 def _problem_settings(
@@ -265,9 +272,11 @@ def _problem_settings(
 def _message(problem: DesignProblem, best: Design, ended: Ended) -> str:
     """The optimiser's own words, and which bifurcations the best design does not meet."""
     low, high = range_of(problem.scene_at(best.u), "slope")
+    ensemble = problem.ensemble
     return " ".join(
         [
             ended.message,
+            *([ensemble.words] if ensemble and ensemble.criterion == "worst" else []),
             *(
                 f"{name}: none from {low:.6g} to {high:.6g} rad."
                 for name in best.known.beyond_range

@@ -15,11 +15,18 @@ from jaxbiped.continuation._nearest_bifurcation import farthest_allowed, range_o
 from jaxbiped.dynamics._actuation import actuator_powers, hip_torques
 from jaxbiped.dynamics._push_off import push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion
-from jaxbiped.optimise import _certificate
+from jaxbiped.optimise import _certificate, _ensemble
 from jaxbiped.optimise._cycle_functionals import _totals, with_errors
 from jaxbiped.optimise._cycle_integrals import integrals_of
 from jaxbiped.optimise._design_problem import DesignProblem
-from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, _by_nominal, _together, ensemble_of
+from jaxbiped.optimise._ensemble import (
+    Ensemble,
+    GaitSettings,
+    _by_nominal,
+    _together,
+    ensemble_of,
+    with_worse_members,
+)
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._jacobian_weights import leading_multipliers, weighed
 from jaxbiped.optimise._local_model import Local
@@ -222,7 +229,8 @@ def member(speed, radius, d):
 def test_members_are_taken_together(criterion, speed, radius):
     each = [member(1.0, 0.3, 1.0), member(3.0, 0.7, 3.0)]
     larger = {"speed": False, "spectral_radius": True}
-    found = _together(Ensemble(("d",), np.ones((2, 1)), criterion, larger), each[0], each)
+    ensemble = Ensemble(("d",), np.ones((2, 1)), criterion, larger, np.zeros(1))
+    found = _together(ensemble, each[0], each)
     assert found.values == {"speed": speed, "spectral_radius": pytest.approx(radius)}
     by_d = {name: slopes[NAMES.index("d")] for name, slopes in found.slopes.items()}
     expected = (2.0, -2.0) if criterion == "mean" else (1.0, -3.0)
@@ -233,9 +241,33 @@ def test_members_are_multiples_of_the_nominal_design():
     ensemble = ensemble_of(SCENE, {"d": 0.1, "m": 0.3}, 64, "mean", {}, 0)
     assert ensemble.factors.min(axis=0) == pytest.approx([0.9, 0.7], abs=0.02)
     assert ensemble.factors.max(axis=0) == pytest.approx([1.1, 1.3], abs=0.02)
+    # The worst case is that of the box: its corners come along.
+    corners = ensemble_of(SCENE, {"d": 0.1, "m": 0.3}, 8, "worst", {}, 0).factors[8:]
+    np.testing.assert_allclose(corners, [[0.9, 0.7], [0.9, 1.3], [1.1, 0.7], [1.1, 1.3]])
     places = [NAMES.index("d"), NAMES.index("m")]
     found = _by_nominal(member(1.0, 0.3, 2.0), np.array([0.9, 1.2]), places)
     assert found.slopes["speed"][NAMES.index("d")] == pytest.approx(1.8)
+
+
+def test_a_search_in_the_box_finds_what_neither_sample_nor_corners_show(monkeypatch):
+    """−Σ (f − 1.03)² is worst, for a measure that should be small, at f = 1.03 inside the box."""
+
+    def members(ensemble, *_):
+        values = -np.sum((ensemble.factors - 1.03) ** 2, axis=1)
+        return [None if f[0] > 1.09 else member(v, 0.0, 0.0) for f, v in
+                zip(ensemble.factors, values, strict=True)]  # fmt: skip
+
+    monkeypatch.setattr(_ensemble, "evaluate_members", members)
+    ensemble = ensemble_of(SCENE, {"d": 0.08, "m": 0.1}, 8, "worst", {"speed": True}, 0)
+    found = with_worse_members(ensemble, SCENE, None, ("speed",), GaitSettings(), 0)
+    assert found.factors.shape == ensemble.factors.shape
+    np.testing.assert_allclose(found.factors[-1], 1.03, atol=0.02)
+    np.testing.assert_array_equal(found.factors[7:-1], ensemble.factors[8:])  # corners are kept
+    # A member without a gait is worse than any other.
+    wide = ensemble_of(SCENE, {"d": 0.095, "m": 0.1}, 4, "worst", {"speed": True}, 0)
+    inside = wide._replace(factors=1.0 + 0.5 * (wide.factors - 1.0))
+    lost = with_worse_members(inside, SCENE, None, ("speed",), GaitSettings(), 0)
+    assert lost.factors[-1][0] > 1.09
 
 
 def test_functionals_carry_the_change_by_the_looser_solve():
