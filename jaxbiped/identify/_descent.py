@@ -212,10 +212,10 @@ class Descent:
         limits = np.stack([self.variables(each) for each in self.limits])
         square = float(np.sum(residuals**2)) + _WITHIN**2
 
+        known = residuals, slopes * used
         if not follow:
             low, high = (
-                linear_step(residuals, slopes * used, square, which, sign, limits - at)[which]
-                for sign in (-1.0, 1.0)
+                linear_step(*known, square, which, sign, limits - at)[which] for sign in (-1.0, 1.0)
             )
             return at[which] + low, at[which] + high
 
@@ -224,5 +224,5 @@ class Descent:
                 return None
             return self.residuals(variables), self.slopes(variables) * used
 
-        low, high = (interval_end(model, at, square, which, s, limits) for s in (-1.0, 1.0))
+        low, high = (interval_end(model, at, known, square, which, s, limits) for s in (-1.0, 1.0))
         return low, high

@@ -27,13 +27,19 @@ Model = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray] | None]
 
 
 def interval_end(
-    model: Model, at: np.ndarray, square: float, which: int, sign: float, limits: np.ndarray
+    model: Model,
+    at: np.ndarray,
+    known: tuple[np.ndarray, np.ndarray],
+    square: float,
+    which: int,
+    sign: float,
+    limits: np.ndarray,
 ) -> float:
     """The farthest value of a variable for which the sum of squares need not exceed `square`.
 
     Args:
         model: the fit.
-        at: where the fit ended, shape (k,).
+        at, known: where the fit ended, shape (k,), and the model there.
         square: sum of squares at the end.
         which: the variable.
         sign: 1 for the upper end, −1 for the lower.
@@ -42,10 +48,9 @@ def interval_end(
     Returns:
         The end, infinite where none is found.
     """
-    here, known, farthest = at, model(at), 0.0
+    here, farthest = at, 0.0
     near = np.clip(limits, at - _FAR, at + _FAR)
     for _ in range(_MOST):
-        assert known is not None
         room = np.clip(near - here, -_REACH, _REACH)
         step = linear_step(*known, square, which, sign, room)
         ahead = here[which] + step[which]
@@ -54,8 +59,9 @@ def interval_end(
         if ahead in limits[:, which] or abs(step[which]) <= _SHARE * farthest:
             return float(ahead)
         for _ in range(_HALVINGS):
-            known = model(here + step)
-            if known is not None:
+            there = model(here + step)
+            if there is not None:
+                known = there
                 break
             step = 0.5 * step
         else:  # the gait, or the walker, ends before the interval does
