@@ -1,5 +1,7 @@
 """Descent of a fit: from predictions of measured gaits to estimates and their intervals."""
 
+from typing import TypeAlias
+
 import numpy as np
 from jaxtyping import PyTree
 from tqdm import tqdm
@@ -15,8 +17,15 @@ _WITHIN = 1.959963984540054
 """Standard errors to each end of a 95 % interval."""
 _LINEAR = 0.02
 """Standard error of every parameter, in units of its size, up to which a model counts as linear."""
+UNLIKELY = 1e-3
+"""Probability of chi squared below which a fit is said not to fit."""
+_STARTS, _ABOUT = 8, float(np.log(3.0))
+"""Starts that are tried beside a fit's own, and how far from it."""
 _FITS = 3
 """Descents, at most: a better fit that an interval's end comes upon begins another."""
+
+Best: TypeAlias = tuple[float, np.ndarray, list[Prediction]]
+"""Sum of squares, variables and predictions."""
 
 
 class Descent:
@@ -39,35 +48,67 @@ class Descent:
         self.how = dict(accuracy=accuracy, engine=engine)
         self.values = np.concatenate([gait.values for gait in measured])
         self.deviations = np.concatenate([gait.deviations for gait in measured])
-        self.best: tuple[float, np.ndarray, list[Prediction]] | None = None
+        self.best: Best | None = None
         self.last: tuple[np.ndarray, list[Prediction] | None] | None = None
         self.evaluations, self.searching = 0, True
 
     def run(self, most: int) -> GaitFit:
-        """Minimises; tells what was found."""
-        if self.predictions(np.zeros(len(self.names))) is None:
+        """Minimises; tells what was found.
+
+        If the start has no gait, or ends where the model does not fit, others about it are tried.
+        """
+        try:
+            fit = self.settled(np.zeros(len(self.names)), most)
+            if fit.ending is FitEnding.NO_GAIT or fit.p_value < UNLIKELY:
+                for begin in self.others():
+                    self.best = begin
+                    other = self.settled(begin[1], most)
+                    fit = fit if fit.chi_squared <= other.chi_squared else other
+                    if not fit.p_value < UNLIKELY:
+                        break
+        except KeyboardInterrupt:
+            return self.described(FitEnding.INTERRUPTED)
+        return fit._replace(evaluations=self.evaluations)
+
+    def settled(self, begin: np.ndarray, most: int) -> GaitFit:
+        """The fit from a start on; a better one that an interval comes upon is gone on from."""
+        if self.predictions(begin) is None:
             return self.described(FitEnding.NO_GAIT)
         for _ in range(_FITS):
-            ending = FitEnding.INTERRUPTED
-            try:
-                ending = self.minimise(most)
-                best = self.best
-                fit = self.described(ending)
-            except KeyboardInterrupt:
-                return self.described(FitEnding.INTERRUPTED)
+            ending = self.minimise(begin, most)
+            best = self.best
+            fit = self.described(ending)
             if self.best is best or ending is not FitEnding.CONVERGED:
                 break
+            assert self.best is not None
+            begin = self.best[1]
         return fit
 
-    def minimise(self, most: int) -> FitEnding:
-        """Descends from the best that is known."""
+    def others(self) -> list[Best]:
+        """Starts within a factor of three, or within the bounds, the best first.
+
+        Their gaits are searched from nothing: the first start may have led to others.
+        """
+        from scipy.stats import qmc
+
+        low, high = map(self.variables, self.limits)
+        low, high = np.maximum(low, -_ABOUT), np.minimum(high, _ABOUT)
+        found: list[Best | None] = []
         self.searching = True
+        for start in qmc.scale(qmc.Sobol(len(low), seed=0).random(_STARTS), low, high):
+            self.best = None
+            self.predictions(start)
+            found.append(self.best)
+        return sorted((each for each in found if each is not None), key=lambda each: each[0])
+
+    def minimise(self, begin: np.ndarray, most: int) -> FitEnding:
+        """Descends."""
         from scipy.optimize import least_squares
 
-        assert self.best is not None
+        self.searching = True
         found = least_squares(
             self.residuals,
-            self.best[1],
+            begin,
             self.slopes,
             bounds=tuple(map(self.variables, self.limits)),
             max_nfev=most,

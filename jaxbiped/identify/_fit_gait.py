@@ -8,7 +8,7 @@ import numpy as np
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_finite, check_type
-from jaxbiped.identify._descent import Descent
+from jaxbiped.identify._descent import UNLIKELY, Descent
 from jaxbiped.identify._gait_fit import FitEnding, GaitFit
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene
@@ -17,9 +17,6 @@ from jaxbiped.scene._parameters import parameter_names, parameter_values, with_p
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
-
-_UNLIKELY = 1e-3
-"""Probability of chi squared below which a fit is said not to fit."""
 
 
 def fit_gait(
@@ -79,7 +76,7 @@ def fit_gait(
     bar = tqdm(total=max_evaluations, unit="scenes", disable=not progress)
     with bar:
         fit = Descent(scene, bounds, gaits, accuracy, engine, bar).run(int(max_evaluations))
-    if fit.ending is FitEnding.CONVERGED and fit.p_value < _UNLIKELY:
+    if fit.ending is FitEnding.CONVERGED and fit.p_value < UNLIKELY:
         warnings.warn(
             f"the model does not fit the data: chi squared is {fit.chi_squared:.3g} at "
             f"{fit.freedom} degrees of freedom (p = {fit.p_value:.1g}), so that standard errors "

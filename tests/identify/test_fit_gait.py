@@ -49,6 +49,15 @@ def test_the_truth_is_found_from_afar(rigid, gaits):
     assert fit.freedom == 2
 
 
+@pytest.mark.parametrize("shares", [(0.5, 0.5), (0.5, 1.5), (1.5, 0.5), (1.5, 1.5)])
+def test_the_truth_is_found_from_half_as_much_off(rigid, gaits, shares):
+    """From (0.5, 1.5) the start's own gait leads to others, which fit 1,000 deviations off."""
+    truth = {name: float(jb.parameter_values(rigid)[name]) for name in ("J", "d")}
+    start = {name: share * truth[name] for name, share in zip(truth, shares, strict=True)}
+    fit = jb.fit_gait(jb.with_parameters(rigid, start), ("J", "d"), _measured(gaits))
+    assert fit.estimates == pytest.approx(truth, rel=1e-6)
+
+
 def test_standard_errors_are_those_of_refitted_data(rigid, gaits):
     """The linear propagation of errors against a derivative of the estimates themselves."""
     step = 0.1
