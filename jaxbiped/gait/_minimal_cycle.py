@@ -8,7 +8,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped._types import Scalar, by_numpy
+from jaxbiped._types import RealScalarLike, Scalar, by_numpy
 from jaxbiped.gait._fixed_point_search import Found
 from jaxbiped.gait._poincare_map import LinearisedReturn
 
@@ -16,7 +16,7 @@ _ERRORS, _TOLERANCES = 4.0, 30.0
 """Distance of two crossings that are one: in units of the fixed point's error, and of rtol."""
 
 
-def minimal_cycle(last: LinearisedReturn, error: Scalar, rtol: Scalar | float) -> Scalar:
+def minimal_cycle(last: LinearisedReturn, error: Scalar, rtol: RealScalarLike) -> Scalar:
     """The least divisor k of n such that the crossing after k footsteps is the first one.
 
     Args:

@@ -182,9 +182,8 @@ def _slope_errors(last: LinearisedReturn, slopes: Slopes, looser: Slopes) -> Slo
     terms without their signs.
     """
     m = last.recurring.shape[0]
-    by_state, by_parameter = (jnp.abs(part) for part in jnp.split(last.jacobian, [m], axis=1))
     inverse = jnp.abs(solve(jnp.eye(m) - last.jacobian[:, :m], jnp.eye(m)))
-    recurring = inverse @ by_parameter
+    recurring = inverse @ jnp.abs(last.jacobian[:, m:])
 
     def total(rows: Scalar) -> Scalar:
         return jnp.abs(rows[..., m:]) + jnp.abs(rows[..., :m]) @ recurring

@@ -26,8 +26,8 @@ from jaxbiped.variational._solve_to_section import (
     SectionArrival,
     solve_to_section,
 )
-from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
+from jaxbiped.variational._watch import Watch
 
 STATE_FLOOR = 0.1
 """Size below which errors of derivatives with respect to the state are absolute, in the scene's

@@ -13,7 +13,7 @@ from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._redundant_scene import RedundantScene
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.variational._hybrid_system import AbstractSystem, RedundantWalking, system_of
-from jaxbiped.variational._switch_locator import Watch
+from jaxbiped.variational._watch import Watch
 
 _PATIENCE = 50.0
 """Time allowed to the next arrival, in units of √(l/g)."""

@@ -69,12 +69,13 @@ def basin(
         data: Any = labels
         labels, cycle_footsteps, gait = data.label, data.cycle_footsteps, data.gait
     if hasattr(labels, "dims"):
-        along = _axes_of(labels, x, y, names)
+        known: Any = labels
+        along = _axes_of(known, x, y, names)
         names = along if names is None else names
-        x, y = (labels[n] if c is None else c for n, c in zip(along, (x, y), strict=True))
+        x, y = (known[n] if c is None else c for n, c in zip(along, (x, y), strict=True))
+        parts: tuple[Any, ...] = (known, cycle_footsteps, gait)
         labels, cycle_footsteps, gait = (
-            each.transpose(*along[::-1]) if hasattr(each, "dims") else each
-            for each in (labels, cycle_footsteps, gait)
+            each.transpose(*along[::-1]) if hasattr(each, "dims") else each for each in parts
         )
     if x is None or y is None or names is None:
         raise ArgumentError("x, y and names are needed: these labels do not know their axes.")

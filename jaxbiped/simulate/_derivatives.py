@@ -17,6 +17,7 @@ import numpy as np
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import PyTree
 
+from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
 from jaxbiped._jax_versions import untraced
 from jaxbiped._types import Scalar
@@ -87,7 +88,7 @@ def _refuse(primals: object, tangents: object) -> NoReturn:
     )
 
 
-@jax.jit
+@cached_jit
 def _contract(
     slopes: Slopes, along: list[Scalar], clock: Scalar | float = 0.0
 ) -> tuple[Scalar, list[Scalar]]:

@@ -17,11 +17,11 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.simulate._slopes import LOOSER, Slopes
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._ending import FALL_ANGLE
-from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
 from jaxbiped.variational._event_motion import EventMotion, follow_event
-from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Tangents, along_columns, as_columns
 from jaxbiped.variational._tangents_at_times import seeded_directions, tangents_after
+from jaxbiped.variational._watch import Watch
 
 _WATCH = Watch(field=rolling_field, switches=lambda args, y: ())
 
@@ -62,7 +62,7 @@ def rigid_slopes_of(
     """
     scene, state = jtu.tree_map(lambda leaf: jnp.asarray(leaf, jnp.float64), (scene, state))
     start, seeded = seeded_directions(scene, state, places, active)
-    precision, solver = Precision(rtol, LOOSER * rtol), solver_named("rodas5p")
+    precision, solver = Precision(rtol, LOOSER * rtol), Rodas5P()
     unit = jnp.sqrt(scene.walker.l / scene.ground.g)
     n = len(places) + len(active)
 

@@ -248,6 +248,7 @@ def _slopes(
     # The columns take the walk's own method of steps, where that is one for them.
     solver = run.solver if isinstance(run.solver, AbstractRosenbrock) else solver_named("rodas4p")
     assert isinstance(solver, AbstractRosenbrock)
+    assert isinstance(run.scene, Scene)
     return slopes_of(
         run.scene,
         run.state,

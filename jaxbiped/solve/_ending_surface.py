@@ -32,7 +32,8 @@ def ending_surface(code: Scalar, scene: PyTree, end: PyTree, y: PyTree) -> Scala
         end: a state just past the ending, which decides between causes of the same code.
         y: the state of which the value is wanted.
     """
-    minimal, past = minimal_state(scene, y), minimal_state(scene, end)
+    minimal: PyTree = minimal_state(scene, y)
+    past: PyTree = minimal_state(scene, end)
     both = feet(scene, y)
     held = [_contact(scene, foot, rate) for foot, rate in zip(both, _rates(minimal), strict=True)]
     feet_then = feet(scene, end)

@@ -9,10 +9,10 @@ from jaxbiped.compiler import Recorded, Recording
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import Nodes, SectionArrival
-from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents
 from jaxbiped.variational._variational_solve import solve_variational
 from jaxbiped.variational._variational_types import VariationalSolution
+from jaxbiped.variational._watch import Watch
 
 
 def solve_to_section_by_lanes(

@@ -15,7 +15,7 @@ from jaxbiped.compiler import Recorded, Recording
 from jaxbiped.solve._accuracy import Precision, rms_norm
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._step_control import first_step, step_control
-from jaxbiped.variational._switch_locator import SwitchLocator, SwitchLocatorState, Watch
+from jaxbiped.variational._switch_locator import SwitchLocator, SwitchLocatorState
 from jaxbiped.variational._tangent_solver import (
     TangentControl,
     TangentSolver,
@@ -30,6 +30,7 @@ from jaxbiped.variational._tangents import (
     plain_args,
     plain_state,
 )
+from jaxbiped.variational._watch import Watch
 
 Along: TypeAlias = Callable[
     [Callable[[PyTree, PyTree], PyTree], Tangents, Seeded], tuple[PyTree, PyTree]

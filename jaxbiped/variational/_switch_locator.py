@@ -4,55 +4,31 @@ A step across a switch would ruin derivatives long before the state shows it.
 """
 
 import functools
-from collections.abc import Callable
 from typing import Any, NamedTuple, cast
 
 import diffrax
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
-from jaxbiped.dynamics._switches import Switch
+from jaxbiped._types import RealScalarLike, Scalar, Time
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_cubic import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
 from jaxbiped.variational._grazing import turns_of
 from jaxbiped.variational._tangents import plain_args, plain_state
+from jaxbiped.variational._watch import Watch, surfaces_of
 
 _OVERSHOOT = 1e-4
 """Largest part of a step that may lie past a switch."""
 MARGIN = 1e-12
 """Time past a switch [s] that a step may always end, and aims at: the side must be beyond doubt."""
-_ROUNDING = 1e-12
 NEAR = 1e-9
 """Longest step [s] that crosses a switch where the field itself is not smooth: longer ones end
 before it, for a step's last stage lies on the other side, where the Jacobian may be any size."""
 _BEFORE = 1e-3
 """How far before, as a share of the way to it."""
-
-
-class Watch(eqx.Module):
-    """What a solve ends steps on, and what ends it. All functions take (args, state).
-
-    Attributes:
-        field: vector field (t, state, args).
-        switches: the surfaces that no step may straddle.
-        section: value and whether a crossing counts; the solve ends where the value rises through
-            zero and it does. None: nothing to arrive at.
-        ending: code of the failure that ends the solve, 0 for none.
-        peak: a quantity whose largest value is to be known.
-    """
-
-    field: VectorField = eqx.field(static=True)
-    switches: Callable[[PyTree, PyTree], tuple[Switch, ...]] = eqx.field(static=True)
-    section: Callable[[PyTree, PyTree], tuple[Scalar, Scalar]] | None = eqx.field(
-        static=True, default=None
-    )
-    ending: Callable[[PyTree, PyTree], Scalar] | None = eqx.field(static=True, default=None)
-    peak: Callable[[PyTree, PyTree], PyTree] | None = eqx.field(static=True, default=None)
 
 
 class SwitchLocatorState(NamedTuple):
@@ -181,7 +157,7 @@ class SwitchLocator(AbstractWrappedControl):
         Or before a switch comes so near zero that it may be crossed twice in this step.
         """
         watch = self.watch
-        surfaces = functools.partial(_surfaces, watch, landed.peak, scene)
+        surfaces = functools.partial(surfaces_of, watch, landed.peak, scene)
         at_start, at_end = surfaces(before), surfaces(after)
         crossed = [
             ((a.value > 0.0) != (b.value > 0.0)) & (a.live | b.live)
@@ -299,17 +275,3 @@ class _Crossed(NamedTuple):
     def field(self) -> Scalar:
         """Whether the first of the surfaces is a switch where the field itself is not smooth."""
         return self.which > 0
-
-
-def _surfaces(watch: Watch, peak: PyTree, scene: PyTree, state: PyTree) -> list[Switch]:
-    """Every surface to end steps on: switches, the peak quantity's maxima, and last the section."""
-    found = list(watch.switches(scene, state))
-    if watch.peak is not None:
-        rate = watch.field(jnp.zeros_like(peak), state, scene)
-        quantity = functools.partial(watch.peak, scene)
-        value, slope = jax.jvp(quantity, (state,), (rate,))
-        # The same value computed twice may differ by its rounding.
-        found.append(Switch(slope, value >= peak - _ROUNDING * jnp.abs(peak)))
-    if watch.section is not None:
-        found.append(Switch(*watch.section(scene, state)))
-    return found

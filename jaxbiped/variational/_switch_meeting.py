@@ -1,5 +1,6 @@
 """Meeting of motions at a switch: derivatives at the moment at which each of them passes it."""
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax
@@ -8,8 +9,8 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
+from jaxbiped.variational._watch import Watch
 
 
 class SwitchMeeting(NamedTuple):
@@ -53,3 +54,38 @@ def meeting_at(watch: Watch, state: PyTree, args: Seeded, which: Scalar) -> Swit
     inverse = 1.0 / jnp.where(rate == 0.0, jnp.finfo(rate.dtype).tiny, rate)
     along = jnp.stack(by_parameter) if q else jnp.zeros(0, rate.dtype)
     return SwitchMeeting(normal * inverse, along * inverse, rates)
+
+
+def meet(
+    meeting: SwitchMeeting, columns: Sequence[Scalar], shifts: Sequence[Scalar], sizes: Scalar
+) -> tuple[list[Scalar], tuple[Scalar, ...]]:
+    """Columns and shifts at the switch: of directions of the state, and of p parameters' `sizes`."""
+
+    def follow(column: Scalar, shift: Scalar, forcing: Scalar) -> tuple[Scalar, Scalar]:
+        later = -(jnp.sum(meeting.by_state * column) + forcing)
+        return column + meeting.rates * later, shift + later
+
+    forcings = jnp.zeros(len(columns[0])), meeting.by_parameter * sizes
+    parts = zip(columns, shifts, forcings, strict=True)
+    both = [_along_rows(follow, *part) if len(part[0]) else part[:2] for part in parts]
+    met, later = zip(*both, strict=True)
+    return list(met), later
+
+
+def at_fixed_time(
+    rates: PyTree, columns: Sequence[Scalar], shifts: Sequence[Scalar]
+) -> list[Scalar]:
+    """Columns at a fixed time where the state changes at these rates."""
+    velocity = jnp.stack(jtu.tree_leaves(rates))
+    pairs = zip(columns, shifts, strict=True)
+    return [
+        _along_rows(lambda column, shift: column - velocity * shift, *pair)
+        if len(pair[0])
+        else pair[0]
+        for pair in pairs
+    ]
+
+
+def _along_rows(function: Callable[..., PyTree], *rows: Scalar) -> PyTree:
+    """A function of rows, one after the other."""
+    return jax.lax.map(lambda each: function(*each), rows)

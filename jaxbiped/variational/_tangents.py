@@ -70,6 +70,23 @@ def along_columns(
     return jax.vmap(along, in_axes=-1, out_axes=(None, 0))(y.columns, args.seeds)
 
 
+def along_columns_in_turn(
+    function: Callable[[PyTree, PyTree], PyTree], y: Tangents, args: Seeded
+) -> tuple[PyTree, PyTree]:
+    """`along_columns`, one column after the other."""
+    state, structure = jtu.tree_flatten(y.state)
+
+    def of_leaves(state: list[Scalar], parameters: list[Scalar]) -> PyTree:
+        return function(jtu.tree_unflatten(structure, state), with_active(args, parameters))
+
+    def along(each: tuple[Scalar, Scalar]) -> PyTree:
+        tangents = tuple([part[i] for i in range(part.shape[0])] for part in each)
+        return jax.jvp(of_leaves, (state, active_leaves(args)), tangents)[1]
+
+    found = jax.lax.map(along, (y.columns.T, args.seeds.T))
+    return of_leaves(state, active_leaves(args)), found
+
+
 def as_columns(tangents: PyTree) -> Scalar:
     """Derivatives with leaves of shape (n,) as one matrix of shape (c, n)."""
     return jnp.stack(jtu.tree_leaves(tangents))

@@ -12,9 +12,9 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents
 from jaxbiped.variational._variational_solve import solve_variational
+from jaxbiped.variational._watch import Watch
 
 _FLOOR = 1e-4
 """Size below which a derivative's error is absolute, along a direction of its own size."""

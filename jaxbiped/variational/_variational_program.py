@@ -4,7 +4,6 @@ The twin for lanes of what `_solve_to_section` does through diffrax.
 """
 
 import dataclasses
-from collections.abc import Callable
 from typing import NamedTuple
 
 import diffrax
@@ -22,11 +21,17 @@ from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._column_step import Differentiated, column_step, differentiate_step
 from jaxbiped.variational._solve_to_section import onto_section, peak_of
-from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState, Watch
-from jaxbiped.variational._switch_meeting import has_field_switches, meeting_at
+from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState
+from jaxbiped.variational._switch_meeting import (
+    at_fixed_time,
+    has_field_switches,
+    meet,
+    meeting_at,
+)
 from jaxbiped.variational._tangent_solver import SHARE
-from jaxbiped.variational._tangents import Seeded, Tangents, active_leaves, with_active
+from jaxbiped.variational._tangents import Seeded, Tangents, along_columns_in_turn
 from jaxbiped.variational._variational_types import VariationalProblem, VariationalSolution
+from jaxbiped.variational._watch import Watch
 
 
 class _Now(NamedTuple):
@@ -164,12 +169,12 @@ class AdaptiveColumns:
         time_columns, peak = jnp.zeros(columns.shape[1]), jnp.zeros(())
         peak_columns = time_columns
         if self.watch.section is not None:
-            y, t, time_columns = onto_section(self.watch, y, t, seeded, _along_columns_in_turn)
+            y, t, time_columns = onto_section(self.watch, y, t, seeded, along_columns_in_turn)
         if self.watch.peak is not None:
             at_peak = now.landed.at_peak
             peaks = self._at_fixed_time(given, at_peak, now.peak_columns, now.peak_shifts)
             highest = Tangents(at_peak, jnp.concatenate(peaks).T)
-            peak, peak_columns = peak_of(self.watch, highest, seeded, _along_columns_in_turn)
+            peak, peak_columns = peak_of(self.watch, highest, seeded, along_columns_in_turn)
             peak_columns = jnp.where(now.landed.peak_saltation_pending, jnp.nan, peak_columns)
         return VariationalSolution(
             t=t,
@@ -194,16 +199,7 @@ class AdaptiveColumns:
 
         def met() -> tuple[list[Scalar], tuple[Scalar, ...]]:
             meeting = meeting_at(self.watch, now.state, self._seeded(given), which)
-
-            def meet(column: Scalar, shift: Scalar, forcing: Scalar) -> tuple[Scalar, Scalar]:
-                later = -(jnp.sum(meeting.by_state * column) + forcing)
-                return column + meeting.rates * later, shift + later
-
-            forcings = jnp.zeros(len(stepped[0])), meeting.by_parameter * given.sizes
-            parts = zip(now.columns, now.shifts, forcings, strict=True)
-            both = [_along_rows(meet, *part) for part in parts]
-            columns, shifts = zip(*both, strict=True)
-            return list(columns), shifts
+            return meet(meeting, now.columns, now.shifts, given.sizes)
 
         found: tuple[list[Scalar], tuple[Scalar, ...]] = jax.lax.cond(
             which > 0, met, lambda: (stepped, now.shifts)
@@ -217,13 +213,7 @@ class AdaptiveColumns:
         columns: tuple[Scalar, ...],
         shifts: tuple[Scalar, ...],
     ) -> list[Scalar]:
-        rates = self.watch.field(jnp.zeros(()), state, given.args)
-        velocity = jnp.stack(jtu.tree_leaves(rates))
-
-        def fix(column: Scalar, shift: Scalar) -> Scalar:
-            return column - velocity * shift
-
-        return [_along_rows(fix, *pair) for pair in zip(columns, shifts, strict=True)]
+        return at_fixed_time(self.watch.field(jnp.zeros(()), state, given.args), columns, shifts)
 
     def _seeded(self, given: VariationalProblem) -> Seeded:
         m, p = given.by_state.shape[0], given.by_parameter.shape[0]
@@ -295,13 +285,6 @@ class AdaptiveColumns:
         return SwitchLocator(control, self.watch)
 
 
-def _along_rows(function: Callable[..., PyTree], rows: Scalar, *more: Scalar) -> PyTree:
-    """A function of rows, one after the other; without any it is as many as it has results."""
-    if not rows.shape[0]:
-        return (rows, *more[:1]) if len(more) > 1 else rows
-    return jax.lax.map(lambda each: function(*each), (rows, *more))
-
-
 def _select(keep: Scalar, new: Scalar, old: Scalar) -> Scalar:
     return jax.lax.map(lambda each: jnp.where(keep, *each), (new, old))
 
@@ -310,20 +293,3 @@ def _row(
     keep: Scalar, highest: Scalar, new: Scalar, old: Scalar, peak: Scalar
 ) -> tuple[Scalar, Scalar]:
     return jnp.where(keep, new, old), jnp.where(highest, new, peak)
-
-
-def _along_columns_in_turn(
-    function: Callable[[PyTree, PyTree], PyTree], y: Tangents, args: Seeded
-) -> tuple[PyTree, PyTree]:
-    """`along_columns`, one column after the other."""
-    state, structure = jtu.tree_flatten(y.state)
-
-    def of_leaves(state: list[Scalar], parameters: list[Scalar]) -> PyTree:
-        return function(jtu.tree_unflatten(structure, state), with_active(args, parameters))
-
-    def along(each: tuple[Scalar, Scalar]) -> PyTree:
-        tangents = tuple([part[i] for i in range(part.shape[0])] for part in each)
-        return jax.jvp(of_leaves, (state, active_leaves(args)), tangents)[1]
-
-    found = jax.lax.map(along, (y.columns.T, args.seeds.T))
-    return of_leaves(state, active_leaves(args)), found

@@ -10,10 +10,10 @@ from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._switch_locator import Watch
 from jaxbiped.variational._tangents import Seeded, Tangents
 from jaxbiped.variational._variational_program import AdaptiveColumns
 from jaxbiped.variational._variational_types import VariationalProblem, VariationalSolution
+from jaxbiped.variational._watch import Watch
 
 _QUICK = 50_000
 """Attempted steps that take less than a second."""

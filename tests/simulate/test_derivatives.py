@@ -102,11 +102,6 @@ ENDS = {
     "stumbled": (HELD, TRIPS, -1.7282, dict(duration=9.0)),
     "arrivals": (SEED, START, RATE, dict(duration=0.9, save=jb.HeelStrike())),
     "times": (SEED, START, RATE, dict(duration=0.9, save=TIMES)),
-        jb.seed_scene(),
-        jb.seed_state(),
-        RATE,
-        dict(duration=0.9, save=jnp.array([0.2, 0.9])),
-    ),
 }
 
 

@@ -17,9 +17,10 @@ from jaxbiped.variational._hybrid_system import RedundantWalking, Rolling, Walki
 from jaxbiped.variational._radau_collocation import RADAU, KnownStep
 from jaxbiped.variational._saltation import saltation_at
 from jaxbiped.variational._section_tangents import after_reset, on_section, tangent_on_section
-from jaxbiped.variational._switch_locator import SwitchLocator, Watch
+from jaxbiped.variational._switch_locator import SwitchLocator
 from jaxbiped.variational._tangent_solver import TangentSolver, VariationalField
 from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._watch import Watch
 
 BEFORE, AFTER = -9.8, 14.0
 """Accelerations above the level and below [m/s²]."""

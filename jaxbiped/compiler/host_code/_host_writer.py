@@ -189,14 +189,10 @@ class HostWriter:
             )
         text = form.format(*map(self.text, inputs))
         block = self._block_for(inputs)
-        known = self._known(block, text)
-        if known is None:
-            return self._add(block, text, results)
-        # The same text may stand for fewer or for more entries than it holds.
-        return tuple(
-            each if each.shape == tuple(shape) else dataclasses.replace(each, shape=tuple(shape))
-            for each, (shape, _, _) in zip(known, results, strict=True)
-        )
+        known = self._known(block, text) or self._add(block, text, results)
+        # The same text may stand for other shapes than where it was written first.
+        shapes = (tuple(shape) for shape, *_ in results)
+        return tuple(dataclasses.replace(k, shape=s) for k, s in zip(known, shapes, strict=True))
 
     def full(self, value: Value) -> Value:
         """The same, held in its whole shape."""
