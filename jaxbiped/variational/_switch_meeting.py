@@ -59,7 +59,7 @@ def meeting_at(watch: Watch, state: PyTree, args: Seeded, which: Scalar) -> Swit
 def meet(
     meeting: SwitchMeeting, columns: Sequence[Scalar], shifts: Sequence[Scalar], sizes: Scalar
 ) -> tuple[list[Scalar], tuple[Scalar, ...]]:
-    """Columns and shifts at the switch: of directions of the state, and of p parameters' `sizes`."""
+    """Columns and shifts at the switch; the last p columns move parameters by their `sizes`."""
 
     def follow(column: Scalar, shift: Scalar, forcing: Scalar) -> tuple[Scalar, Scalar]:
         later = -(jnp.sum(meeting.by_state * column) + forcing)
