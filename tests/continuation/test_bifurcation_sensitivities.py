@@ -20,7 +20,13 @@ def _followed(scene, kind, bounds):
 @pytest.mark.parametrize(
     ("scene", "kind", "bounds", "names"),
     [
-        (jb.seed_scene(slope=0.0105), BranchEvent.FOLD, (0.009, 0.0108), ("r", "K", "mu_kinetic")),
+        pytest.param(
+            jb.seed_scene(slope=0.0105),
+            BranchEvent.FOLD,
+            (0.009, 0.0108),
+            ("r", "K", "mu_kinetic"),
+            marks=pytest.mark.nightly,
+        ),
         (
             jb.with_parameters(RIGID, {"slope": 0.098}),
             BranchEvent.PERIOD_DOUBLING,

@@ -32,6 +32,7 @@ def gaits():
     return minimal, redundant
 
 
+@pytest.mark.nightly
 def test_gait_multipliers_and_sensitivities_agree(gaits):
     minimal, redundant = gaits
     assert redundant.outcome is jb.gait.Search.FOUND
@@ -51,6 +52,7 @@ def test_gait_multipliers_and_sensitivities_agree(gaits):
         np.testing.assert_allclose(ours, expected, rtol=1e-5)
 
 
+@pytest.mark.nightly
 def test_orbit_is_told_in_minimal_coordinates(gaits):
     _, redundant = gaits
     times, states = redundant.orbit
@@ -84,6 +86,7 @@ def test_measures_differentiate_in_both_modes(gaits, monkeypatch):
         assert float(along[1]) == pytest.approx(float(getattr(modelled, name)), rel=1e-9)
 
 
+@pytest.mark.nightly
 def test_the_command_finds_it_too(gaits, monkeypatch, tmp_path, capsys):
     """From the seed's start; the same search, told and written as any gait is."""
     minimal, _ = gaits

@@ -71,7 +71,7 @@ def evaluation(scene, names, guess=None, accuracy="balanced"):
 @pytest.mark.parametrize(
     "which",
     [
-        "rigid",
+        pytest.param("rigid", marks=pytest.mark.nightly),
         pytest.param("stribeck", marks=pytest.mark.nightly),
         pytest.param("heavy hip", marks=pytest.mark.nightly),
         *DRIVEN,

@@ -55,6 +55,7 @@ def long_walks():
     return {name: walks(name) for name in ("standard", "augmented", "described")}
 
 
+@pytest.mark.nightly
 def test_drift_over_a_hundred_footsteps(long_walks):
     """The standard method's grows with time; a penalty bounds it; a projection leaves none."""
     ten, hundred = (
@@ -67,6 +68,7 @@ def test_drift_over_a_hundred_footsteps(long_walks):
     assert hundred["described"] < 1e-12
 
 
+@pytest.mark.nightly
 def test_all_walk_at_the_minimal_ones_pace(long_walks):
     truth = jb.simulate(jb.seed_scene(), jb.seed_state(), duration=HUNDRED, save="end").final
     for walks in long_walks.values():
