@@ -61,10 +61,19 @@ class LocatedEnding(AbstractWrappedControl):
         start, span = jnp.asarray(t0), jnp.asarray(t1 - t0)
         walked = jnp.asarray(result != diffrax.RESULTS.successful)
         probe = y1_candidate if self.probe is None else self.probe
-        ends = keep & (walked | (self._failure(t1, probe, args) != int(Ending.WALKING)))
+        failures = {
+            name: happens
+            for name, happens in ending_events(self.watch).items()
+            if name != Ending.SOLVER_FAILED
+        }
+        ends = keep & walked
+        for happens in failures.values():
+            ends = ends | (keep & jnp.asarray(happens(t1, probe, args)))
 
         def part_before() -> Scalar:
-            code = self._failure(t1, y1_candidate, args)
+            code = jnp.asarray(int(Ending.WALKING))
+            for name, happens in failures.items():
+                code = jnp.where(happens(t1, y1_candidate, args), int(name), code)
             before, after = (
                 ending_surface(code, args, y1_candidate, y) for y in (y0, y1_candidate)
             )
@@ -80,11 +89,3 @@ class LocatedEnding(AbstractWrappedControl):
         result = diffrax.RESULTS.where(again, diffrax.RESULTS.successful, result)
         next_t0, next_t1 = jnp.where(again, t0, next_t0), jnp.where(again, target, next_t1)
         return keep & ~again, next_t0, next_t1, jump, inner, result
-
-    def _failure(self, t: Time, y: PyTree, args: PyTree) -> Scalar:
-        """Code of the failure that has come to a state, that of "walking" where none has."""
-        code = jnp.asarray(int(Ending.WALKING))
-        for name, happens in ending_events(self.watch).items():
-            if name != Ending.SOLVER_FAILED:
-                code = jnp.where(happens(t, y, args), int(name), code)
-        return code
