@@ -177,6 +177,21 @@ def check_unbatched(name: str, value: object, one: str = "one number") -> None:
             )
 
 
+def check_increasing(name: str, value: object, least: int) -> None:
+    """Raises `ArgumentError` unless a list of at least so many finite numbers never decreases."""
+    import numpy as np
+
+    if _is_traced(value):
+        return
+    values = _numbers(name, value)
+    known = values.ndim == 1 and len(values) >= least and bool(np.all(np.isfinite(values)))
+    if not known or np.any(np.diff(values) < 0.0):
+        raise ArgumentError(
+            f"{name} = {np.array2string(values, threshold=8)} is not allowed: it must be a list of "
+            f"{least} or more increasing numbers."
+        )
+
+
 def check_at_least(name: str, value: object, bound_name: str, bound: object) -> None:
     """Raises `ArgumentError` unless `value >= bound` in every entry.
 

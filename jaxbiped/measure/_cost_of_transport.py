@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._checks import ArgumentError, check_increasing, check_type
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._energy import energies, powers
 from jaxbiped.dynamics._redundant_state import EulerState, RedundantState, minimal_state
@@ -60,8 +60,8 @@ def cost_of_transport(
         The cost of each stretch with what it is made of, leaves of shape (n,).
 
     Raises:
-        ArgumentError: a walk of another kind than the scene, times with a rigid walk, or a rigid
-            walk that kept fewer than two heel strikes.
+        ArgumentError: a walk of another kind than the scene, times that do not increase, or with a
+            rigid walk, or a rigid walk that kept fewer than two heel strikes.
         ValueError: a trajectory without its continuous solution, or a batch of them.
 
     Examples:
@@ -87,6 +87,8 @@ def cost_of_transport(
         check_type("walk", walk, Trajectory)
         check_type("walk.state", walk.state, State, BristleState, RedundantState, EulerState)
         check_scene_of(walk, scene, "walk")
+        if times is not None:
+            check_increasing("times", times, 2)
         ends = heel_strikes(scene, walk).time_s if times is None else np.asarray(times)
         distance, gravity, motors = _compliant(scene, walk, ends)
     return CostOfTransport((motors + gravity) / (weight * distance), motors, gravity, distance)

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxbiped._checks import check_increasing
 from jaxbiped.dynamics._energy import energies, powers
 from jaxbiped.measure._samples import evaluate_at, sample
 from jaxbiped.scene._scene import Scene
@@ -54,6 +55,7 @@ def energy_ledger(
         The ledger of every interval [J], leaves of shape (n,); n = 1 unless `times` are given.
 
     Raises:
+        ArgumentError: times that do not increase.
         ValueError: a trajectory without its continuous solution, or a batch of them.
 
     Examples:
@@ -67,6 +69,8 @@ def energy_ledger(
     """
     check_scene_of(trajectory, scene)
     trajectory.require_dense()
+    if times is not None:
+        check_increasing("times", times, 2)
     ends = np.asarray(trajectory.t)[[0, -1]] if times is None else np.asarray(times)
     held = evaluate_at(scene, trajectory, energies, ends)
     flows = sample(scene, trajectory, powers, ends)

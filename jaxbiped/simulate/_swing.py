@@ -1,12 +1,24 @@
 """Swing of a linkage in gravity."""
 
+import warnings
+
 import diffrax
+import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._cached_jit import cached_jit
-from jaxbiped._checks import ArgumentError, check_count, check_finite, check_positive, check_type
+from jaxbiped._checks import (
+    ArgumentError,
+    check_count,
+    check_finite,
+    check_increasing,
+    check_not_negative,
+    check_positive,
+    check_type,
+)
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._ending import Ending
 from jaxbiped._types import Parameter, Scalar, as_float
@@ -24,6 +36,12 @@ from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.controllers._wrapped_control import StepControl
+
+_FAR = 0.5
+"""Distance of a start from its joints, in units of the longest arm, beyond which it is refused."""
+_LONGER, _LONG = 2.0, 1e-2
+"""Factor to the steps that steps of one size are held against, and the relative change of the final
+state from which they are too long."""
 
 
 @without_switches
@@ -71,24 +89,71 @@ def swing(
             check_finite(f"state.{name}", value)
     state = LinkageState(*(tuple(map(as_float, values)) for values in state))
     check_finite("times", times)
+    check_increasing("times", times, 1)
+    check_not_negative("times", times, "s")
     check_count("max_solver_steps", max_solver_steps)
     times = as_float(times)
     check_positive("times[-1]", times[-1], "s")
     method = solver_named(solver)
     check_steps(method, dt, most_steps=max_solver_steps, duration=times[-1])
     check_independent(scene.linkage, scene.method, state.q)
+    _check_joints(scene, state)
     check_adjoint(scene.method, adjoint)
     relative, absolute = tolerances(accuracy, rtol, atol)
     control = step_control(relative, absolute, rms_norm) if dt is None else None
     chosen = diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint
+    problem = scene, state, times, method, control
+    step = None if dt is None else as_float(dt)
     try:
-        return _solve(scene, state, times, method, control, dt, max_solver_steps, chosen)
+        swung = _solve(*problem, step, max_solver_steps, chosen)
     except TypeError as error:
         if adjoint is not None or "forward-mode" not in str(error):
             raise
         raise ArgumentError(
             "adjoint = None is not allowed in forward mode: choose diffrax.ForwardMode()."
         ) from error
+    leaves = jtu.tree_leaves((scene, state, times, step))
+    if step is not None and not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+        longer = _solve(*problem, _LONGER * step, max_solver_steps, chosen)
+        _warn_of_long_steps(swung, float(step), longer)
+    return swung
+
+
+def _check_joints(scene: LinkageScene, state: LinkageState) -> None:
+    """Refuses a start whose joints are far open; what is traced, or a batch, is not looked at."""
+    joints = scene.linkage.joints
+    pins = [joint.point_1 for joint in joints]
+    pins += [joint.point_2 for joint in joints if joint.body_2 is not None]
+    leaves = jtu.tree_leaves((scene, state))
+    if not pins or any(isinstance(x, jax.core.Tracer) or jnp.ndim(x) for x in leaves):
+        return
+    arm = max(float(np.hypot(*pin)) for pin in pins)
+    off = float(_distance(constraints_of(scene.linkage, *state)))
+    if arm > 0.0 and off > _FAR * arm:
+        raise ArgumentError(
+            f"state is {off:.3g} m off its joints: give a start on its constraints, or nearer than "
+            f"{_FAR:g} times the longest arm from a centre of mass to a joint, {arm:.3g} m."
+        )
+
+
+def _warn_of_long_steps(
+    swung: Trajectory[LinkageState], dt: float, other: Trajectory[LinkageState]
+) -> None:
+    """Warns where steps of one size are too long: others lead elsewhere."""
+    if swung.outcome is not Ending.FINISHED:
+        return
+    change = 0.0
+    for course, found in zip(swung.state, other.final, strict=True):
+        size = np.max(np.abs(np.array(course)))
+        apart = np.max(np.abs(np.array(course)[:, -1] - np.array(found)))
+        change = max(change, float(apart / size) if size > 0.0 else 0.0)
+    if not change <= _LONG:
+        warnings.warn(
+            f"dt = {dt:g} is too long: with steps of {_LONGER * dt:g} s the relative change of the "
+            f"final state is {change:.2g}; take shorter steps, or tolerances.",
+            RuntimeWarning,
+            stacklevel=3,
+        )
 
 
 @cached_jit
@@ -98,7 +163,7 @@ def _solve(
     times: Scalar,
     solver: diffrax.AbstractSolver[PyTree],
     control: StepControl | None,
-    dt: float | None,
+    dt: Scalar | None,
     most: int,
     adjoint: diffrax.AbstractAdjoint,
 ) -> Trajectory[LinkageState]:

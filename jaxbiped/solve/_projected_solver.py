@@ -70,6 +70,11 @@ class Projected(diffrax.AbstractWrappedSolver):  # type: ignore[type-arg]
         """The solver's, where it has one: diffrax asks Runge–Kutta methods."""
         return getattr(self.solver, "scan_kind", None)
 
+    @property
+    def root_finder(self) -> Any:
+        """The solver's, where it has one: diffrax hands it the tolerances of the steps."""
+        return getattr(self.solver, "root_finder", None)
+
     def order(self, terms: Any) -> int | None:
         """The solver's."""
         return self.solver.order(terms)

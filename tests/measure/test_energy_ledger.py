@@ -53,3 +53,9 @@ def test_gravitys_work_is_its_potential(seed_walk):
     flows = sample(scene, walk, powers, np.zeros(0))
     work = flows.integral(flows.values.gravity).sum()
     assert work == pytest.approx(jb.energy_ledger(scene, walk).gravity_work[0], rel=1e-7)
+
+
+@pytest.mark.parametrize("times", [[1.0, 0.5], [0.2, 1.0, 0.5, 1.5], [0.5], [[0.2, 0.5]]])
+def test_times_that_do_not_increase_are_refused(seed_walk, times):
+    with pytest.raises(jb.ArgumentError, match="2 or more increasing numbers"):
+        jb.energy_ledger(*seed_walk, np.array(times))

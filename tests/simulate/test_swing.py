@@ -175,3 +175,52 @@ def test_what_is_not_allowed_is_one_sentence(change, said):
     with pytest.raises(jb.ArgumentError) as refused:
         jb.swing(scene, options.pop("state"), **options)
     assert said in str(refused.value)
+
+
+STILL = hanging(0.5, rates=(0.0,))
+
+
+def one_leg_angle(time):
+    """By SciPy, from rest at 0.5 rad."""
+    pull = -9.8 * 0.1 / (0.0096 + 0.1**2)
+    field = lambda t, y: [y[1], pull * np.sin(y[0])]
+    return solve_ivp(field, (0.0, time), [0.5, 0.0], rtol=1e-11, atol=1e-12).y[0, -1]
+
+
+@pytest.mark.parametrize(
+    ("solver", "dt", "long"),
+    [("euler", 0.02, True), ("euler", 1e-3, True), ("rodas4", 0.2, True), ("rodas4", 0.02, False)],
+)
+def test_steps_of_one_size_that_are_too_long_are_told(solver, dt, long, recwarn):
+    scene = jb.LinkageScene(one_leg(), jb.constraints.Index1())
+    found = jb.swing(scene, STILL, times=[0.0, 3.0], solver=solver, dt=dt)
+    told = any(f"dt = {dt:g} is too long" in str(each.message) for each in recwarn)
+    assert told is long
+    if not long:
+        assert float(found.state.q[2][-1]) == pytest.approx(one_leg_angle(3.0), abs=5e-3)
+
+
+def test_an_implicit_method_of_diffrax_keeps_projected_constraints():
+    scene = jb.LinkageScene(one_leg(), jb.constraints.Index1())
+    found = jb.swing(scene, STILL, times=[3.0], solver="kvaerno5", accuracy="tight")
+    assert float(found.state.q[2][-1]) == pytest.approx(one_leg_angle(3.0), abs=1e-7)
+    assert float(found.violation[-1]) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("how", "said"),
+    [
+        (dict(times=3.0), "times = 3"),
+        (dict(times=[]), "1 or more increasing numbers"),
+        (dict(times=[2.0, 1.0, 3.0]), "increasing numbers"),
+        (dict(times=[-1.0, 3.0]), "times = -1"),
+        (dict(times=[1.0, np.nan]), "times = nan"),
+        (dict(solver="kvaerno5", dt=0.1), "dt is not allowed for solver = kvaerno5"),
+        (dict(state=STILL._replace(q=(5.0, 5.0, 0.5))), "7.1 m off its joints"),
+    ],
+)
+def test_times_steps_and_starts_that_are_not_allowed(how, said):
+    scene = jb.LinkageScene(one_leg(), jb.constraints.Index1())
+    how = {"state": STILL, "times": [0.0, 3.0]} | how
+    with pytest.raises(jb.ArgumentError, match=said):
+        jb.swing(scene, how.pop("state"), **how)
