@@ -167,6 +167,8 @@ class SwitchLocator(AbstractWrappedControl):
         if watch.section is not None:
             arrives = crossed[-1] & (at_end[-1].value > 0.0) & (landed.accepted > 0)
             crossed[-1] = arrives
+            # Whether it counts is asked where the step ends just past it, not before.
+            arrives = arrives & at_end[-1].live
         others = (watch.peak is not None) + (watch.section is not None)
         count = len(crossed) - others
         switching = crossed[:count]
@@ -256,7 +258,8 @@ class SwitchLocator(AbstractWrappedControl):
             saltation_pending=jnp.where(keep, crossed.jump, old.saltation_pending),
             peak_saltation_pending=peak_saltation_pending,
             crossed_field=jnp.where(keep, crossed.which, 0),
-            arrived=keep & crossed.section,
+            # What has fallen by then has not arrived.
+            arrived=keep & crossed.section & (code == 0),
             code=code,
             peak=peak,
             at_peak=at_peak,

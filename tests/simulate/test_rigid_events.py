@@ -130,3 +130,20 @@ def test_a_foot_that_grazes_the_ground_is_told():
     assert int(jb.rigid_walk(scene, states(between), footsteps=1, rtol=1e-4).grazes) > 0
     for rate in (low - 0.1, high + 0.1):
         assert int(jb.rigid_walk(scene, states(rate), footsteps=1, rtol=1e-4).grazes) == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "start"),
+    [
+        ("seed", (0.1887, -0.1014, -3.7796, 2.3404)),
+        ("point feet", (0.6564, -0.1274, -3.1428, 1.1597)),
+        ("large feet", (0.5016, -0.5932, 5.3215, -2.1858)),
+    ],
+)
+def test_a_return_is_asked_at_the_root_and_a_fall_comes_first(name, start):
+    """A leg that is ahead before the root or behind it alone; a fall just before a strike."""
+    scene, state = _scene(name), jb.dynamics.RigidState(0.0, *start)
+    true = walks(scene, state, 1)
+    assert np.isfinite(true.falls[0])
+    assert np.isinf(true.strikes[0, 0])
+    assert int(jb.return_map(scene, state).code) in (1, 2)
