@@ -47,7 +47,7 @@ def cache_folder() -> Path | None:
     if chosen is None:
         base = os.environ.get("XDG_CACHE_HOME")
         return (Path(base) if base else Path.home() / ".cache") / "jaxbiped"
-    return Path(chosen) if chosen else None
+    return Path(chosen).expanduser() if chosen else None
 
 
 def read_entry(kind: str, name: str) -> bytes | None:

@@ -147,8 +147,7 @@ def find_gait(
     check_unbatched("guess", start, "one state")
     most = (40 if method == "newton" else 400) if max_evaluations is None else max_evaluations
     check_count("max_evaluations", most)
-    # A redundant scene's leaves begin with those of what it models.
-    modelled = scene.minimal
+    modelled = scene.minimal  # a redundant scene's leaves begin with those of what it models
     names, active = select_parameters(modelled, parameters)
     precision = precision_of(accuracy, scene) if isinstance(accuracy, str) else accuracy
     method_of_steps = orbit_solver(solver, rigid=not scene.compliant)
