@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Callable
-from typing import NamedTuple
 
 from jaxbiped._checks import ArgumentError
 
@@ -14,15 +13,10 @@ VECTOR_VARIABLE = "JAXBIPED_VECTOR_BITS"
 """The bits of a vector where the CPU has as many or more."""
 
 
-class _Allowed(NamedTuple):
-    words: str
-    test: Callable[[int], bool]
-
-
-_ALLOWED = {
-    CACHE_BYTES_VARIABLE: _Allowed("a whole number of bytes, 0 to keep none", lambda n: True),
-    THREADS_VARIABLE: _Allowed("a whole number of threads above 0", lambda n: n > 0),
-    VECTOR_VARIABLE: _Allowed("128, 256 or 512", (128, 256, 512).__contains__),
+_ALLOWED: dict[str, tuple[str, Callable[[int], bool]]] = {
+    CACHE_BYTES_VARIABLE: ("a whole number of bytes, 0 to keep none", lambda n: True),
+    THREADS_VARIABLE: ("a whole number of threads above 0", lambda n: n > 0),
+    VECTOR_VARIABLE: ("128, 256 or 512", (128, 256, 512).__contains__),
 }
 
 
@@ -32,9 +26,9 @@ def environment_number(name: str) -> int | None:
     Raises:
         ArgumentError: it holds something else.
     """
-    text, allowed = os.environ.get(name, "").strip(), _ALLOWED[name]
-    if text and not (text.isdecimal() and allowed.test(int(text))):
-        raise ArgumentError(f"{name} = {text!r} in the environment: it must be {allowed.words}.")
+    text, (allowed, test) = os.environ.get(name, "").strip(), _ALLOWED[name]
+    if text and not (text.isdecimal() and test(int(text))):
+        raise ArgumentError(f"{name} = {text!r} in the environment: it must be {allowed}.")
     return int(text) if text else None
 
 
