@@ -110,6 +110,22 @@ class Once(Generic[_T]):
         return self._made[0]
 
 
+class OfObjects(Generic[_T]):
+    """A value for each of some immutable objects, kept for as long as the object lives."""
+
+    def __init__(self) -> None:
+        self._known: dict[int, tuple[weakref.ref[Any], _T]] = {}
+
+    def __call__(self, thing: Any, make: Callable[[], _T]) -> _T:
+        """The object's value, made where it is not; it must not hold the object."""
+        number = id(thing)
+        known = self._known.get(number)
+        if known is None or known[0]() is not thing:
+            gone = weakref.ref(thing, lambda _: self._known.pop(number, None))
+            known = self._known[number] = (gone, make())
+        return known[1]
+
+
 def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]]:
     """Decorator: keeps a function's last `bound` results by its hashable positional arguments.
 

@@ -263,7 +263,9 @@ def check_type(name: str, value: object, *kinds: type) -> None:
     """Raises `ArgumentError` unless `value` is an instance of one of `kinds`."""
     if not isinstance(value, kinds):
         allowed = " or a ".join(kind.__name__ for kind in kinds)
-        raise ArgumentError(f"{name} = {value!r} is not allowed: it must be a {allowed}.")
+        shown = repr(value)
+        shown = shown if len(shown) < 80 else f"a {type(value).__name__}"
+        raise ArgumentError(f"{name} = {shown} is not allowed: it must be a {allowed}.")
 
 
 def _in(unit: str) -> str:

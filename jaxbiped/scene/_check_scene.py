@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import ArrayLike
 
+from jaxbiped._caches import OfObjects
 from jaxbiped._checks import ArgumentError, check_type, is_number, traced_rules
 from jaxbiped._types import SomeTree, as_float
 
@@ -26,13 +27,26 @@ def check_scene(scene: Any, *kinds: type[SomeModule], name: str = "scene") -> An
             NaN throughout instead, in that lane.
     """
     check_type(name, scene, *kinds)
-    with traced_rules() as rules:
-        scene = jtu.tree_map(_in_64_bits, scene)
-        for part in _parts(scene):
-            for kind in reversed(type(part).__mro__):
-                if "__check_init__" in vars(kind):
-                    kind.__check_init__(part)  # type: ignore[attr-defined]
-    return where_allowed(rules, scene)
+    leaves, structure = jtu.tree_flatten(scene)
+    exact = [_in_64_bits(leaf) for leaf in leaves]
+    if any(a is not b for a, b in zip(leaves, exact, strict=True)):
+        scene = jtu.tree_unflatten(structure, exact)
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in exact):
+        with traced_rules() as rules:
+            _check_parts(scene)
+        return where_allowed(rules, scene)
+    _CHECKED(scene, lambda: _check_parts(scene))
+    return scene
+
+
+_CHECKED = OfObjects[None]()
+
+
+def _check_parts(scene: Any) -> None:
+    for part in _parts(scene):
+        for kind in reversed(type(part).__mro__):
+            if "__check_init__" in vars(kind):
+                kind.__check_init__(part)  # type: ignore[attr-defined]
 
 
 def where_allowed(

@@ -167,7 +167,8 @@ class Simulation(eqx.Module):
         units = units_of(scene, state)
         units = units if atol is None else si_units(units)
         save_steps = isinstance(save, str) and save == "steps"
-        scene, time = jtu.tree_map(cast, (scene, time))
+        scene = scene if dtype == jnp.float64 else jtu.tree_map(cast, scene)
+        time = cast(time)
         chosen = choose_engine(
             engine,
             solver=method,

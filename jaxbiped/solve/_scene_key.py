@@ -14,7 +14,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTreeDef
 
-from jaxbiped._caches import PROGRAMS, bounded_cache
+from jaxbiped._caches import PROGRAMS, OfObjects, bounded_cache
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._identity import identity
 from jaxbiped._types import Scalar, as_array
@@ -31,13 +31,13 @@ def scene_key(scene: Any) -> Scalar:
     """The key of a scene, shaped as its leaves; without derivatives."""
     leaves, structure = jtu.tree_flatten(scene)
     weights = _weights(structure)
-
     if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
         leaves = [jax.lax.stop_gradient(leaf) for leaf in leaves]
         return _sum(jnp, jnp.stack(jnp.broadcast_arrays(*map(jnp.asarray, leaves))), weights)
-    if all(np.ndim(leaf) == 0 for leaf in leaves):
-        return as_array(_sum(np, np.array([float(leaf) for leaf in leaves]), weights))
-    return as_array(_sum(np, np.stack(np.broadcast_arrays(*map(np.asarray, leaves))), weights))
+    return _KEYS(scene, lambda: as_array(_sum(np, np.stack(np.broadcast_arrays(*leaves)), weights)))
+
+
+_KEYS = OfObjects[Scalar]()
 
 
 def _sum(numpy: Any, values: Any, weights: np.ndarray) -> Any:
