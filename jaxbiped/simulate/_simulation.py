@@ -168,13 +168,13 @@ class Simulation(eqx.Module):
         units = units if atol is None else si_units(units)
         save_steps = isinstance(save, str) and save == "steps"
         scene = scene if dtype == jnp.float64 else jtu.tree_map(cast, scene)
-        time = cast(time)
+        longest = cast(time)
         chosen = choose_engine(
             engine,
             solver=method,
             save_steps=save_steps,
             adjoint=adjoint,
-            leaves=(scene, state, time),
+            leaves=(scene, state, longest),
             dt=dt,
             redundant=scene.redundant,
             times=save,
@@ -184,7 +184,7 @@ class Simulation(eqx.Module):
             scene=scene,
             state=state,
             correction=correction,
-            duration=time,
+            duration=longest,
             times=cast(save) if timed else None,
             rtol=cast(relative),
             atol=cast(absolute),
