@@ -89,12 +89,20 @@ def _find_each(scene: Scene | RigidScene, starts: WalkerState, options: dict[str
 
 
 def _told_apart(gaits: Gait) -> tuple[list[int], np.ndarray]:
-    """The first start that found each gait, and which of these gaits each start found."""
+    """The first start that found each gait, and which of these gaits each start found.
+
+    A gait is the same wherever its orbit was entered: its state is one of the other's crossings.
+    """
     states = np.stack([np.asarray(leaf) for leaf in gaits.measures.state[1:]], axis=1)
+    crossings = np.stack([np.asarray(leaf)[:, :, 0] for leaf in gaits.orbit[1][1:]], axis=2)
     first: list[int] = []
     which = np.full(len(states), -1)
     for i in np.flatnonzero(np.asarray(gaits.ending) == int(Search.FOUND)):
-        near = [k for k, j in enumerate(first) if np.max(np.abs(states[i] - states[j])) <= _SAME]
+        near = [
+            k
+            for k, j in enumerate(first)
+            if np.min(np.max(np.abs(states[i] - crossings[j]), axis=1)) <= _SAME
+        ]
         if not near:
             first.append(int(i))
         which[i] = near[0] if near else len(first) - 1

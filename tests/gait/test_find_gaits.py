@@ -31,6 +31,16 @@ def test_many_starts_find_a_stable_and_an_unstable_gait():
     assert bool(stable[int(found.which[0])])
 
 
+def test_a_cycle_that_is_entered_at_either_footstep_is_one_gait():
+    scene = jb.with_parameters(jb.ladder()["rigid"], {"slope": 0.102})
+    first = jb.find_gait(scene, footsteps=2, parameters=(), radius_sensitivities=False)
+    second = jb.return_map(scene, first.measures.state).state
+    starts = jax.tree.map(lambda a, b: jnp.stack([a, b]), first.measures.state, second)
+    found = jb.find_gaits(scene, starts, footsteps=2)
+    assert np.asarray(found.reached).tolist() == [2]
+    assert np.asarray(found.gaits.cycle_footsteps).tolist() == [2]
+
+
 @pytest.mark.parametrize("shape", [(), (2, 2), (0,)])
 def test_starts_of_another_shape_are_refused(shape):
     starts = jax.tree.map(lambda leaf: jnp.full(shape, leaf), jb.seed_state())
