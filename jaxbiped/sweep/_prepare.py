@@ -1,5 +1,6 @@
 """Preparation of a labelling: its gaits found, from a start or from the starts themselves."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -56,6 +57,7 @@ def labelling(
 
     Returns:
         A `Labelling`: call it with starts, or give it to `sweep`, `label_at` or `nearest_failure`.
+        A `RuntimeWarning` says where no stable gait was found.
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
@@ -80,6 +82,17 @@ def labelling(
         with_parameters(scene, {name: np.asarray(column, dtype=np.float64)})
     start = default_guess(scene) if guess is None else guess
     family = find_family(scene, effort, parameters=values, guess=start)
+    missing = sum(not row for row in family.rows)
+    if missing:
+        of = (
+            f" for {missing} of {len(family.rows)} combinations of the parameters" if values else ""
+        )
+        warnings.warn(
+            f"no stable gait was found{of}: what walks there is labelled unresolved until one is "
+            "met (see `with_gaits_met`).",
+            RuntimeWarning,
+            stacklevel=2,
+        )
     return Labelling(scene, family, effort)
 
 
