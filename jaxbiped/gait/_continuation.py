@@ -86,6 +86,7 @@ def follow_branch(
     start: np.ndarray,
     *,
     scales: np.ndarray,
+    smallest: float = _CONTROL.smallest,
     most_steps: int = 150,
 ) -> FollowedBranch:
     """Follows the branch of zeros of `change` from one at s = 0 until s = 1.
@@ -94,6 +95,7 @@ def follow_branch(
         change: of a point, shape (m,), and s.
         start: the zero at s = 0.
         scales: sizes of the components, shape (m,), in which arclength is measured; s in its own.
+        smallest: arclength of a step below which the branch is given up.
         most_steps: steps allowed.
     """
     curve = Curve(change, np.append(scales, 1.0), _CONVERGED)
@@ -101,14 +103,18 @@ def follow_branch(
     first = correct(curve, here, np.eye(len(here))[-1])
     if first.found is None:
         return FollowedBranch(start[None], np.zeros(1), BranchEnd.NO_BEGINNING, first.code)
+    control = _CONTROL._replace(smallest=smallest)
     path, end, code = [first.found], BranchEnd.UNFINISHED, 0
-    for attempt in islice(follow(curve, first.found, _CONTROL, high=1.0), most_steps):
+    for attempt in islice(follow(curve, first.found, control, high=1.0), most_steps):
         if attempt.found is None:
             code = attempt.code
             end = BranchEnd.WALK_ENDS if code else BranchEnd.BREAKS_OFF
             break
-        path += [*_fold(curve, path[-1], attempt.found), attempt.found]
-        if abs(attempt.found.place[-1] - 1.0) < _AT_END:
+        here, there = path[-1], attempt.found
+        if here.place[-1] < 1.0 < there.place[-1]:  # a step about a bend
+            there = _at_end(curve, here, there) or there
+        path += [*_fold(curve, here, there), there]
+        if abs(there.place[-1] - 1.0) < _AT_END:
             end = BranchEnd.REACHED
         if end is BranchEnd.REACHED or _is_far_behind_a_fold(path):
             break
@@ -116,6 +122,13 @@ def follow_branch(
         end, code = BranchEnd.FOLD, 0
     points = np.stack([point.place for point in path]) * curve.sizes
     return FollowedBranch(points[:, :-1], points[:, -1], end, code)
+
+
+def _at_end(curve: Curve, here: CurvePoint, there: CurvePoint) -> CurvePoint | None:
+    """The point at s = 1 between two points on either side of it."""
+    share = (1.0 - here.place[-1]) / (there.place[-1] - here.place[-1])
+    guess = here.place + share * (there.place - here.place)
+    return correct(curve, guess, np.eye(len(guess))[-1], here.tangent).found
 
 
 def _fold(curve: Curve, here: CurvePoint, there: CurvePoint) -> list[CurvePoint]:

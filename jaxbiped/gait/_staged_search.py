@@ -37,6 +37,7 @@ from jaxbiped.gait._settled_walks import component_sizes, settle_walks
 from jaxbiped.scene._abstract_scene import AbstractScene
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._accuracy import Precision
 
 _STARTS = {Scene: (16, 64), RigidScene: (1024,)}
 """Starts from which walks are followed, the more only where the fewer found no stable gait."""
@@ -47,6 +48,8 @@ _PUSHES = (-0.05, -0.01, 0.01, 0.05)
 shorter cycle from which longer ones are sought."""
 _TURNS = 20
 """Turns that each further search may take."""
+_SMALLEST, _FINER = 2e-4, Precision(3e-7, 3e-6)
+"""Step at which the seed's gait is lost; how exactly it is then followed again, by finer steps."""
 _SCATTERED = 12
 """Starts of the last stage."""
 _SAME = 1e-5
@@ -251,24 +254,36 @@ def _follow_from_seed(
     if int(first.ending) != int(Search.FOUND):
         return FollowedBranch(point[None], np.zeros(1), BranchEnd.NO_BEGINNING, int(first.code))
 
-    def change(point: np.ndarray, s: float) -> Change:
-        given: PyTree = point, np.float64(s)
-        value, by_point, by_s, code = map(np.asarray, _scene_along(scout, line, like, *given))
-        return Change(value, by_point, by_s, int(code))
+    def followed(precision: Precision, smallest: float) -> FollowedBranch:
+        def change(point: np.ndarray, s: float) -> Change:
+            given: PyTree = point, np.float64(s), precision
+            value, by_point, by_s, code = map(np.asarray, _scene_along(scout, line, like, *given))
+            return Change(value, by_point, by_s, int(code))
 
-    return follow_branch(change, point, scales=component_sizes(line.first, like))
+        scales = component_sizes(line.first, like)
+        return follow_branch(change, point, scales=scales, smallest=smallest)
+
+    branch = followed(ROUGH, _SMALLEST)
+    # On stiff ground rough solves and long steps may lose the branch before it ends.
+    lost = branch.end in (BranchEnd.WALK_ENDS, BranchEnd.BREAKS_OFF)
+    return followed(_FINER, 0.1 * _SMALLEST) if lost else branch
 
 
 @host_jit(runs_by_lanes, within=True)
 def _scene_along(
-    scout: ReturnMapSpec, line: Homotopy, like: WalkerState, point: Scalar, s: Scalar
+    scout: ReturnMapSpec,
+    line: Homotopy,
+    like: WalkerState,
+    point: Scalar,
+    s: Scalar,
+    precision: Precision,
 ) -> tuple[Scalar, Scalar, Scalar, Scalar]:
     """What a return changes in a point, and how that depends on the point and on s."""
     m, scene = point.shape[0], line.at(s)
     seeds, sizes = seed_directions(scene, tuple(range(len(jtu.tree_leaves(scene)))), m)
     start = state_with(scout.system, like, point)
     once = linearised_return(
-        scout, seeds, start, ROUGH, jnp.asarray(False), carries_parameters=jnp.asarray(True)
+        scout, seeds, start, precision, jnp.asarray(False), carries_parameters=jnp.asarray(True)
     )
     by_s = once.jacobian[:, m:] @ (line.slopes(s) / sizes)
     return once.recurring - point, once.jacobian[:, :m] - jnp.eye(m), by_s, once.code

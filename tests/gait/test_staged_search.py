@@ -24,6 +24,25 @@ def test_the_stable_gait_is_found_on_every_slope(slope):
     assert float(gait.measures.period) == pytest.approx(TRUTH[slope], abs=1e-5)
 
 
+@pytest.mark.parametrize(("stiffness", "options"), [
+    (10.0**8.25, [{"parameters": ("K",)}, {"parameters": ("c",), "radius_sensitivities": False}]),
+    (4e8, []),
+])  # fmt: skip
+def test_on_stiff_ground_the_gait_is_the_one_that_walks_settle_on(stiffness, options):
+    """Feet bounce there, for thousands of steps. Which derivatives are asked for changes no bit."""
+    scene = jb.seed_scene(slope=0.02, K=stiffness)
+    gait = jb.find_gait(scene, **PLAIN)
+    assert bool(gait.stable)
+    for each in options:
+        other = jb.find_gait(scene, **each)
+        np.testing.assert_array_equal(other.multipliers, gait.multipliers)
+        np.testing.assert_array_equal(other.measures.period, gait.measures.period)
+    pushed = gait.measures.state._replace(omega_1=gait.measures.state.omega_1 * 1.001)
+    walk = jb.simulate(scene, pushed, footsteps=14, max_solver_steps=400_000, accuracy="balanced")
+    settled = np.asarray(jb.footsteps(scene, walk).period_s)[-4:]
+    np.testing.assert_allclose(settled, float(gait.measures.period), atol=2e-6)
+
+
 def test_the_unstable_gait_that_was_seen_is_told():
     scene = jb.seed_scene(slope=0.03)
     gait = jb.find_gait(scene, **PLAIN)
