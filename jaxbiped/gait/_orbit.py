@@ -101,19 +101,16 @@ def with_parameter_columns(
         lambda *pair: jnp.stack(list(map(jnp.asarray, pair))), precision, looser(precision)
     )
     new, own = _each_of(spec, once)(pairs), found.both
-    names = ("jacobian", "monodromy", "period_row", "advance_rows", "peak_row")
-    rows = {
-        name: jnp.concatenate(
-            [getattr(own, name)[..., :m], jnp.where(lost, jnp.nan, getattr(new, name)[..., m:])],
-            axis=-1,
-        )
-        for name in names
-    }
-    counts = {
-        name: jnp.maximum(getattr(own, name), getattr(new, name))
-        for name in ("jumps", "missed", "grazes")
-    }
-    return found._replace(both=own._replace(nodes=new.nodes, **rows, **counts))
+
+    def joined(name: str) -> Scalar:
+        parameters = jnp.where(lost, jnp.nan, getattr(new, name)[..., m:])
+        return jnp.concatenate([getattr(own, name)[..., :m], parameters], axis=-1)
+
+    rows = ("jacobian", "monodromy", "period_row", "advance_rows", "peak_row")
+    changed = {name: joined(name) for name in rows}
+    for name in ("jumps", "missed", "grazes"):
+        changed[name] = jnp.maximum(getattr(own, name), getattr(new, name))
+    return found._replace(both=own._replace(nodes=new.nodes, **changed))
 
 
 def orbit_of(

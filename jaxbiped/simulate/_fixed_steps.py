@@ -18,7 +18,7 @@ from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import relative_to_scene
 
-LONG = 1e-2
+_LONG = 1e-2
 """Relative change of the final state by other steps from which steps are too long."""
 _MANY = 8
 """Steps from which the other ones are longer, and cost less; those of fewer are shorter."""
@@ -72,4 +72,4 @@ def _change(run: Simulation, walk: Trajectory, other: Trajectory) -> str:
         return f"it ends as {other.outcome} instead of {walk.outcome}"
     apart = jtu.tree_map(lambda a, b: np.abs(np.asarray(a - b)), walk.final, other.final)
     change = relative_to_scene(run.scene.minimal, np.zeros(()), apart)
-    return "" if change <= LONG else f"the relative change of its final state is {change:.2g}"
+    return "" if change <= _LONG else f"the relative change of its final state is {change:.2g}"
