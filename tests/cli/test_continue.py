@@ -43,7 +43,7 @@ def test_the_numbers(followed):
         assert all(len(pair) == 2 for pair in point["multipliers"])
         assert point["stable"] in (True, False, None)
     (event,) = numbers["bifurcations"]
-    assert set(event) == {"kind", "value", "multiplier", "error", "value_error"}
+    assert set(event) == {"kind", "value", "multiplier", "error", "value_error", "beyond"}
     assert 0.0 < event["value_error"] < 1e-4
     assert event["kind"] == "period-doubling"
     assert 0.1 < event["value"] < 0.102
