@@ -18,7 +18,8 @@ from jaxbiped.continuation._nearest_bifurcation import (
 )
 from jaxbiped.optimise._certificate import Certificate, certify
 from jaxbiped.optimise._objectives import OBJECTIVES
-from jaxbiped.optimise._optimise_gait import Optimum, optimise_gait
+from jaxbiped.optimise._optimise_gait import optimise_gait
+from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.optimise._runs import Outcome
 from jaxbiped.scene._parameters import parameter_names, parameter_quantities, parameter_values
 from jaxbiped.scene._redundant_scene import RedundantScene

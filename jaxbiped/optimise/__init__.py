@@ -11,8 +11,8 @@ from jaxbiped.optimise._objectives import OBJECTIVES as OBJECTIVES
 from jaxbiped.optimise._objectives import Evaluation as Evaluation
 from jaxbiped.optimise._optimality import Held as Held
 from jaxbiped.optimise._optimality import Optimality as Optimality
-from jaxbiped.optimise._optimise_gait import Optimum as Optimum
 from jaxbiped.optimise._optimisers import OPTIMISERS as OPTIMISERS
+from jaxbiped.optimise._optimum import Optimum as Optimum
 from jaxbiped.optimise._pareto_front import ParetoFront as ParetoFront
 from jaxbiped.optimise._pareto_front import pareto_front as pareto_front
 from jaxbiped.optimise._runs import Iteration as Iteration

@@ -25,7 +25,7 @@ from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._optimality import Optimality
-from jaxbiped.optimise._optimise_gait import Optimum
+from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.scene._parameters import parameter_names
 from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
