@@ -73,6 +73,9 @@ def save_animation(animation: FuncAnimation, path: str | Path) -> Path:
 
     Returns:
         The path.
+
+    Raises:
+        ArgumentError: a path where no file can be written.
     """
     where = check_writable_file("path", path)
     animation.save(str(where), writer="pillow")

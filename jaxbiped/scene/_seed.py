@@ -50,6 +50,7 @@ def seed_scene(
         mu_static, mu_kinetic: static and kinetic friction coefficients [–].
         v0: slip speed at which friction peaks [m/s].
         xi: rate at which friction falls beyond it [s/m].
+        unknown: none: any other name is refused.
 
     Returns:
         The scene: `Walker`, `Ground`, `RistowSchafer` and `BengisuAkay`, and the paper's rule of
