@@ -91,13 +91,6 @@ def check_steps(
                 "in seconds, such as dt = 1e-6."
             )
         return
-    # diffrax's implicit methods take the tolerances of the steps, unless they have their own.
-    own = getattr(getattr(solver, "root_finder", None), "rtol", 0.0)
-    if not isinstance(own, int | float) and not hasattr(own, "dtype"):
-        raise ArgumentError(
-            f"dt is not allowed for solver = {type(solver).__name__.lower()}, which solves its "
-            "equations as tightly as tolerances say: leave dt out, or take rodas4 or euler."
-        )
     check_unbatched("dt", dt)
     check_positive("dt", dt, "s")
     if holds_somewhere(duration > dt * most_steps):

@@ -32,7 +32,7 @@ from jaxbiped.scene._linkage_scene import LinkageScene
 from jaxbiped.simulate._start import check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
 from jaxbiped.solve._projected_solver import check_adjoint, wrap_projected
-from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve._solvers import solver_named, with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve.controllers._step_control import first_step, step_control
 from jaxbiped.solve.controllers._wrapped_control import StepControl
@@ -102,6 +102,8 @@ def swing(
     relative, absolute = tolerances(accuracy, rtol, atol)
     control = step_control(relative, absolute, rms_norm) if dt is None else None
     chosen = diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint
+    if dt is not None:
+        method = with_root_tolerances(method, as_float(relative), as_float(absolute))
     problem = scene, state, times, method, control
     step = None if dt is None else as_float(dt)
     try:

@@ -24,7 +24,7 @@ _OVERSHOOT = 1e-4
 """Largest part of a step that may lie past a switch."""
 MARGIN = 1e-12
 """Time past a switch [s] that a step may always end, and aims at: the side must be beyond doubt."""
-NEAR = 1e-9
+NEAR = 1e-11
 """Longest step [s] that crosses a switch where the field itself is not smooth: longer ones end
 before it, for a step's last stage lies on the other side, where the Jacobian may be any size."""
 _BEFORE = 1e-3

@@ -55,9 +55,9 @@ def test_bars_of_derivatives_hold_in_nearly_all_cases(gaits):
     assert max(shares) <= 2.0
 
 
-def test_draft_tells_measures_to_a_hundredth_in_a_third_of_the_steps():
+def test_draft_tells_measures_to_a_hundredth_in_two_fifths_of_the_steps():
     draft, balanced = (jb.find_gait(SCENE, accuracy=name, **HOW) for name in ("draft", "balanced"))
-    assert 3 * int(draft.solver_steps) <= int(balanced.solver_steps)
+    assert 5 * int(draft.solver_steps) <= 2 * int(balanced.solver_steps)
     for name in ("period", "step_length", "speed", "peak_normal", "spectral_radius"):
         told, true = (float(getattr(each.measures, name)) for each in (draft, balanced))
         assert told == pytest.approx(true, rel=1e-2), name

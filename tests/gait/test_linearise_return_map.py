@@ -57,7 +57,7 @@ def test_a_damped_oscillator(engine):
         (dict(max_time=0.0), "max_time = 0 is not allowed"),
         (dict(footsteps=0), "footsteps = 0 is not allowed"),
         (dict(max_solver_steps=0), "max_solver_steps = 0 is not allowed"),
-        (dict(args=jb.RedundantScene(jb.seed_scene())), "args = RedundantScene"),
+        (dict(args=jb.RedundantScene(jb.seed_scene())), "args = a RedundantScene"),
     ],
 )
 def test_what_is_not_allowed_is_one_sentence(change, said):
