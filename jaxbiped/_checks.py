@@ -99,11 +99,12 @@ def _require(name: str, value: object, allowed: str, test: _Test) -> None:
     import numpy as np
 
     array = _numbers(name, value)
-    if not array.ndim and np.isfinite(one := array.item()) and test(one):
+    if not array.ndim and np.isfinite(one := array.item()) and np.all(test(one)):
         return  # the quick way for what is asked of every number at every door
     bad = ~(np.isfinite(array) & test(array))
     if bad.any():
-        raise ArgumentError(f"{name} = {_shown(array, bad)} is not allowed: it must be {allowed}.")
+        shown = _shown(np.broadcast_to(array, bad.shape), bad)
+        raise ArgumentError(f"{name} = {shown} is not allowed: it must be {allowed}.")
 
 
 def holds_somewhere(condition: "ArrayLike") -> bool:

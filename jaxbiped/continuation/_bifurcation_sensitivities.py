@@ -67,8 +67,8 @@ def bifurcation_sensitivities(
     check_type("branch", branch, Branch)
     check_type("bifurcation", bifurcation, BifurcationPoint)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
-    located = bifurcation.kind is not BranchEvent.NOT_LOCATED
-    if not located or bifurcation.kind in (BranchEvent.LIMIT, BranchEvent.BRANCH_POINT):
+    without = (BranchEvent.LIMIT, BranchEvent.BRANCH_POINT, BranchEvent.NOT_LOCATED)
+    if bifurcation.kind in without:
         raise ArgumentError(
             f"bifurcation is not allowed: a {bifurcation.kind} has no derivative; choose a fold, a "
             "period doubling or a Neimark–Sacker point."

@@ -209,7 +209,7 @@ def summarise_gait(
     measures = known(measures)._replace(state=orbit.state)
     slopes = _by_parameter(orbit, measures, orbit.slopes, orbit.radius_slopes)
     # Errors of length and period add up in the speed's, whatever their signs.
-    backwards = measures._replace(speed=-measures.speed)
+    backwards = measures._replace(speed=-jnp.abs(measures.speed))
     slope_errors = _by_parameter(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
     errors = _measure_errors(measures, orbit)
     return Gait(

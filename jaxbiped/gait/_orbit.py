@@ -28,6 +28,7 @@ _RADIUS_FLOOR = 2e-8
 parameter's size: of the switches' crossings, which second derivatives magnify."""
 
 
+_NOTHING = 1e-300
 _SHARE = 0.5
 """Of what a looser solve changes, that a first derivative may be wrong by."""
 _POOLED = 0.1
@@ -134,7 +135,7 @@ def orbit_of(
     unknown = jnp.where(last.grazes > 0, jnp.inf, stability.errors)
     stability = stability._replace(errors=unknown)
     slopes, looser = (slopes_of(each) for each in (last, coarse))
-    # Where the force itself jumped on the section, columns lack the jump's own correction.
+    # Where the force itself jumped on the section by XLA, columns lack the jump's own correction.
     slopes = jax.tree.map(lambda leaf: jnp.where(last.missed > 0, jnp.nan, leaf), slopes)
     errors = _slope_errors(last, slopes, looser)
     _, sizes = seed_directions(args, active, m)
@@ -144,7 +145,8 @@ def orbit_of(
             spec, lambda each: _radius_slopes(spec, args, active, guess, each)
         )(found.both)
         change = jnp.abs(radius_slopes - looser_slopes)
-        share = jnp.sqrt(jnp.sum(change * change) / jnp.sum(radius_slopes * radius_slopes))
+        size = jnp.maximum(jnp.sum(radius_slopes * radius_slopes), _NOTHING)
+        share = jnp.sqrt(jnp.sum(change * change) / size)
         pooled = _POOLED * share * jnp.abs(radius_slopes)
         radius_errors = jnp.maximum(jnp.maximum(change, pooled), _RADIUS_FLOOR)
     return Orbit(found, state, stability, slopes, errors, radius_slopes, radius_errors, sizes)

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._checks import check_choice, check_count, check_positive
+from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Scalar, Time, as_float, select
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
@@ -101,6 +101,8 @@ def return_map(
     check_positive("max_time", max_time, "s")
     if system is None:
         args = check_scene(args, Scene, RigidScene, RedundantScene)
+        if not hasattr(state, "_fields"):
+            raise ArgumentError(f"state = {state!r} is not allowed: give a State.")
         state = check_leaves(state, "state")
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
     redundant = isinstance(args, RedundantScene) and system is None

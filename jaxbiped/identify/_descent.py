@@ -57,6 +57,7 @@ class Descent:
 
         If the start has no gait, or ends where the model does not fit, others about it are tried.
         """
+        fit: GaitFit | None = None
         try:
             fit = self.settled(np.zeros(len(self.names)), most)
             if fit.ending is FitEnding.NO_GAIT or fit.p_value < UNLIKELY:
@@ -67,7 +68,10 @@ class Descent:
                     if not fit.p_value < UNLIKELY:
                         break
         except KeyboardInterrupt:
-            return self.described(FitEnding.INTERRUPTED)
+            now = self.described(FitEnding.INTERRUPTED)
+            if fit is None or now.chi_squared < fit.chi_squared:
+                fit = now
+            fit = fit._replace(ending=FitEnding.INTERRUPTED)
         return fit._replace(evaluations=self.evaluations)
 
     def settled(self, begin: np.ndarray, most: int) -> GaitFit:

@@ -130,7 +130,9 @@ def bifurcation_distance(
     if located is None:
         none, nowhere = np.nan, np.full(len(parameter_names(scene)), np.nan)
         outcome, distance = Sought.UNKNOWN, none
-        if event is None and parts and all(part.stop.end in _ENDS for part in parts):
+        seen = [each.kind for part in parts for each in part.bifurcations]
+        known = BranchEvent.NOT_LOCATED not in seen
+        if event is None and parts and known and all(part.stop.end in _ENDS for part in parts):
             outcome, distance = Sought.NONE_IN_RANGE, max(abs(end - own) for end in bounds)
         return BifurcationDistance(
             along, outcome, none, distance, none, nowhere, nowhere, nowhere, bounds

@@ -124,12 +124,18 @@ class DesignProblem:
         )
 
     def begin_again(self, design: Design, ensemble: Ensemble) -> Design:
-        """That design with another ensemble, and no other; raises as `begin`."""
-        count = self.evaluations.count
-        self.ensemble, self.asked = ensemble, []
-        self.evaluations = Evaluations(None, {})
-        self.evaluations.count = count
-        return self.begin(design.u)
+        """That design with another ensemble, and no other.
+
+        Raises as `begin`, and then leaves all as it was.
+        """
+        before = self.ensemble, self.asked, self.evaluations, self.latest
+        self.ensemble, self.asked, self.evaluations = ensemble, [], Evaluations(None, {})
+        self.evaluations.count = before[2].count
+        try:
+            return self.begin(design.u)
+        except BaseException:
+            self.ensemble, self.asked, self.evaluations, self.latest = before
+            raise
 
     def at(self, u: np.ndarray) -> Evaluation | None:
         """What is known of a design; None where no gait was found on the way from the latest."""

@@ -123,7 +123,8 @@ def with_worse_members(
             tried = ensemble._replace(factors=factors)
             each = evaluate_members(tried, scene, nominal, wanted, settings)
             # A member without a gait is worse than any that has one.
-            values = [np.inf if known is None else sign * known.values[name] for known in each]
+            told = [np.inf if known is None else sign * known.values[name] for known in each]
+            values = np.nan_to_num(told, nan=np.inf, posinf=np.inf, neginf=-np.inf)
             place = int(np.argmax(values))
             if values[place] > worst[-1]:
                 worst, centre = [*worst, values[place]], factors[place]

@@ -153,7 +153,13 @@ def optimise_gait(
                 harder = problem.worse_ensemble(runs.best, int(seed))
                 if harder is None:
                     break
-                runs.run(problem.begin_again(runs.best, harder))
+                try:
+                    again = problem.begin_again(runs.best, harder)
+                except ArgumentError:
+                    lost = f"{runs.ended.message} Within the box there are members without a gait."
+                    runs.ended = Ended(runs.ended.converged, lost)
+                    break
+                runs.run(again)
         except KeyboardInterrupt:
             runs.ended, runs.interrupted = Ended(False, "Interrupted."), True
     return optimum_of(problem, runs)

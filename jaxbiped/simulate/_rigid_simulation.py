@@ -53,7 +53,8 @@ class RigidSimulation(eqx.Module):
 
     def __call__(self) -> Trajectory[RigidState]:
         """Solves it, differentiably."""
-        return with_derivatives(self, RigidSimulation.solved, moving=_moving, slopes=_slopes)
+        walk = with_derivatives(self, RigidSimulation.solved, moving=_moving, slopes=_slopes)
+        return dataclasses.replace(walk, scene_key=scene_key(self.walk.scene))
 
     def solved(self) -> Trajectory[RigidState]:
         """Solves it."""
@@ -72,7 +73,6 @@ class RigidSimulation(eqx.Module):
             rejected=found.rejected,
             arrivals=arrivals_among(rows, found.footsteps, state),
             grazes=found.grazes,
-            scene_key=scene_key(self.walk.scene),
             engine=self.engine,
         )
 

@@ -208,8 +208,10 @@ class Simulation(eqx.Module):
         if self.adjoint is not None:
             if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(self)):
                 warnings.warn(_OF_STEPS, RuntimeWarning, stacklevel=3)
-            return _run(self)
-        return with_derivatives(self, _run, moving=_moving, slopes=_slopes)
+            walk = _run(self)
+        else:
+            walk = with_derivatives(self, _run, moving=_moving, slopes=_slopes)
+        return dataclasses.replace(walk, scene_key=scene_key(self.scene))
 
     def lane_request(self) -> Request | None:
         """What it asks of lanes or devices; None where XLA runs it."""
@@ -224,8 +226,7 @@ class Simulation(eqx.Module):
 
 def _run(run: Simulation) -> Trajectory:
     request = run.lane_request()
-    walk = trim(by_xla(run)) if request is None else by_lanes(run, request)
-    return dataclasses.replace(walk, scene_key=scene_key(run.scene))
+    return trim(by_xla(run)) if request is None else by_lanes(run, request)
 
 
 def _moving(run: Simulation) -> tuple[PyTree, PyTree, PyTree]:
@@ -240,7 +241,7 @@ def _slopes(
         "extremes": (run.extremes is not None, "only times and states have derivatives"),
         "scene = RedundantScene(…)": (
             run.scene.redundant,
-            "the same walk in minimal coordinates, scene.minimal, has them",
+            "simulate scene.minimal, or choose an adjoint of diffrax's",
         ),
     }
     for argument, (is_so, instead) in refused.items():

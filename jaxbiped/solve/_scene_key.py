@@ -34,10 +34,11 @@ def scene_key(scene: Any) -> Scalar:
     if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
         leaves = [jax.lax.stop_gradient(leaf) for leaf in leaves]
         return _sum(jnp, jnp.stack(jnp.broadcast_arrays(*map(jnp.asarray, leaves))), weights)
-    return _KEYS(scene, lambda: as_array(_sum(np, np.stack(np.broadcast_arrays(*leaves)), weights)))
+    # Kept as NumPy's: under `jit` an array of JAX's would be a tracer.
+    return as_array(_KEYS(scene, lambda: _sum(np, np.stack(np.broadcast_arrays(*leaves)), weights)))
 
 
-_KEYS = OfObjects[Scalar]()
+_KEYS = OfObjects[np.ndarray]()
 
 
 def _sum(numpy: Any, values: Any, weights: np.ndarray) -> Any:

@@ -47,7 +47,7 @@ def tangents_at_times(
     """Follows a motion from one time to the next, with its derivatives.
 
     Directions are those of the leaves of the state at `places`, then those of the `active` leaves
-    of the scene. Times increase; from one that is infinite on, everything stays as it was.
+    of the scene. Times increase; infinite ones are passed over.
     """
     start, seeded = seeded_directions(scene, state, places, active)
 

@@ -84,7 +84,8 @@ class LocatedEnding(AbstractWrappedControl):
         way = span * jnp.where(ends, fusion_barrier(ends, part_before), 1.0)
         again = ends & (span - way > jnp.maximum(_OVERSHOOT * way, 4.0 * _MARGIN))
         target = start + way * (1.0 + 0.5 * _OVERSHOOT) + _MARGIN
-        again, target = jax.lax.stop_gradient((again & (target < start + span), target))
+        possible = (target > start) & (target < start + span)
+        again, target = jax.lax.stop_gradient((again & possible, target))
         inner = jtu.tree_map(lambda a, b: jnp.where(again, a, b), controller_state, inner)
         result = diffrax.RESULTS.where(again, diffrax.RESULTS.successful, result)
         next_t0, next_t1 = jnp.where(again, t0, next_t0), jnp.where(again, target, next_t1)
