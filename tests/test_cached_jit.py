@@ -78,7 +78,7 @@ def test_other_shapes_types_and_settings_are_other_programs(cache):
     assert len(list(cache.iterdir())) == 2
     just_before_end(jnp.asarray(2.0))  # of a weak type
     assert len(list(cache.iterdir())) == 3
-    with jax.numpy_dtype_promotion("standard"):
+    with jax.default_matmul_precision("highest"):
         just_before_end(np.float64(2.0))
     assert len(list(cache.iterdir())) == 4
 
@@ -99,7 +99,7 @@ def test_alone_it_is_one_program_and_traced_a_part_of_the_whole(cache):
     assert list(cache.iterdir()) == [kept]
     of = jb.dynamics.energies
     traced, plainly = (jax.make_jaxpr(f)(scene, jb.seed_state()) for f in (of, of.__wrapped__))
-    assert str(traced) == str(plainly)
+    assert [e.primitive for e in traced.eqns] == [e.primitive for e in plainly.eqns]
     whole = jax.jit(jb.dynamics.energies)(scene, jb.seed_state())
     np.testing.assert_allclose(found.kinetic, whole.kinetic, rtol=1e-14)
 
@@ -173,8 +173,8 @@ def test_another_process_runs_what_one_compiled(tmp_path, monkeypatch):
 
     first = run("compiles", "0.02")
     assert run("loads", "0.02") == first
-    other = run("loads", "0.025")
+    other = run("loads", "0.022")
     assert other.startswith("lanes walking")
-    scene = jb.seed_scene(slope=0.025)
+    scene = jb.seed_scene(slope=0.022)
     walk = jb.simulate(scene, jb.seed_state(), footsteps=2, accuracy="draft")
     assert float(walk.t[-1]).hex() == other.split()[2]

@@ -94,7 +94,7 @@ def test_whole_turns_are_the_same_start(leg, turns):
         return jb.simulate(SCENE, state, duration=0.7, save=jb.MidStance(), accuracy="draft")
 
     one, other = arrived(START), arrived(turned(START))
-    assert int(one.arrivals.total) == int(other.arrivals.total) == 1
+    assert int(one.arrivals.total) == int(other.arrivals.total) == 2
     np.testing.assert_allclose(other.arrivals.t[0], one.arrivals.t[0], rtol=1e-3)
     label = jb.labelling(RIGID)
     both = jax.tree.map(lambda *leaves: np.stack(leaves), ROLLING, turned(ROLLING))

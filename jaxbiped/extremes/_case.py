@@ -10,7 +10,7 @@ import equinox as eqx
 import numpy as np
 
 from jaxbiped.dynamics._bristle_state import BristleState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import State, within_a_turn
 from jaxbiped.extremes._check_equations import (
     FRICTION,
     FRICTION_AT,
@@ -120,6 +120,8 @@ class Case:
         told |= {name: value for name, value in changed.items()}
         if "hip_z" not in changed:
             told["hip_z"] = r + (l - r) * math.cos(told["theta_2"]) + height
+        for name in ("theta_1", "theta_2"):
+            told[name] = within_a_turn(told[name])
         return {name: float(told[name]) for name in _FIELDS}
 
     @property

@@ -72,7 +72,7 @@ NIGHTLY = ("optimise", "basin", "constraints", "trade")
 def test_the_second_process_compiles_nothing(name, tmp_path):
     measured = tmp_path / "measured.json"
     measured.write_text(
-        json.dumps({"gaits": [{"period_s": [0.5, 1e-3], "step_length_m": [0.2, 1e-3]}]})
+        json.dumps({"gaits": [{"period_s": [0.44, 1e-3], "step_length_m": [0.19, 1e-3]}]})
     )
     environment = os.environ | {CACHE_VARIABLE: str(tmp_path / "cache")}
 

@@ -78,7 +78,7 @@ def test_every_law_goes_into_a_file(name, short_walk, tmp_path):
 
 
 def test_a_rigid_walker_is_refused(seed_walk):
-    with pytest.raises(jb.ArgumentError, match="scene = RigidScene"):
+    with pytest.raises(jb.ArgumentError, match="scene = a RigidScene"):
         jb.trajectory_dataset(jb.ladder()["rigid"], seed_walk[1])
 
 
