@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax._src.core import eval_context, top_axis_env, trace_ctx, trace_state_clean
+from jax._src.interpreters.batching import BatchTracer
 from jax.extend.core import Jaxpr, JaxprEqn
 from jaxlib import lapack
 from jaxlib.mlir import ir
@@ -58,6 +59,13 @@ def scan_counts(params: dict[str, Any]) -> tuple[int, int]:
 def nothing_is_traced() -> bool:
     """Whether the caller is under no transformation of JAX."""
     return bool(trace_state_clean())
+
+
+def unbatched(leaf: object) -> object:
+    """What a tracer of `vmap` holds: by itself that differentiates nothing."""
+    while isinstance(leaf, BatchTracer):
+        leaf = leaf.val
+    return leaf
 
 
 @contextlib.contextmanager

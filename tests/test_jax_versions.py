@@ -17,6 +17,7 @@ PRIVATE = {
     ("_jax_versions.py", "jax._src.core.top_axis_env"),
     ("_jax_versions.py", "jax._src.core.trace_ctx"),
     ("_jax_versions.py", "jax._src.core.trace_state_clean"),
+    ("_jax_versions.py", "jax._src.interpreters.batching.BatchTracer"),
     ("_jax_versions.py", "jaxlib.lapack"),
     ("_jax_versions.py", "jaxlib.mlir.ir"),
     ("gait/_gait_measures.py", "equinox.internal"),

@@ -114,8 +114,10 @@ def check_leaves(state: SomeState, name: str) -> SomeState:
         for field, value in state._asdict().items()
         if value is not None or field not in left_out
     }
+    traced = [field for field, value in given.items() if isinstance(value, jax.core.Tracer)]
     for field, value in given.items():
-        check_finite(f"{name}.{field}", value)
+        if field not in traced:
+            check_finite(f"{name}.{field}", value)
     leaves = {field: as_float(value) for field, value in given.items()}
     leaves |= {name: within_a_turn(leaf) for name, leaf in leaves.items() if name in _ANGLES}
     shapes = {leaf.shape for leaf in leaves.values()}
@@ -123,4 +125,6 @@ def check_leaves(state: SomeState, name: str) -> SomeState:
         raise ArgumentError(
             f"{name} has leaves of shapes {sorted(shapes)}: all of them must have the same shape."
         )
+    if traced:  # together, for each operation on what is traced takes long
+        check_finite(name, sum(leaves[field] for field in traced))
     return state._replace(**leaves)

@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.dynamics._bristle_state import BristleState
@@ -121,7 +122,7 @@ class Case:
         if "hip_z" not in changed:
             told["hip_z"] = r + (l - r) * math.cos(told["theta_2"]) + height
         for name in ("theta_1", "theta_2"):
-            told[name] = within_a_turn(told[name])
+            told[name] = float(within_a_turn(jnp.asarray(told[name])))
         return {name: float(told[name]) for name in _FIELDS}
 
     @property

@@ -6,7 +6,7 @@ are, so a rule is given here.
 
 import contextlib
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NoReturn, TypeVar
 
 import equinox as eqx
@@ -19,7 +19,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
-from jaxbiped._jax_versions import untraced
+from jaxbiped._jax_versions import unbatched, untraced
 from jaxbiped._types import Scalar
 from jaxbiped.simulate._slopes import Slopes
 from jaxbiped.solve._trajectory import Trajectory
@@ -46,7 +46,7 @@ def with_derivatives(
     """
     arrays, rest = eqx.partition(run, eqx.is_array)
     leaves, structure = jtu.tree_flatten(arrays)
-    if not _is_traced(leaves):
+    if not _is_traced(map(unbatched, leaves)):
         return compute(run)
 
     def whole(leaves: Sequence[Any]) -> _Run:
@@ -137,5 +137,5 @@ def _is_real(leaf: Scalar) -> bool:
     return jnp.issubdtype(jnp.result_type(leaf), jnp.inexact)
 
 
-def _is_traced(leaves: Sequence[object]) -> bool:
+def _is_traced(leaves: Iterable[object]) -> bool:
     return any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
