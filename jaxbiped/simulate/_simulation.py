@@ -261,7 +261,6 @@ def _slopes(
         rtol=run.rtol,
         places=places,
         active=active,
-        device=run.engine == "cuda",
     )
 
 

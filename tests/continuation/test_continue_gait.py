@@ -229,8 +229,8 @@ def test_the_compliant_branch_turns_at_a_fold():
     assert folds[0].value == pytest.approx(0.0095185, abs=1e-6)
     state = branch.state(folds[0])
     options = dict(parameters=(), radius_sensitivities=False)
-    inside = jb.find_gait(jb.seed_scene(slope=folds[0].value + 3e-6), state, **options)
-    outside = jb.find_gait(jb.seed_scene(slope=folds[0].value - 3e-6), state, **options)
+    inside = jb.find_gait(jb.seed_scene(slope=folds[0].value + 1e-6), state, **options)
+    outside = jb.find_gait(jb.seed_scene(slope=folds[0].value - 1e-6), state, **options)
     assert str(inside.outcome) == "found"
     assert str(outside.outcome) != "found"
     assert {True, False} <= set(branch.stable)

@@ -14,13 +14,13 @@ LANDING = ("end", "steps", "labels", "rigid")
 MOST = {
     "end": (255, 744, 984),
     "steps": (255, 692, 1060),
-    "times": (255, 748, 1148),
+    "times": (255, 804, 1100),
     "arrivals": (255, 788, 1088),
     "extremes": (255, 840, 1092),
-    "tangents": (255, 6524, 11724),
-    "labels": (255, 2400, 3944),
+    "tangents": (255, 744, 984),
+    "labels": (255, 2440, 3992),
     "rigid": (236, 0, 0),
-    "rigid_labels": (255, 608, 568),
+    "rigid_labels": (255, 636, 596),
 }
 """Registers of a thread, bytes that are stored to and loaded from memory for want of them:
 on sm_90, by `ptxas` 12.9."""
