@@ -25,6 +25,8 @@ from jaxbiped.simulate._slopes import Slopes
 from jaxbiped.solve._trajectory import Trajectory
 
 _Run = TypeVar("_Run")
+_STILL = object()
+"""Tangent of what is known."""
 
 
 def with_derivatives(
@@ -46,11 +48,19 @@ def with_derivatives(
     """
     arrays, rest = eqx.partition(run, eqx.is_array)
     leaves, structure = jtu.tree_flatten(arrays)
-    if not _is_traced(map(unbatched, leaves)):
+    # What is known stays so: the times to save at must be, for lanes.
+    traced = [i for i, leaf in enumerate(leaves) if isinstance(leaf, jax.core.Tracer)]
+    if not _is_traced(unbatched(leaves[i]) for i in traced):
         return compute(run)
 
-    def whole(leaves: Sequence[Any]) -> _Run:
-        found: _Run = eqx.combine(jtu.tree_unflatten(structure, leaves), rest)
+    def filled(others: Sequence[Any], values: Sequence[Any]) -> PyTree:
+        every = list(others)
+        for i, value in zip(traced, values, strict=True):
+            every[i] = value
+        return jtu.tree_unflatten(structure, every)
+
+    def whole(values: Sequence[Any]) -> _Run:
+        found: _Run = eqx.combine(filled(leaves, values), rest)
         return found
 
     @jax.custom_jvp
@@ -60,7 +70,7 @@ def with_derivatives(
     def rule(
         primals: Sequence[Scalar], tangents: Sequence[Scalar | SymbolicZero]
     ) -> tuple[Trajectory[Any], Trajectory[Any]]:
-        dots = moving(jtu.tree_unflatten(structure, tangents))
+        dots = moving(filled([_STILL] * len(leaves), tangents))
         state_dots, scene_dots, clock_dots = map(_moved, dots)
         # What is known is not traced along with the tangents: JAX compiles no small programs.
         known = not _is_traced(primals)
@@ -72,7 +82,7 @@ def with_derivatives(
         return found, _tangent_of(found, *_contract(at, along, *clock_dots.values()))
 
     function.defjvp(rule, symbolic_zeros=True)
-    return function(*leaves)
+    return function(*(leaves[i] for i in traced))
 
 
 @jax.custom_jvp
@@ -123,8 +133,12 @@ def _tangent_of(found: Trajectory, t_dot: Scalar, leaf_dots: list[Scalar]) -> Tr
 
 def _moved(dots: PyTree) -> dict[int, Scalar]:
     """Tangents of the leaves that have one, by place."""
-    leaves = jtu.tree_leaves(dots, is_leaf=lambda leaf: isinstance(leaf, SymbolicZero))
-    return {i: leaf for i, leaf in enumerate(leaves) if not isinstance(leaf, SymbolicZero)}
+    leaves = jtu.tree_leaves(dots, is_leaf=_is_still)
+    return {i: leaf for i, leaf in enumerate(leaves) if not _is_still(leaf)}
+
+
+def _is_still(dot: object) -> bool:
+    return dot is _STILL or isinstance(dot, SymbolicZero)
 
 
 def _no_tangent(leaf: Scalar) -> Scalar | np.ndarray:
