@@ -1,6 +1,6 @@
 """Meeting of motions at a switch: derivatives at the moment at which each of them passes it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -67,7 +67,10 @@ def meet(
 
     forcings = jnp.zeros(len(columns[0])), meeting.by_parameter * sizes
     parts = zip(columns, shifts, forcings, strict=True)
-    both = [_along_rows(follow, *part) if len(part[0]) else part[:2] for part in parts]
+    both = [
+        jax.lax.map(lambda each: follow(*each), part) if len(part[0]) else part[:2]
+        for part in parts
+    ]
     met, later = zip(*both, strict=True)
     return list(met), later
 
@@ -78,14 +81,4 @@ def at_fixed_time(
     """Columns at a fixed time where the state changes at these rates."""
     velocity = jnp.stack(jtu.tree_leaves(rates))
     pairs = zip(columns, shifts, strict=True)
-    return [
-        _along_rows(lambda column, shift: column - velocity * shift, *pair)
-        if len(pair[0])
-        else pair[0]
-        for pair in pairs
-    ]
-
-
-def _along_rows(function: Callable[..., PyTree], *rows: Scalar) -> PyTree:
-    """A function of rows, one after the other."""
-    return jax.lax.map(lambda each: function(*each), rows)
+    return [column - shift[:, None] * velocity for column, shift in pairs]

@@ -41,7 +41,7 @@ def test_lanes_bits_and_registers(monkeypatch, name):
     assert fake.launches
     for a, b in zip(jtu.tree_leaves(found), jtu.tree_leaves(expected), strict=True):
         np.testing.assert_array_equal(a, b)
-    # A gradient's programs are those of the end and of tangents.
+    # Of a gradient the end is a device's; its columns are the CPU's.
     registers, stores, loads = MOST.get(name, (0, 0, 0))
     for text in fake.modules if name in MOST else ():
         for architecture in ARCHITECTURES.values():
