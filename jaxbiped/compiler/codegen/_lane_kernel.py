@@ -66,7 +66,7 @@ class _Kernel:
             w.homes[id(value)] = Place(rooms.row, offset)
         w.homes[id(graph.next_time)] = Place(rooms.next_time, 0)
         for value in _values_to_compute(graph.prepare, self.needed):
-            self.kept.append((value, Place(w.room(value.kind, 1), 0)))
+            self.kept.append((value, Place(self._zeroed_room(value.kind, 1), 0)))
         for array in graph.carried:
             self._carry_room(array)
 
@@ -74,20 +74,28 @@ class _Kernel:
         """Memory for what is carried: along its first axis one behind the other, for maps."""
         if not array.size:
             return
-        w, t = self.writer, self.t
+        w = self.writer
         kind = next(iter(array.ravel())).kind
         rows = np.moveaxis(array, 0, -1) if array.ndim else array.reshape(1)
         padded = w.padded(rows.shape[-1]) if array.ndim else 1
         flat = rows.reshape(-1, rows.shape[-1])
-        pointer = w.room(kind, padded * len(flat))
+        pointer = self._zeroed_room(kind, padded * len(flat))
         if array.ndim:
             w.padded_rooms.add(pointer)
-        size = padded * len(flat) * self.width * BYTES[kind]
-        t.declarations.add("declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
-        t.line(f"call void @llvm.memset.p0.i64(ptr {pointer}, i8 0, i64 {size}, i1 false)")
         for j, row in enumerate(flat):
             for k, value in enumerate(row):
                 w.homes[id(value)] = Place(pointer, j * padded + k)
+
+    def _zeroed_room(self, kind: Kind, count: int) -> str:
+        """Memory with zeros: the first outputs are made of it, before any simulation has begun.
+
+        They are given to nobody, but LLVM takes a branch on memory without content for a proof
+        that the kernel is never run.
+        """
+        pointer, size = self.writer.room(kind, count), count * self.width * BYTES[kind]
+        self.t.declarations.add("declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
+        self.t.line(f"call void @llvm.memset.p0.i64(ptr {pointer}, i8 0, i64 {size}, i1 false)")
+        return pointer
 
     def _refill(self) -> None:
         """Lanes that are done give their outputs and take the next simulations."""
