@@ -66,6 +66,7 @@ def _programs() -> dict[str, Any]:
         "final state": lambda rate: walk(rate, save="end"),
         "arrivals": lambda rate: walk(rate, save=jb.MidStance()),
         "extremes": lambda rate: walk(rate, save="end", extremes=lambda _, y: y.hip_z),
+        "tangents": jax.jacfwd(lambda rate: walk(rate, save="end")),
     }
     found = {}
     for name, function in asked.items():

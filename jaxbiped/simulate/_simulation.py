@@ -261,6 +261,7 @@ def _slopes(
         rtol=run.rtol,
         places=places,
         active=active,
+        device=run.engine == "cuda",
     )
 
 

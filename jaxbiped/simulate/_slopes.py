@@ -9,7 +9,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.compiler import host_jit
+from jaxbiped.compiler import CUDA, host_jit
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import exchange_legs
@@ -50,7 +50,7 @@ class Slopes(NamedTuple):
     rates: Scalar
 
 
-@host_jit()
+@host_jit(lambda *_, device, **__: not device)
 def slopes_of(
     scene: Scene,
     state: PyTree,
@@ -62,6 +62,7 @@ def slopes_of(
     rtol: Scalar,
     places: tuple[int, ...],
     active: tuple[int, ...],
+    device: bool,
 ) -> Slopes:
     """Derivatives of what was `found`, with respect to some leaves of the state and of the scene.
 
@@ -74,6 +75,7 @@ def slopes_of(
         section: at which arrivals were saved.
         rtol: relative tolerance of the solve.
         places, active: of the leaves that are differentiated.
+        device: whether CUDA devices carry the columns; else it is lanes where they can, else XLA.
     """
     wide: tuple[Scene, PyTree, PyTree] = jtu.tree_map(_widened, (scene, state, found.state))
     scene, state, saved = wide
@@ -97,6 +99,7 @@ def slopes_of(
             places=places,
             active=active,
             precision=Precision(rtol, LOOSER * rtol),
+            engine=CUDA if device else None,
         )
         time = jnp.zeros(at.columns.shape[:2])
     columns = at.columns

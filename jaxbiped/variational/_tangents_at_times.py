@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, select
+from jaxbiped.compiler import AbstractEngine
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -43,6 +44,7 @@ def tangents_at_times(
     places: tuple[int, ...],
     active: tuple[int, ...],
     precision: Precision,
+    engine: AbstractEngine | None = None,
 ) -> TangentsAtTimes:
     """Follows a motion from one time to the next, with its derivatives.
 
@@ -57,7 +59,7 @@ def tangents_at_times(
         since, at = now
         moves = jnp.isfinite(time) & (time > since)
         lasts = jnp.where(moves, time - since, 0.0)
-        found = tangents_after(watch, solver, at, seeded, lasts, precision)
+        found = tangents_after(watch, solver, at, seeded, lasts, precision, engine)
         after = select(moves, found, at)
         return (jnp.where(moves, time, since), after), TangentsAtTimes(after.state, after.columns.T)
 
@@ -92,6 +94,7 @@ def tangents_after(
     seeded: Seeded,
     time: Scalar,
     precision: Precision,
+    engine: AbstractEngine | None = None,
 ) -> Tangents:
     """A state and its derivatives a fixed time [s] later; NaN where they are not determined."""
     found, _ = solve_variational(
@@ -103,6 +106,6 @@ def tangents_after(
         precision=precision,
         max_time=time,
         max_solver_steps=_MOST_ATTEMPTS,
-        engine=None,
+        engine=engine,
     )
     return Tangents(found.state, jnp.where(found.undetermined, jnp.nan, found.columns.T))
