@@ -15,7 +15,12 @@ from jaxtyping import PyTree
 from jaxbiped._types import RealScalarLike, Scalar, Time
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_cubic import StepCubic
-from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
+from jaxbiped.solve.controllers._wrapped_control import (
+    AbstractWrappedControl,
+    Adapted,
+    StepControl,
+    try_again,
+)
 from jaxbiped.variational._grazing import turns_of
 from jaxbiped.variational._tangents import plain_args, plain_state
 from jaxbiped.variational._watch import Watch, surfaces_of
@@ -117,9 +122,10 @@ class SwitchLocator(AbstractWrappedControl):
         controller_state: SwitchLocatorState,
     ) -> Adapted:
         """Accepts or rejects a step, as diffrax asks."""
-        keep, next_t0, next_t1, jump, inner, result = self.controller.adapt_step_size(
+        adapted = self.controller.adapt_step_size(
             t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state.inner
         )
+        *_, jump, _, result = adapted
         parts = (plain_args(args), plain_state(y0), plain_state(y1_candidate))
         scene, before, after = jax.lax.stop_gradient(parts)
         crossed, part = self._crossings(
@@ -132,12 +138,8 @@ class SwitchLocator(AbstractWrappedControl):
         approaches = crossed.field & (before_switch > NEAR)
         target = jnp.where(approaches, t0 + before_switch * (1.0 - _BEFORE), target)
         target = jax.lax.stop_gradient(target)
-        next_t1 = jnp.where(again, jnp.where(keep, target, jnp.minimum(next_t1, target)), next_t1)
-        next_t0 = jnp.where(again, t0, next_t0)
-        keep = keep & ~again
-        inner = jtu.tree_map(
-            lambda old, new: jnp.where(again, old, new), controller_state.inner, inner
-        )
+        before_it = controller_state.inner
+        keep, next_t0, next_t1, inner = try_again(again, target, t0, adapted, before_it)
         landed = self._landed(inner, keep, crossed, scene, after, y1_candidate, controller_state)
         ends = landed.arrived | (landed.code != 0)
         ended = diffrax.RESULTS.where(

@@ -6,7 +6,6 @@ import diffrax
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
@@ -14,7 +13,12 @@ from jaxbiped._types import RealScalarLike, Scalar, Time
 from jaxbiped.solve._ending import ending_events
 from jaxbiped.solve._ending_surface import ending_surface
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
+from jaxbiped.solve.controllers._wrapped_control import (
+    AbstractWrappedControl,
+    Adapted,
+    StepControl,
+    try_again,
+)
 
 _OVERSHOOT = 1e-9
 """Part of the way to an event that the last step may go past it."""
@@ -55,9 +59,10 @@ class LocatedEnding(AbstractWrappedControl):
         controller_state: Any,
     ) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, but for the last one."""
-        keep, next_t0, next_t1, jump, inner, result = self.controller.adapt_step_size(
+        adapted = self.controller.adapt_step_size(
             t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state
         )
+        keep, _, _, jump, _, result = adapted
         start, span = jnp.asarray(t0), jnp.asarray(t1 - t0)
         walked = jnp.asarray(result != diffrax.RESULTS.successful)
         probe = y1_candidate if self.probe is None else self.probe
@@ -86,7 +91,6 @@ class LocatedEnding(AbstractWrappedControl):
         target = start + way * (1.0 + 0.5 * _OVERSHOOT) + _MARGIN
         possible = (target > start) & (target < start + span)
         again, target = jax.lax.stop_gradient((again & possible, target))
-        inner = jtu.tree_map(lambda a, b: jnp.where(again, a, b), controller_state, inner)
         result = diffrax.RESULTS.where(again, diffrax.RESULTS.successful, result)
-        next_t0, next_t1 = jnp.where(again, t0, next_t0), jnp.where(again, target, next_t1)
-        return keep & ~again, next_t0, next_t1, jump, inner, result
+        keep, next_t0, next_t1, inner = try_again(again, target, t0, adapted, controller_state)
+        return keep, next_t0, next_t1, jump, inner, result

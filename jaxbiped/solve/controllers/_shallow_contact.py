@@ -10,14 +10,18 @@ from typing import Any, cast
 
 import jax
 import jax.numpy as jnp
-import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import RealScalarLike, Scalar, Time
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_cubic import StepCubic
-from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
+from jaxbiped.solve.controllers._wrapped_control import (
+    AbstractWrappedControl,
+    Adapted,
+    StepControl,
+    try_again,
+)
 
 _OVERSHOOT = 5e-5
 """Part of the way to the ground that a step ends past it."""
@@ -61,16 +65,15 @@ class ShallowContact(AbstractWrappedControl):
         controller_state: Any,
     ) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, but for shallow contacts."""
-        keep, next_t0, next_t1, jump, inner, result = self.controller.adapt_step_size(
+        adapted = self.controller.adapt_step_size(
             t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state
         )
+        keep, _, _, jump, _, result = adapted
         start, span = cast(Scalar, t0), cast(Scalar, t1 - t0)
         found = _touchdown(args, start, span, keep, y0, y1_candidate)
         again, target = jax.lax.stop_gradient(found)
-        next_t1 = jnp.where(again, jnp.where(keep, target, jnp.minimum(next_t1, target)), next_t1)
-        next_t0 = jnp.where(again, t0, next_t0)
-        inner = jtu.tree_map(lambda a, b: jnp.where(again, a, b), controller_state, inner)
-        return keep & ~again, next_t0, next_t1, jump, inner, result
+        keep, next_t0, next_t1, inner = try_again(again, target, t0, adapted, controller_state)
+        return keep, next_t0, next_t1, jump, inner, result
 
 
 def _touchdown(

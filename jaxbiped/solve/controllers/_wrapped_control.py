@@ -8,9 +8,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
 
 import equinox as eqx
+import jax.numpy as jnp
+import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped._types import RealScalarLike, Scalar, Time
 from jaxbiped.solve._accuracy import rms_norm
 
 if TYPE_CHECKING:  # which takes the adaptive one's abstract attributes for arguments
@@ -34,6 +36,20 @@ class StepControl(Protocol):
 
     def adapt_step_size(self, *step: Any) -> Adapted:
         """Accepts or rejects a step."""
+
+
+def try_again(
+    again: Scalar, target: Scalar, start: Time, adapted: Adapted, before: Any
+) -> tuple[Scalar, Scalar, Scalar, Any]:
+    """Whether a step is kept, the next one's ends and the controller's state.
+
+    Where it is tried `again`, the next one ends at the `target` at the latest, and the controller
+    knows what it did `before`.
+    """
+    keep, next_t0, next_t1, _, state, _ = adapted
+    sooner = jnp.where(keep, target, jnp.minimum(next_t1, target))
+    state = jtu.tree_map(lambda a, b: jnp.where(again, a, b), before, state)
+    return keep & ~again, jnp.where(again, start, next_t0), jnp.where(again, sooner, next_t1), state
 
 
 class AbstractWrappedControl(AbstractControl):  # type: ignore[type-arg]
