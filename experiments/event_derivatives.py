@@ -8,6 +8,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
+import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,12 +19,21 @@ import jaxbiped as jb
 
 SEED, START = jb.seed_scene(), jb.seed_state()
 RIGID = jb.ladder()["rigid"]
-MODES = {"jacfwd": jax.jacfwd, "jacrev": jax.jacrev, "hessian": jax.hessian}
-NORMAL = ("ristow-schafer", "kelvin-voigt", "hunt-crossley", "tsuji", "kuwabara-kono", "hertz")
-FRICTION = ("stribeck", "coulomb", "andersson", "brown-mcphee", "viscous")
 ACCURACIES = ("draft", "balanced", "tight")
-Simulated = Callable[[Any, str, str], Any]
-"""Numbers of a simulation by what is moved, the accuracy and the engine."""
+ENGINES = ("lanes", "xla")
+
+
+@dataclasses.dataclass(frozen=True)
+class How:
+    """How a simulation is computed and differentiated."""
+
+    accuracy: str
+    engine: str
+    forward: bool = True
+
+
+Simulated = Callable[[Any, How], Any]
+"""Numbers of a simulation by what is moved, and how."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,7 +44,28 @@ class Case:
     ends: str
     run: Simulated
     at: float
-    step: float = 1e-5
+    step: float = 1e-4
+    engines: tuple[str, ...] = ENGINES
+
+
+# ruff: noqa: D102
+class Ball(jb.gait.AbstractSystem):
+    """A ball (y, v) in air with linear drag, which a paddle returns: v becomes 1 − 0.8 v."""
+
+    def vector_field(self, t: Any, y: Any, args: Any) -> Any:
+        return y[1], -9.8 - args * y[1]
+
+    def switches(self, args: Any, y: Any) -> Any:
+        return ()
+
+    def ending(self, args: Any, y: Any) -> Any:
+        return jnp.asarray(0)
+
+    def load(self, args: Any, y: Any) -> Any:
+        return None
+
+    def reset_map(self, args: Any, y: Any) -> Any:
+        return y[0], 1.0 - 0.8 * y[1]
 
 
 def _slips(name: str) -> Any:
@@ -45,30 +76,63 @@ def _slips(name: str) -> Any:
 
 
 def _walk(scene: Any, start: jb.State, **how: Any) -> Simulated:
-    """Time and end of a walk by the rate of the swing leg."""
+    """Times and states of a walk by the rate of the swing leg."""
 
-    def run(rate: Any, accuracy: str, engine: str) -> Any:
-        state = start._replace(omega_1=rate)
-        walk = jb.simulate(
-            scene, state, accuracy=accuracy, engine=engine, **({"save": "end"} | how)
-        )
-        if walk.arrivals is not None:
-            count = 2
-            return jnp.stack([*walk.arrivals.t[:count], *walk.arrivals.state.theta_1[:count]])
-        return jnp.stack([*walk.t, *walk.state.hip_x, *walk.state.theta_1, *walk.state.omega_1])
+    def run(rate: Any, by: How) -> Any:
+        state, given = start._replace(omega_1=rate), {"save": "end"} | how
+        walk = jb.simulate(scene, state, accuracy=by.accuracy, engine=by.engine, **given)
+        found = walk if walk.arrivals is None else walk.arrivals
+        count = 2 if walk.arrivals is not None else None
+        at = (found.t, found.state.hip_x, found.state.theta_1, found.state.omega_1)
+        return jnp.concatenate([leaf[:count] for leaf in at])
 
     return run
 
 
 def _rolls(start: Any, **how: Any) -> Simulated:
-    """Time and end of a rigid walk by the rate of the swing leg."""
+    """Times and states of a rigid walk by the rate of the swing leg."""
 
-    def run(rate: Any, accuracy: str, engine: str) -> Any:
-        state = start._replace(omega_1=rate)
-        walk = jb.rigid_walk(RIGID, state, accuracy=accuracy, engine=engine, **how)
-        return jnp.stack([*walk.t, *walk.state.hip_x, *walk.state.theta_1, *walk.state.omega_1])
+    def run(rate: Any, by: How) -> Any:
+        state, strikes = start._replace(omega_1=rate), how.get("max_arrivals", 0)
+        walk = jb.rigid_walk(RIGID, state, accuracy=by.accuracy, engine=by.engine, **how)
+        found = walk.arrivals if strikes else walk
+        at = (found.t, found.state.hip_x, found.state.theta_1, found.state.omega_1)
+        return jnp.concatenate([leaf[: strikes or None] for leaf in at])
 
     return run
+
+
+def _returns(args: Any, state_at: Callable[[Any], Any], **how: Any) -> Simulated:
+    """Time and state of a return by a component of the start."""
+
+    def run(x: Any, by: How) -> Any:
+        accuracy = "balanced" if by.accuracy == "draft" else by.accuracy
+        gradient = jb.Forward() if by.forward else jb.Reverse()
+        given = {"accuracy": accuracy, "engine": by.engine, "gradient": gradient} | how
+        found = jb.return_map(args, state_at(x), **given)
+        return jnp.stack([found.time, *jax.tree.leaves(found.state)])
+
+    return run
+
+
+def _gait(slope: Any, by: How) -> Any:
+    """Measures of a gait by the slope."""
+    gait = jb.gait_measures(jb.seed_scene(slope=slope), accuracy=by.accuracy, engine=by.engine)
+    return jnp.stack([gait.period, gait.step_length, gait.state.theta_1, gait.state.omega_1])
+
+
+def _swing(angle: Any, by: How) -> Any:
+    """Angle and rate of a leg that swings from a pin, after a second, by its first angle."""
+    body, joint = jb.constraints.Body(1.0, 0.0096), jb.constraints.Joint((0.0, 0.1), (0.0, 0.0), 0)
+    linkage = jb.constraints.Linkage((body,), (joint,))
+    scene = jb.LinkageScene(linkage, jb.constraints.Baumgarte())
+    zero = jnp.zeros_like(angle)
+    place = (0.1 * jnp.sin(angle), -0.1 * jnp.cos(angle), angle)
+    start = jb.dynamics.LinkageState(place, (zero, zero, zero))
+    adjoint = diffrax.ForwardMode() if by.forward else None
+    given = {"times": jnp.array([1.0]), "accuracy": by.accuracy, "adjoint": adjoint}
+    found = jb.swing(scene, start, **given)
+    return jnp.stack([found.state.q[2][-1], found.state.v[2][-1]])
 
 
 def cases() -> list[Case]:
@@ -80,8 +144,14 @@ def cases() -> list[Case]:
     stop = START._replace(omega_2=-1.3137, theta_1=-0.4124, hip_vx=0.3559)
     trip = START._replace(omega_2=-0.2945, theta_1=-0.1838, hip_vx=0.7326)
     rigid = jb.dynamics.rigid_state(START)
+    hinged = jb.RedundantScene(SEED, "baumgarte")
     times, strikes = jnp.array([0.2, 0.5, 0.9]), jb.HeelStrike()
     rate = float(START.omega_1)
+    down = jb.Section(lambda args, y: -y[0])
+
+    def started(like: Any) -> Callable[[Any], Any]:
+        return lambda rate: like._replace(omega_1=rate)
+
     return [
         Case("compliant", "duration", _walk(SEED, START, duration=0.9), rate),
         Case("compliant", "footsteps", _walk(SEED, START, footsteps=2), rate),
@@ -92,62 +162,77 @@ def cases() -> list[Case]:
         Case("compliant", "saved times", _walk(SEED, START, duration=0.9, save=times), rate),
         Case("compliant", "arrivals", _walk(SEED, START, duration=0.9, save=strikes), rate),
         Case("compliant", "every step", _walk(SEED, START, duration=0.1, save="steps"), rate),
+        Case("compliant", "return map", _returns(SEED, started(START)), rate),
+        Case("compliant", "gait", _gait, 0.02),
         Case("bristle", "duration", _walk(bristles, START, duration=0.9), rate),
         Case("bristle", "footsteps", _walk(bristles, START, footsteps=2), rate),
+        Case("bristle", "arrivals", _walk(bristles, START, duration=0.9, save=strikes), rate),
+        Case("bristle", "return map", _returns(bristles, started(START)), rate),
         Case("rigid", "duration", _rolls(rigid, duration=0.9), rate),
         Case("rigid", "footsteps", _rolls(rigid, footsteps=2), rate),
+        Case("rigid", "arrivals", _rolls(rigid, duration=0.9, max_arrivals=2), rate),
         Case("rigid", "fell forward", _rolls(rigid._replace(omega_2=-1.9), duration=9.0), rate),
         Case("rigid", "fell back", _rolls(rigid, duration=9.0), 1.5),
+        Case("rigid", "return map", _returns(RIGID, started(rigid)), rate),
+        Case("redundant", "footsteps", _walk(hinged, START, footsteps=1), rate),
+        Case("redundant", "return map", _returns(hinged, started(START)), rate),
+        Case("linkage", "swing", _swing, 0.5, engines=("xla",)),
+        Case("own system", "return map", _returns(0.3, _thrown, section=down, system=Ball()), 3.0),
     ]
+
+
+def _thrown(speed: Any) -> tuple[Any, Any]:
+    return jnp.zeros_like(speed), speed
+
+
+def _in_a_batch(function: Any) -> Any:
+    """The Jacobian of the first of two equal lanes of a compiled batch."""
+    return lambda x: jax.jit(jax.vmap(jax.jacfwd(function)))(jnp.stack([x, x]))[0]
+
+
+MODES: dict[str, tuple[bool, Any]] = {
+    "jacfwd": (True, jax.jacfwd),
+    "jacrev": (False, jax.jacrev),
+    "jit(vmap(jacfwd))": (True, _in_a_batch),
+    "hessian": (False, jax.hessian),
+}
+"""Whether a gradient mode that must be chosen is the forward one, and what differentiates."""
 
 
 def error_of(case: Case, mode: str, accuracy: str, engine: str) -> float | str:
     """The relative error of a derivative, or what refuses it."""
-    differs = MODES[mode]
+    if engine not in case.engines:
+        return f"A {case.model}'s {case.ends} has no `engine`: it runs through diffrax."
+    forward, differs = MODES[mode]
+    how = How(accuracy, engine, forward)
     try:
-        told = np.asarray(differs(lambda x: case.run(x, accuracy, engine))(jnp.asarray(case.at)))
+        told = np.asarray(differs(lambda x: case.run(x, how))(jnp.asarray(case.at)))
     except jb.ArgumentError as error:
         return str(error)
-    ends = [np.asarray(case.run(case.at + s * case.step, "tight", "lanes")) for s in (1, -1)]
-    right = (ends[0] - ends[1]) / (2.0 * case.step)
+    fine = How("tight", case.engines[0])
+
+    def difference(step: float) -> Any:
+        ends = [np.asarray(case.run(jnp.asarray(case.at + s * step), fine)) for s in (1, -1)]
+        return (ends[0] - ends[1]) / (2.0 * step)
+
+    right = (4.0 * difference(0.5 * case.step) - difference(case.step)) / 3.0
     return float(np.max(np.abs(told - right)) / np.max(np.abs(right)))
 
 
 def law_cases(options: Options) -> list[Case]:
     """One heel strike and a lift-off by each law of contact."""
-    normal, friction = (NORMAL[1:4], FRICTION[:1]) if options.quick else (NORMAL, FRICTION)
     found = []
-    for name in normal:
-        law = jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
-        for slips in friction:
+    for slips in ("stribeck",) if options.quick else jb.laws.FRICTION_LAWS:
+        for name in ("kelvin-voigt", "tsuji") if options.quick else jb.laws.NORMAL_LAWS:
+            law = jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
             scene = dataclasses.replace(SEED, normal=law, friction=_slips(slips))
             run = _walk(scene, START, duration=0.6)
-            found.append(Case(name, slips, run, float(START.omega_1), 1e-4))
+            found.append(Case(slips, name, run, float(START.omega_1)))
     return found
 
 
 def main() -> None:
     options = parse(__doc__ or "")
-    rows: list[dict[str, Any]] = []
-    engines = ("lanes",) if options.quick else ("lanes", "xla")
-    modes = ("jacfwd", "jacrev") if options.quick else tuple(MODES)
-    every = cases()[:9:2] if options.quick else cases()
-    for case in tqdm(every, desc="endings"):
-        cells = {f"{e}, {m}": error_of(case, m, "balanced", e) for e in engines for m in modes}
-        rows.append({"model": case.model, "ends": case.ends, "errors": cells})
-    laws: list[dict[str, Any]] = []
-    for case in tqdm(law_cases(options), desc="laws"):
-        cells = {a: error_of(case, "jacfwd", a, "lanes") for a in ACCURACIES}
-        laws.append({"normal": case.model, "friction": case.ends, "errors": cells})
-    tables = [_table(("model", "ends"), rows), _table(("normal", "friction"), laws)]
-    options.path("event_derivatives.md").write_text("\n\n".join(tables) + "\n")
-    for table in tables:
-        options.say(table)
-    options.finish({"endings": rows, "laws": laws})
-
-
-def _table(names: tuple[str, str], rows: list[dict[str, Any]]) -> str:
-    heads = [*names, *rows[0]["errors"]]
     notes: list[str] = []
 
     def cell(value: float | str) -> str:
@@ -155,14 +240,35 @@ def _table(names: tuple[str, str], rows: list[dict[str, Any]]) -> str:
             return f"{value:.0e}"
         if value not in notes:
             notes.append(value)
-        return f"refused [{notes.index(value) + 1}]"
+        return f"[{notes.index(value) + 1}]"
 
-    lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
-    for row in rows:
-        cells = [row[name] for name in names] + [cell(each) for each in row["errors"].values()]
-        lines.append(f"| {' | '.join(cells)} |")
-    lines += [f"\n[{k}] {note}" for k, note in enumerate(notes, 1)]
-    return "\n".join(lines)
+    engines = ENGINES[:1] if options.quick else ENGINES
+    modes = tuple(MODES)[:2] if options.quick else tuple(MODES)
+    endings: list[dict[str, Any]] = []
+    for case in tqdm(cases()[:9:2] if options.quick else cases(), desc="endings"):
+        cells = {f"{e}, {m}": error_of(case, m, "balanced", e) for e in engines for m in modes}
+        endings.append({"model": case.model, "ends": case.ends, "errors": cells})
+    rows = [[each["model"], each["ends"], *map(cell, each["errors"].values())] for each in endings]
+    tables = [_table(["model", "ends", *endings[0]["errors"]], rows)]
+    laws: dict[str, dict[str, list[float | str]]] = {}
+    for case in tqdm(law_cases(options), desc="laws"):
+        errors = [error_of(case, "jacfwd", accuracy, "lanes") for accuracy in ACCURACIES]
+        laws.setdefault(case.model, {})[case.ends] = errors
+    rows = [
+        [name, *(" / ".join(map(cell, errors)) for errors in row.values())]
+        for name, row in laws.items()
+    ]
+    tables += [_table([" / ".join(ACCURACIES), *next(iter(laws.values()))], rows)]
+    tables += [f"[{k}] {note}" for k, note in enumerate(notes, 1)]
+    options.path("event_derivatives.md").write_text("\n\n".join(tables) + "\n")
+    for table in tables:
+        options.say(table)
+    options.finish({"endings": endings, "laws": laws})
+
+
+def _table(heads: list[str], rows: list[list[str]]) -> str:
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped.continuation._bifurcations import BranchEvent
+from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._continue_gait import continue_gait
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._check_scene import check_scene
@@ -105,9 +105,15 @@ def nearest_bifurcation(
     seen = [each for each in branch.bifurcations if level or each.value / own > 0.0]
     if not seen:
         return NearestBifurcation(along, None, math.nan, math.nan, complex(math.nan), math.nan)
-    if level:
-        first, ratio = min(seen, key=lambda each: abs(each.value)), math.nan
-    else:
-        first = min(seen, key=lambda each: abs(math.log(each.value / own)))
-        ratio = first.value / own
+
+    def distance(value: float) -> float:
+        return abs(value) if level else abs(math.log(value / own))
+
+    def nearest(each: BifurcationPoint) -> float:
+        # One that was not located lies between two values.
+        ends = (each.value,) if math.isnan(each.beyond) else (each.value, each.beyond)
+        return min(map(distance, ends))
+
+    first = min(seen, key=nearest)
+    ratio = math.nan if level else first.value / own
     return NearestBifurcation(along, first.kind, first.value, ratio, first.multiplier, first.error)

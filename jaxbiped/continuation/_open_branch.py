@@ -45,10 +45,8 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
     if "branch" not in dataset.attrs:
         raise ArgumentError("dataset is not allowed: it must be that of a branch.")
     settings = json.loads(dataset.attrs["branch"])
-    # Datasets of earlier versions do not tell what the scene is made of beside its numbers.
-    kept = {name: settings[name] for name in ("scene", "model") if name in settings}
     own = scene_identity(scene)
-    difference = difference_of(kept, {name: own[name] for name in kept})
+    difference = difference_of({name: settings.get(name) for name in own}, own)
     if difference is not None:
         raise ArgumentError(
             f"scene is not allowed: it differs from the branch's own in {difference}."

@@ -172,7 +172,7 @@ def find_gait(
         residual=_RESIDUAL_SHARE * precision.rtol,
         patience=np.asarray(int(most)),
     )
-    searching = (spec, scene, start, precision, how)
+    searching = (spec, scene, active, start, precision, how)
     describing = (names, active, radius_sensitivities)
     by = FoundBy.GUESS if guess is not None else FoundBy.START
     origin = single_stage_origin(modelled, start, by)
@@ -203,7 +203,7 @@ def _search_on(
     searching: SearchArguments, modelled: Scene | RigidScene, first: Found, engine: str
 ) -> tuple[Found, Origin]:
     """The stages of a search beyond the first."""
-    spec, scene, start, precision, how = searching
+    spec, scene, active, start, precision, how = searching
     solver = orbit_solver(None, rigid=not modelled.compliant)
     section = section_of(modelled, None)
     if scene.redundant:
@@ -214,7 +214,7 @@ def _search_on(
 
     def search_from(spec: ReturnMapSpec, scene: PyTree, start: PyTree, patience: int) -> Found:
         hasty = dataclasses.replace(how, patience=np.asarray(min(patience, how.max_evaluations)))
-        return _search(spec, scene, start, precision, hasty)
+        return _search(spec, scene, active, start, precision, hasty)
 
     rtol = float(precision.rtol)
     staged = search_in_stages(search_from, spec, scout, scene, modelled, first, rtol)
@@ -251,7 +251,7 @@ def _compilation_of(kind: tuple[object, ...]) -> Once[None]:
 
 def _compile(searching: SearchArguments, describing: Described, origin: Origin) -> None:
     """Compiles both programs, and what lanes run for them, at the same time."""
-    spec, scene, start, precision, _ = searching
+    spec, scene, _, start, precision, _ = searching
     told = stage("compiling the search (first time for this kind of scene)")
     with told, ThreadPoolExecutor() as meanwhile:
         with deferred_checks() as programs:

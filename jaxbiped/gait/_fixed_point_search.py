@@ -98,13 +98,16 @@ class Found(NamedTuple):
 Run = Callable[[Scalar, Scalar, Scalar], LinearisedReturn]
 """The return from recurring components, as exactly as a stage wants, or none where idle."""
 
-SearchArguments: TypeAlias = tuple[ReturnMapSpec, PyTree, PyTree, Precision, Method]
+SearchArguments: TypeAlias = tuple[
+    ReturnMapSpec, PyTree, tuple[int, ...], PyTree, Precision, Method
+]
 """Those of `search`, for a scene and a guess."""
 
 
 def search(
     spec: ReturnMapSpec,
     args: PyTree,
+    active: tuple[int, ...],
     guess: PyTree,
     precision: Precision,
     method: Method,
@@ -112,12 +115,13 @@ def search(
 ) -> Found:
     """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely.
 
-    Not at all where not `wanted`. It knows no parameters: which gait is found does not depend on
-    what is asked of it (see `with_parameter_columns`).
+    Not at all where not `wanted`. Derivatives with respect to the active parameters are not carried
+    (see `with_parameter_columns`): which gait is found does not depend on what is asked of it. They
+    are named so that one program serves for both.
     """
     first = recurring_components(spec.system, guess)
     off = jnp.abs(spec.section.value(args, guess))
-    run = _runner(spec, args, guess, precision)
+    run = _runner(spec, args, active, guess, precision)
     shape: LinearisedReturn = jax.eval_shape(run, first, jnp.asarray(0), jnp.asarray(True))
     empty_return = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
     begin = initial_progress(first, off, method, empty_return)
@@ -156,9 +160,15 @@ def _with_soundness(spec: ReturnMapSpec, args: PyTree, guess: PyTree, end: Progr
     return is_sound(args, state, jnp.sum(last.advance), last.period)
 
 
-def _runner(spec: ReturnMapSpec, args: PyTree, guess: PyTree, precision: Precision) -> Run:
+def _runner(
+    spec: ReturnMapSpec,
+    args: PyTree,
+    active: tuple[int, ...],
+    guess: PyTree,
+    precision: Precision,
+) -> Run:
     """Returns, with derivatives with respect to the state."""
-    seeds, _ = seed_directions(args, (), len(recurring_components(spec.system, guess)))
+    seeds, _ = seed_directions(args, active, len(recurring_components(spec.system, guess)))
     coarse = looser(precision)
 
     def run(trial: Scalar, stage: Scalar, idle: Scalar) -> LinearisedReturn:
@@ -168,7 +178,9 @@ def _runner(spec: ReturnMapSpec, args: PyTree, guess: PyTree, precision: Precisi
                 for a, b, c in zip(precision, coarse, ROUGH, strict=True)
             )
         )
-        return linearised_return(spec, seeds, state_with(spec.system, guess, trial), wanted, idle)
+        start = state_with(spec.system, guess, trial)
+        no = jnp.asarray(False)
+        return linearised_return(spec, seeds, start, wanted, idle, carries_parameters=no)
 
     return run
 

@@ -64,6 +64,7 @@ class _Way(NamedTuple):
 def search_along(
     spec: ReturnMapSpec,
     scene: AbstractScene,
+    active: tuple[int, ...],
     start: WalkerState,
     precision: Precision,
     method: Method,
@@ -78,9 +79,10 @@ def search_along(
     def run(way: _Way) -> Found:
         there = line.at(jnp.where(way.s < 0.0, 1.0, way.s))
         guess = state_with(spec.system, start, way.ahead)
-        return search(spec, there, guess, precision, method, ~way.over)
+        return search(spec, there, active, guess, precision, method, ~way.over)
 
-    shape = jax.eval_shape(lambda: search(spec, scene, start, precision, method, jnp.asarray(True)))
+    one = (spec, scene, active, start, precision, method, jnp.asarray(True))
+    shape = jax.eval_shape(lambda: search(*one))
     no_return = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shape)
     begin = _Way(
         s=jnp.asarray(-1.0),

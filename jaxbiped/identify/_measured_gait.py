@@ -22,7 +22,7 @@ MEASURES = ("period", "step_length", "speed", "peak_normal")
 ANGLES = ("theta_1", "theta_2")
 CLOCKS = ("mid-stance", None)
 _LONGEST = 20.0
-"""Time beyond which a footstep is taken for milliseconds [s]."""
+"""Time beyond which milliseconds are suspected [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -103,8 +103,8 @@ def _filled(values: npt.ArrayLike) -> npt.ArrayLike:
 def _check_seconds(name: str, values: npt.ArrayLike) -> None:
     if holds_somewhere(np.asarray(values) > _LONGEST):
         raise ArgumentError(
-            f"{name} = {np.max(values):g} s is longer than any footstep ({_LONGEST:g} s): it must "
-            "be in seconds; are these milliseconds?"
+            f"{name} = {np.max(values):g} s is not allowed: it must be at most {_LONGEST:g} s; "
+            "are these milliseconds?"
         )
 
 

@@ -23,7 +23,7 @@ from jaxbiped.scene._rigid_scene import RigidScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._trajectory import Trajectory
 
-_ROUNDING = 1e4
+_ROUNDING = 1e2
 """Differences of keys that count as none, in units of the walk's precision."""
 
 

@@ -96,7 +96,7 @@ def test_an_orbit_with_its_multiplier_and_all_derivatives():
     @jax.jit
     def run(args):
         tight = precision_of("tight")
-        found = search(spec, args, guess, tight, Method(None, 40, 1e-10))
+        found = search(spec, args, (), guess, tight, Method(None, 40, 1e-10))
         found = with_parameter_columns(spec, args, active, guess, tight, found)
         return orbit_of(spec, args, active, guess, found, radius=True)
 

@@ -178,7 +178,7 @@ def test_every_solver_carries_derivatives(solver, engine):
 
 def _orbit(spec, args, guess):
     tight = precision_of("tight")
-    found = search(spec, args, guess, tight, Method(None, 40, 1e-10))
+    found = search(spec, args, (), guess, tight, Method(None, 40, 1e-10))
     found = with_parameter_columns(spec, args, (0,), guess, tight, found)
     return orbit_of(spec, args, (0,), guess, found, radius=True)
 
