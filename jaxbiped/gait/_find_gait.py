@@ -172,7 +172,9 @@ def find_gait(
         residual=_RESIDUAL_SHARE * precision.rtol,
         patience=np.asarray(int(most)),
     )
-    searching = (spec, scene, active, start, precision, how)
+    # One program of lanes serves every search, whatever it is asked for, and what follows it.
+    columns = select_parameters(modelled, None)[1] if runs_on == "lanes" else ()
+    searching = (spec, scene, columns, start, precision, how)
     describing = (names, active, radius_sensitivities)
     by = FoundBy.GUESS if guess is not None else FoundBy.START
     origin = single_stage_origin(modelled, start, by)
@@ -203,7 +205,7 @@ def _search_on(
     searching: SearchArguments, modelled: Scene | RigidScene, first: Found, engine: str
 ) -> tuple[Found, Origin]:
     """The stages of a search beyond the first."""
-    spec, scene, active, start, precision, how = searching
+    spec, scene, columns, start, precision, how = searching
     solver = orbit_solver(None, rigid=not modelled.compliant)
     section = section_of(modelled, None)
     if scene.redundant:
@@ -214,7 +216,7 @@ def _search_on(
 
     def search_from(spec: ReturnMapSpec, scene: PyTree, start: PyTree, patience: int) -> Found:
         hasty = dataclasses.replace(how, patience=np.asarray(min(patience, how.max_evaluations)))
-        return _search(spec, scene, active, start, precision, hasty)
+        return _search(spec, scene, columns, start, precision, hasty)
 
     rtol = float(precision.rtol)
     staged = search_in_stages(search_from, spec, scout, scene, modelled, first, rtol)

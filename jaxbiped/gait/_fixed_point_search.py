@@ -116,8 +116,8 @@ def search(
     """Searches from `guess`, on the section or not: roughly, then 10 times looser, then finely.
 
     Not at all where not `wanted`. Derivatives with respect to the active parameters are not carried
-    (see `with_parameter_columns`): which gait is found does not depend on what is asked of it. They
-    are named so that one program serves for both.
+    (see `with_parameter_columns`), for which gait is found does not depend on what is asked of it:
+    they only choose the program.
     """
     first = recurring_components(spec.system, guess)
     off = jnp.abs(spec.section.value(args, guess))

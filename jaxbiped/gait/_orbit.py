@@ -28,6 +28,8 @@ _RADIUS_FLOOR = 2e-8
 parameter's size: of the switches' crossings, which second derivatives magnify."""
 
 
+_ROWS = ("jacobian", "monodromy", "period_row", "advance_rows", "peak_row")
+"""Those of a return's leaves that are derivatives."""
 _NOTHING = 1e-300
 _SHARE = 0.5
 """Of what a looser solve changes, that a first derivative may be wrong by."""
@@ -87,9 +89,10 @@ def with_parameter_columns(
     The gait's own values and derivatives stay those of the search. Of parameters nothing is claimed
     (NaN) where it did not converge.
     """
+    m, own = found.recurring.shape[0], found.both
+    alone = {name: getattr(own, name)[..., :m] for name in _ROWS}
     if not active:
-        return found
-    m = found.recurring.shape[0]
+        return found._replace(both=own._replace(**alone))
     seeds, _ = seed_directions(args, active, m)
     start = state_with(spec.system, guess, found.recurring)
     idle = found.ending == int(Search.NO_RETURN)
@@ -101,14 +104,13 @@ def with_parameter_columns(
     pairs = jax.tree.map(
         lambda *pair: jnp.stack(list(map(jnp.asarray, pair))), precision, looser(precision)
     )
-    new, own = _each_of(spec, once)(pairs), found.both
+    new = _each_of(spec, once)(pairs)
 
     def joined(name: str) -> Scalar:
         parameters = jnp.where(lost, jnp.nan, getattr(new, name)[..., m:])
-        return jnp.concatenate([getattr(own, name)[..., :m], parameters], axis=-1)
+        return jnp.concatenate([alone[name], parameters], axis=-1)
 
-    rows = ("jacobian", "monodromy", "period_row", "advance_rows", "peak_row")
-    changed = {name: joined(name) for name in rows}
+    changed = {name: joined(name) for name in _ROWS}
     for name in ("jumps", "missed", "grazes"):
         changed[name] = jnp.maximum(getattr(own, name), getattr(new, name))
     return found._replace(both=own._replace(nodes=new.nodes, **changed))
