@@ -1,0 +1,109 @@
+"""The trip of a scene through the package: which files it enters in one call of a door.
+
+    python -m tests.scene_trip
+
+Nothing is compiled yet, so that all that traces a program of the scene is on its way. A file is
+entered when a function of it is called from another file with a scene among its arguments. A climb is an entry into a file that lies above the caller's: one
+that imports it, directly or not. An entry into a file that was entered before is a return.
+"""
+
+import ast
+import os
+import sys
+import tempfile
+import threading
+from pathlib import Path
+
+import jaxbiped as jb
+from jaxbiped.scene._abstract_scene import AbstractScene
+
+ROOT = Path(jb.__file__).parent
+DOORS = {
+    "simulate": lambda: jb.simulate(jb.seed_scene(), jb.seed_state(), duration=0.1, save="end"),
+    "find_gait": lambda: jb.find_gait(jb.seed_scene(slope=0.02)),
+    "labelling": lambda: jb.labelling(jb.seed_scene(slope=0.02)),
+}
+
+
+def imports():
+    """The files of the package that each file of it imports."""
+    found = {}
+    for path in sorted(ROOT.rglob("*.py")):
+        names = set()
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("jaxbiped"):
+                names.add(node.module)
+                names.update(f"{node.module}.{alias.name}" for alias in node.names)
+        paths = (ROOT.parent.joinpath(*name.split(".")).with_suffix(".py") for name in names)
+        found[str(path)] = {str(each) for each in paths if each.exists()}
+    return found
+
+
+def above(graph):
+    """The files that each file lies above."""
+    known = {}
+
+    def of(path, open_):
+        if path not in known:
+            below = set()
+            for each in graph.get(path, ()):
+                if each not in open_:
+                    below |= {each} | of(each, open_ | {each})
+            known[path] = below
+        return known[path]
+
+    return {path: of(path, {path}) for path in graph}
+
+
+class Trip:
+    """Entries of a scene into files while something runs."""
+
+    def __init__(self):
+        self.entries = []
+
+    def watch(self, frame, event, _):
+        if event != "call" or frame.f_back is None:
+            return
+        here, there = frame.f_back.f_code.co_filename, frame.f_code.co_filename
+        if here == there or not there.startswith(str(ROOT)) or not here.startswith(str(ROOT)):
+            return
+        code = frame.f_code
+        given = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+        if any(isinstance(frame.f_locals.get(name), AbstractScene) for name in given):
+            self.entries.append((here, there))
+
+    def run(self, door):
+        threading.setprofile(self.watch)
+        sys.setprofile(self.watch)
+        try:
+            door()
+        finally:
+            sys.setprofile(None)
+            threading.setprofile(None)
+
+    def counts(self, below):
+        """Files entered, climbs and returns."""
+        seen, returns, climbs = set(), 0, 0
+        for here, there in dict.fromkeys(self.entries):
+            climbs += here in below.get(there, ())
+            returns += there in seen
+            seen.add(there)
+        return len(seen), climbs, returns
+
+
+def main():
+    below = above(imports())
+    print(f"{'door':12s} files climbs returns")
+    for name, door in DOORS.items():
+        trip = Trip()
+        trip.run(door)
+        print(f"{name:12s} {'%5d %6d %7d' % trip.counts(below)}")
+        if "-v" in sys.argv:
+            for here, there in dict.fromkeys(trip.entries):
+                print("   ", *(str(Path(each).relative_to(ROOT)) for each in (here, there)))
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as nothing_kept:
+        os.environ["JAXBIPED_CACHE"] = nothing_kept
+        main()
