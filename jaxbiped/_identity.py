@@ -9,6 +9,7 @@ import functools
 import hashlib
 import inspect
 import json
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -18,15 +19,24 @@ import numpy as np
 
 _KNOWN = ("jaxbiped", "equinox", "diffrax", "builtins", "abc", "collections", "typing")
 """Packages whose code is no user's own."""
+_OWN_MODULE = re.compile(r"^jaxbiped\.(?:[a-z]\w*\.)*_\w+\.")
 
 
 def qualified_name(thing: Any) -> str:
-    """Module and qualified name of a class or function; of a script's own, the script's name."""
+    """Module and qualified name of a class or function; of a script's own, the script's name.
+
+    The package's own are told without their module, which may move from version to version.
+    """
     module = thing.__module__
     if module == "__main__":
         script = getattr(sys.modules["__main__"], "__file__", None)
         module = f"__main__({Path(script).name})" if script else module
-    return f"{module}.{thing.__qualname__}"
+    return _without_module(f"{module}.{thing.__qualname__}")
+
+
+def _without_module(name: str) -> str:
+    """A name in the package without the private module that it lies in."""
+    return _OWN_MODULE.sub("jaxbiped.", name)
 
 
 def identity(value: object) -> Any:
@@ -81,7 +91,8 @@ def difference_of(
 ) -> str | None:
     """The first difference of two identities in words, None for none.
 
-    `alike` may say of two values and their name that they count as equal.
+    `alike` may say of two values and their name that they count as equal. Names of the package's
+    own classes and functions are compared without their modules, which stores of version 0.1 have.
     """
     if isinstance(old, dict) and isinstance(new, dict):
         for key in dict.fromkeys([*new, *old]):
@@ -97,6 +108,8 @@ def difference_of(
         pairs = enumerate(zip(old, new, strict=True))
         found_ = (difference_of(a, b, f"{name}[{i}]", alike) for i, (a, b) in pairs)
         return next((each for each in found_ if each is not None), None)
+    if isinstance(old, str) and isinstance(new, str):
+        old, new = _without_module(old), _without_module(new)
     if old == new or alike(old, new, name):
         return None
     return f"{name} = {_shown(old)} there, {_shown(new)} here"

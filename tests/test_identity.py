@@ -7,8 +7,8 @@ import equinox as eqx
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._identity import code_digests, identity
-from jaxbiped.scene._scene_identity import scene_identity
+from jaxbiped._identity import code_digests, difference_of, identity
+from jaxbiped.scene._parameter_access import scene_identity
 from tests.sweep.walkers import gaitless
 
 SEED = jb.seed_scene()
@@ -54,7 +54,18 @@ def test_numbers_are_told_once_and_by_name():
     settings = _settings()
     assert settings["scene"]["K"] == 1e6
     assert "K" not in settings["models"]["scene"]["normal"]
-    assert identity(SEED)["normal"]["class"].startswith("jaxbiped.")
+    assert identity(SEED)["normal"]["class"] == "jaxbiped.RistowSchafer"
+
+
+@pytest.mark.parametrize("module", ["scene.laws.normal._ristow_schafer", "scene._moved"])
+def test_a_class_that_moved_within_the_package_is_the_same_model(module):
+    def told(name):
+        return {"class": "jaxbiped.Scene", "normal": {"class": name}}
+
+    older = told(f"jaxbiped.{module}.RistowSchafer")
+    assert difference_of(older, told("jaxbiped.RistowSchafer")) is None
+    assert difference_of(older, told("jaxbiped.Tsuji")) is not None
+    assert difference_of(older, told("mylaws._normal.RistowSchafer")) is not None
 
 
 def test_functions_are_known_by_module_name_and_what_is_bound():

@@ -20,10 +20,8 @@ from jaxbiped.cli._report import Report, table
 from jaxbiped.cli.commands._basin import Basin
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._parameters import parameter_values
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_values
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._accuracy import accuracy_told
 from jaxbiped.sweep._effort import effort_of
 from jaxbiped.sweep._labelling import Labelling

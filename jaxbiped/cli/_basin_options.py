@@ -12,8 +12,7 @@ from jaxbiped.cli._option_checks import check_accuracy, check_engine
 from jaxbiped.cli._option_fields import Engine
 
 if TYPE_CHECKING:
-    from jaxbiped.scene._rigid_scene import RigidScene
-    from jaxbiped.scene._scene import Scene
+    from jaxbiped.scene._scene import RigidScene, Scene
     from jaxbiped.sweep.starts._starts import AbstractStarts
 
 

@@ -10,8 +10,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped.cli._basin_options import StartsOptions, parse_axis
 from jaxbiped.dynamics._rigid_state import rigid_state
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep.starts._coordinates import check_coordinates
 from jaxbiped.sweep.starts._given_starts import GivenStarts
 from jaxbiped.sweep.starts._starts import AbstractStarts, grid, sample

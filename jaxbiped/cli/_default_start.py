@@ -13,7 +13,7 @@ from jaxbiped.dynamics._bristle_state import MinimalState
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._state import seed_state
-from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 _DEEPEST = 0.1
@@ -38,7 +38,7 @@ def default_start(scene: Any) -> WalkerState:
     guess = default_guess(scene)
     if not scene.compliant:
         return guess
-    start = cast(MinimalState, guess)
+    start = cast("MinimalState", guess)
     depth = standing_height(own, seed.theta_2) - seed.hip_z
     load = (scene.walker.total_mass * scene.ground.g) / (own.walker.total_mass * own.ground.g)
     fitted = float(_depth(scene.normal, own.normal, depth, load))

@@ -16,11 +16,9 @@ from jaxbiped.cli._walk_options import SceneOptions, StartOptions
 from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.scene._ground import Ground
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.scene._ready_scenes import seed_scene
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator, Actuation
 from jaxbiped.scene.actuation._catalogue import ACTUATORS

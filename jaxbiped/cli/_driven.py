@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 from jaxbiped._types import JsonObject
 from jaxbiped.measure._cost_of_transport import cost_of_transport
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.simulate._simulate import simulate
 from jaxbiped.solve._trajectory import Trajectory

@@ -22,7 +22,7 @@ from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._accuracy import accuracy_told
 from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 

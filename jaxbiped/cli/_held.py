@@ -8,13 +8,13 @@ from jaxbiped._types import JsonObject
 from jaxbiped.constraints._constraint_methods import name_of
 from jaxbiped.dynamics._redundant_motion import hip_force, violation
 from jaxbiped.dynamics._redundant_state import LegsState
-from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.solve._trajectory import Trajectory
 
 
 def constraint_numbers(scene: RedundantScene, trajectory: Trajectory) -> JsonObject:
     """Largest violations at the ends of the steps and what was corrected at the start (SI)."""
-    off = violation(scene, cast(LegsState, trajectory.state))
+    off = violation(scene, cast("LegsState", trajectory.state))
     force = hip_force(scene, trajectory.state)
     correction = trajectory.correction
     return {

@@ -9,10 +9,8 @@ from jaxbiped.cli._report import Report, table
 from jaxbiped.cli.commands._models import Models
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.measure._operation_counts import operation_counts
-from jaxbiped.scene._ladder import ladder
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene._ready_scenes import ladder, seed_scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator
 from jaxbiped.scene.actuation._catalogue import ACTUATORS
 from jaxbiped.scene.laws import AbstractBristleLaw, AbstractFrictionLaw, AbstractNormalLaw

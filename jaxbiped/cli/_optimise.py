@@ -21,10 +21,8 @@ from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.optimise._optimise_gait import optimise_gait
 from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.optimise._runs import Outcome
-from jaxbiped.scene._parameters import parameter_names, parameter_quantities, parameter_values
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, parameter_values
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 
 _USUAL_RANGE = 2.0
 """Factor to both sides of a parameter's own value that it varies by unless bounds are given."""

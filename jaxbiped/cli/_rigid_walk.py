@@ -18,7 +18,7 @@ from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SolveOptions
 from jaxbiped.cli._warnings import cut_short
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._error_estimate import error_numbers, error_sentence

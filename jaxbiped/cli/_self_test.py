@@ -11,10 +11,9 @@ from jaxbiped._types import Scalar, as_float
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._ground import Ground
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.scene._ready_scenes import seed_scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.simulate._simulate import simulate

@@ -24,9 +24,7 @@ from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._footsteps import Footsteps, footsteps
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.simulate._accurate_walk import accurate_walk
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._error_estimate import error_numbers, error_sentence

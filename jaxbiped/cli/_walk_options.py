@@ -29,9 +29,7 @@ from jaxbiped.cli._option_fields import Engine, Group, group
 
 if TYPE_CHECKING:
     from jaxbiped.dynamics._rigid_state import WalkerState
-    from jaxbiped.scene._redundant_scene import RedundantScene
-    from jaxbiped.scene._rigid_scene import RigidScene
-    from jaxbiped.scene._scene import Scene
+    from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 
 MOST_STEPS = 1 << 20
 """Solver's steps that nobody asked for more than: about 25 minutes of the seed's walk."""

@@ -9,8 +9,7 @@ from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._energy_ledger import EnergyLedger
 from jaxbiped.measure._samples import at_steps
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.solve._accuracy import unresolved_slip
 from jaxbiped.solve._trajectory import Trajectory
 

@@ -5,13 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._parameters import (
+from jaxbiped.scene._parameter_access import (
     parameter_names,
     parameter_values,
     select_parameters,
     with_parameters,
 )
+from jaxbiped.scene._scene import AbstractScene
 
 _DECADES = 100.0
 """Ratio of the ends of a range from which it is gone through by equal factors."""

@@ -30,7 +30,7 @@ from jaxbiped.gait._pseudo_arclength import (
     correct,
     follow,
 )
-from jaxbiped.scene._parameters import parameter_quantities, parameter_values
+from jaxbiped.scene._parameter_access import parameter_quantities, parameter_values
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 _DIFFERENCE = 1e-4

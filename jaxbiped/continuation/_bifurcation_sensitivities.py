@@ -15,7 +15,7 @@ from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
 from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.scene._parameters import parameter_values, select_parameters, with_parameters
+from jaxbiped.scene._parameter_access import parameter_values, select_parameters, with_parameters
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 _CRITICAL = 1e-3

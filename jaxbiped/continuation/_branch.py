@@ -13,9 +13,8 @@ from jaxbiped.continuation._branch_dataset import branch_dataset
 from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.continuation._trace import BranchStop
 from jaxbiped.dynamics._rigid_state import WalkerState
-from jaxbiped.scene._parameters import parameter_quantities, with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_quantities, with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 
 if TYPE_CHECKING:
     import xarray
@@ -91,7 +90,7 @@ class Branch(eqx.Module):
         if isinstance(point, BifurcationPoint):
             point = point.point
         state = self.state_type(0.0, *point.recurring.tolist())
-        return cast(WalkerState, jtu.tree_map(as_float, state))
+        return cast("WalkerState", jtu.tree_map(as_float, state))
 
     def scene_at(self, point: int | BranchPoint | BifurcationPoint) -> Scene | RigidScene:
         """The scene of a gait, of the point of that number or of the one given."""

@@ -8,7 +8,7 @@ from jaxbiped._strict_json import strict_json
 from jaxbiped.continuation._bifurcations import EVENTS
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.gait._stability import Bifurcation
-from jaxbiped.scene._scene_identity import scene_identity
+from jaxbiped.scene._parameter_access import scene_identity
 
 if TYPE_CHECKING:
     import xarray

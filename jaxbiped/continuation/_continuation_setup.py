@@ -23,11 +23,9 @@ from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._pseudo_arclength import Attempt, Curve, CurvePoint, correct
 from jaxbiped.gait._return_map_spec import walking_spec
 from jaxbiped.gait._solver import orbit_solver
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import ACCURACIES, precision_of
 from jaxbiped.variational._hybrid_system import section_of
 
@@ -74,7 +72,7 @@ class ContinuationSetup(NamedTuple):
     def state_of(self, recurring: np.ndarray) -> WalkerState:
         """The state of these components."""
         state = type(self.problem.like)(0.0, *recurring.tolist())
-        return cast(WalkerState, jtu.tree_map(as_float, state))
+        return cast("WalkerState", jtu.tree_map(as_float, state))
 
     def point(self, found: CurvePoint) -> BranchPoint:
         """What is told of a point of the curve."""

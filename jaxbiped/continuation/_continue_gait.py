@@ -29,9 +29,8 @@ from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._pseudo_arclength import CurvePoint
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 

@@ -18,7 +18,7 @@ from jaxbiped.gait._fixed_point_search import LOOSER
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._soundness import is_sound
-from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import Precision
 
 

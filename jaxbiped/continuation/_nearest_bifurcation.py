@@ -7,10 +7,9 @@ from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._continue_gait import continue_gait
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._parameters import parameter_names, parameter_values, with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 
 FACTOR = 8.0
 """How far a parameter is followed to both sides of its own value."""

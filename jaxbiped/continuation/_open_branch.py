@@ -17,10 +17,9 @@ from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._continuation import BranchEnd
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._scene_identity import scene_identity
+from jaxbiped.scene._parameter_access import scene_identity
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 
 if TYPE_CHECKING:
     import xarray

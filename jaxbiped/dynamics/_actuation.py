@@ -5,15 +5,14 @@ from typing import NamedTuple, TypeAlias, TypeVar
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.scene._redundant_scene import CompliantScene
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import CompliantScene, RigidScene
 from jaxbiped.scene.actuation._abstract_actuator import (
     AbstractActuator,
     AbstractHipActuator,
     HipMotion,
     LegTorques,
 )
-from jaxbiped.scene.actuation._foot_preload import FootPreload
+from jaxbiped.scene.actuation._foot_actuators import FootPreload
 
 WalkerScene: TypeAlias = CompliantScene | RigidScene
 """A walker that may be driven."""

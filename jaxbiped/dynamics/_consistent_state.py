@@ -27,7 +27,7 @@ from jaxbiped.dynamics._redundant_state import (
     redundant_state,
 )
 from jaxbiped.dynamics._state import check_leaves
-from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._scene import RedundantScene
 
 FURTHEST = Violation(position=0.01, rate=0.1, normalisation=0.01)
 """A start that is further off its constraints is refused [m, m/s, –]."""

@@ -8,7 +8,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Feet, feet, touches
 from jaxbiped.dynamics._forces import FootForces, foot_forces
 from jaxbiped.dynamics._redundant_state import CompliantState
-from jaxbiped.scene._redundant_scene import CompliantScene
+from jaxbiped.scene._scene import CompliantScene
 
 
 class Contacts(NamedTuple):

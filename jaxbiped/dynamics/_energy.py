@@ -12,8 +12,7 @@ from jaxbiped.dynamics._forces import foot_force
 from jaxbiped.dynamics._hip_motion import hip_motion, normal_forces
 from jaxbiped.dynamics._redundant_state import legs_of, minimal_state
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import AbstractScene, Scene
 
 
 class Energies(NamedTuple):

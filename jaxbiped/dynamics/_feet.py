@@ -9,9 +9,8 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._actuation import preload
 from jaxbiped.dynamics._redundant_state import CompliantState, Leg, legs_of
 from jaxbiped.dynamics._state import SomeState, exchange_legs
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._redundant_scene import CompliantScene
-from jaxbiped.scene._stepped_ground import drop_under
+from jaxbiped.scene._ground import drop_under
+from jaxbiped.scene._scene import AbstractScene, CompliantScene
 
 _JUST_TOUCHING = 1e-6
 """Depth or height of a foot that counts as at the surface, in units of the leg's length."""
@@ -145,7 +144,7 @@ def with_leg_2_standing(scene: CompliantScene, state: SomeState) -> SomeState:
     Where leg 1 stands alone the names are exchanged, but for a state at leg 2's heel strike, whose
     foot just touches: it carries from there on.
     """
-    both = feet(scene, cast(CompliantState, state))
+    both = feet(scene, cast("CompliantState", state))
     strikes = jnp.abs(both.foot_2.penetration) <= _JUST_TOUCHING * scene.walker.l
     return select((standing_foot(both) == 1) & ~strikes, exchange_legs(state), state)
 

@@ -9,9 +9,9 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._redundant_state import CompliantState
-from jaxbiped.scene._redundant_scene import CompliantScene
-from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
-from jaxbiped.scene.laws.friction._frictionless import Frictionless
+from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
+from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
 
 class FootForce(NamedTuple):

@@ -4,7 +4,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._actuation import load_shares
 from jaxbiped.dynamics._feet import Feet, Foot
 from jaxbiped.dynamics._forces import foot_force
-from jaxbiped.scene._redundant_scene import CompliantScene
+from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 
 

@@ -8,7 +8,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._push_off import push_off_impulse
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import Support, inertia_of, support_of
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 
 
 class Impact(NamedTuple):

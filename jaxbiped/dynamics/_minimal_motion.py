@@ -14,9 +14,8 @@ from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.dynamics._hip_motion import hip_motion
 from jaxbiped.dynamics._redundant_state import CompliantState
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._redundant_scene import CompliantScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
+from jaxbiped.scene._scene import CompliantScene, Scene
+from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 
 
 class Accelerations(NamedTuple):

@@ -10,8 +10,8 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._actuation import actuators_of
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import support_of
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene.actuation._push_off import PushOff
+from jaxbiped.scene._scene import RigidScene
+from jaxbiped.scene.actuation._foot_actuators import PushOff
 
 
 class Impulse(NamedTuple):

@@ -22,10 +22,9 @@ from jaxbiped.dynamics._hip_motion import hip_motion
 from jaxbiped.dynamics._linkage_motion import LinkageMotion, motion_under
 from jaxbiped.dynamics._minimal_motion import Accelerations, accelerations, bristle_rates
 from jaxbiped.dynamics._redundant_state import Leg, LegsState, legs_of
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._redundant_scene import CompliantScene, RedundantScene
-from jaxbiped.scene._walker_linkage import leg_of
-from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
+from jaxbiped.scene._linkage_scene import leg_of
+from jaxbiped.scene._scene import AbstractScene, CompliantScene, RedundantScene
+from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 
 
 class HipForce(NamedTuple):
@@ -74,7 +73,7 @@ class RedundantMotion(NamedTuple):
 def coordinates_of(scene: RedundantScene, state: LegsState) -> tuple[list[Scalar], list[Scalar]]:
     """Coordinates and rates of a redundant state as the linkage has them."""
     count = 2 * scene.linkage.coordinates
-    leaves = cast(tuple[Scalar, ...], state)
+    leaves = cast("tuple[Scalar, ...]", state)
     return list(leaves[:count]), list(leaves[count : 2 * count])
 
 
@@ -213,7 +212,7 @@ def _applied_forces(scene: RedundantScene, state: LegsState, legs: tuple[Leg, Le
                 torque = torque + reaction.tangential * (reach * leg.cosine + walker.r)
         if driving is not None:
             torque = torque + driving[k]
-        own = cast(tuple[Scalar, ...], state)[size * k : size * (k + 1)]
+        own = cast("tuple[Scalar, ...]", state)[size * k : size * (k + 1)]
         applied += [force_x, force_z, *torque_on(linkage, own, torque)]
     return applied
 

@@ -10,9 +10,8 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._bristle_state import BristleState, MinimalState
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._walker_linkage import leg_of
+from jaxbiped.scene._linkage_scene import leg_of
+from jaxbiped.scene._scene import AbstractScene, RedundantScene
 
 if TYPE_CHECKING:
     from typing_extensions import TypeIs
@@ -211,7 +210,7 @@ def _half_way(scene: AbstractScene, state: LegsState) -> MinimalState:
     if state.bristle_1 is None:
         return State(**values)
     return BristleState(
-        **values, bristle_1=cast(Scalar, one.bristle), bristle_2=cast(Scalar, two.bristle)
+        **values, bristle_1=cast("Scalar", one.bristle), bristle_2=cast("Scalar", two.bristle)
     )
 
 

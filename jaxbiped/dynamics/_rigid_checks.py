@@ -12,8 +12,8 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
+from jaxbiped.scene._scene_checks import check_scene
 
 
 class RigidChecks(NamedTuple):

@@ -9,7 +9,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._bristle_state import MinimalState
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 
 
 class RigidState(NamedTuple):

@@ -11,7 +11,7 @@ from jaxbiped.dynamics._actuation import hip_torques
 from jaxbiped.dynamics._forces import FootForce
 from jaxbiped.dynamics._formulation import field_of
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 

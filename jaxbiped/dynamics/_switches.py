@@ -9,7 +9,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._forces import foot_force
 from jaxbiped.dynamics._redundant_state import CompliantState
-from jaxbiped.scene._redundant_scene import CompliantScene
+from jaxbiped.scene._scene import CompliantScene
 
 
 class Switch(NamedTuple):

@@ -19,9 +19,9 @@ from jaxbiped.extremes._check_equations import (
     NORMAL_AT,
     SIZE,
 )
-from jaxbiped.scene._clearance import AlwaysTouching, StanceRotation
+from jaxbiped.scene._ground import AlwaysTouching, StanceRotation
+from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene.laws._catalogue import friction_law_like, normal_law_like
 
 _FIELDS = ("hip_x", "hip_z", "theta_1", "theta_2", "hip_vx", "hip_vz", "omega_1", "omega_2")

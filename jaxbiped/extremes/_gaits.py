@@ -18,7 +18,7 @@ from jaxbiped.extremes._check_gait import apart, checked_gait
 from jaxbiped.extremes._verdict import SURE
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene._ready_scenes import seed_scene
 
 WANTED = 1e-2
 """Relative error asked of gaits."""

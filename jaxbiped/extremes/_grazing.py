@@ -11,9 +11,9 @@ from jaxbiped._types import Parameter
 from jaxbiped.dynamics._state import State
 from jaxbiped.extremes._case import check_numbers
 from jaxbiped.extremes._check_solve import scales, states_of
-from jaxbiped.scene._clearance import AlwaysTouching
+from jaxbiped.scene._ground import AlwaysTouching
+from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._seed import seed_scene
 from jaxbiped.scene.laws._catalogue import normal_law_like
 from jaxbiped.simulate._simulate import simulate
 

@@ -18,8 +18,8 @@ from jaxbiped.gait._explain_search import grazing_sentence
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._solver import orbit_solver
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.scene._parameter_access import parameter_values
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
 from jaxbiped.solve._error_estimate import Judged, refine
 from jaxbiped.solve._units import relative_to_scene

@@ -11,9 +11,8 @@ from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._rigid_state import WalkerState, rigid_state
 from jaxbiped.dynamics._state import State, seed_state
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene._ready_scenes import seed_scene
+from jaxbiped.scene._scene import AbstractScene, Scene
 from jaxbiped.scene._walker import Walker
 
 

@@ -8,8 +8,8 @@ from jaxbiped._ending import Ending
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._parameters import parameter_values
+from jaxbiped.scene._parameter_access import parameter_values
+from jaxbiped.scene._scene import AbstractScene
 
 _MOST_NAMED = 4
 """Parameters that are named; of more, how many there are."""

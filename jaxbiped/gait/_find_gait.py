@@ -35,12 +35,9 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes, walking
 from jaxbiped.gait._search_along import search_along
 from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.gait._staged_search import is_whole, origin_of, search_in_stages, spectral_radius
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._parameters import select_parameters
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import select_parameters
+from jaxbiped.scene._scene import AbstractScene, RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
 from jaxbiped.solve._error_estimate import check_wanted
 from jaxbiped.variational._hybrid_system import section_of, with_leg_names_of
@@ -228,7 +225,7 @@ def _check_start(scene: AbstractScene, section: AbstractSection, start: PyTree) 
     if not scene.compliant:
         return check_state(start, RigidState, "guess")
     if scene.redundant:
-        start = minimal_state(scene, consistent_state(cast(RedundantScene, scene), start).state)
+        start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)
     return with_leg_names_of(section, scene.minimal, state_for(scene.minimal, start, "guess"))
 
 

@@ -16,9 +16,8 @@ from jaxbiped.dynamics._state import State
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 
 _SAME = 1e-4
 """Largest difference of a component (SI units) between two finds of one gait."""

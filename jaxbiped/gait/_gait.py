@@ -23,8 +23,8 @@ from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._parameters import parameter_quantities
+from jaxbiped.scene._parameter_access import parameter_quantities
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._error_estimate import ErrorEstimate
 

@@ -18,10 +18,8 @@ from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gradient_modes import AbstractGradient, Implicit
 from jaxbiped.gait._return_map import Return, return_map
 from jaxbiped.linalg._elimination import solution
-from jaxbiped.scene._parameters import select_parameters
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import select_parameters
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 
 
 def gait_measures(

@@ -12,10 +12,8 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._seed import seed_scene
+from jaxbiped.scene._ready_scenes import seed_scene
+from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
 from jaxbiped.scene.actuation._abstract_actuator import Actuation
 from jaxbiped.scene.laws._catalogue import (
     FRICTION_LAWS,

@@ -12,10 +12,8 @@ from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._poincare_map import LinearisedReturn, linearised_return, seed_directions
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
-from jaxbiped.scene._abstract_scene import is_rigid
-from jaxbiped.scene._parameters import select_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import select_parameters
+from jaxbiped.scene._scene import RigidScene, Scene, is_rigid
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._hybrid_system import AbstractSystem, section_of, system_of
 

@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.gait._continuation import BranchEnd
-from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._scene import AbstractScene
 
 MOST_OTHERS = 4
 """Other gaits that there is room for."""

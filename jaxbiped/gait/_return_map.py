@@ -20,11 +20,8 @@ from jaxbiped.gait._return_by_lanes import forward_by_lanes, reverse_by_lanes
 from jaxbiped.gait._return_by_xla import forward_by_xla, reverse_by_xla
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._solver import orbit_solver
-from jaxbiped.scene._abstract_scene import is_rigid
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene, is_rigid
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.variational._hybrid_system import (

@@ -9,8 +9,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._scene import AbstractScene, RedundantScene
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.variational._hybrid_system import AbstractSystem, RedundantWalking, system_of
 from jaxbiped.variational._watch import Watch
@@ -79,7 +78,7 @@ def walking_spec(
     """The return map of a walker, of cycles of so many footsteps."""
     within = None
     if scene.redundant:
-        solver, within = with_projection(cast(RedundantScene, scene), solver), RedundantWalking()
+        solver, within = with_projection(cast("RedundantScene", scene), solver), RedundantWalking()
     return ReturnMapSpec(
         system=system_of(scene),
         section=section,

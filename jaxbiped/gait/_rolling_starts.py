@@ -12,9 +12,8 @@ from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._state import State
 from jaxbiped.gait._default_guess import default_guess
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 
 
 def rolling_starts(
@@ -50,7 +49,7 @@ def _scatter(scene: Scene | RigidScene, count: int, spread: float, seed: int) ->
     omega_1, omega_2 = middle.omega_1 * factors[2], middle.omega_2 * factors[3]
     if isinstance(scene, RigidScene):
         return RigidState(jnp.zeros_like(theta_1), theta_1, theta_2, omega_1, omega_2)
-    depth = standing_height(scene, middle.theta_2) - cast(State, middle).hip_z
+    depth = standing_height(scene, middle.theta_2) - cast("State", middle).hip_z
     reach = scene.walker.hip_to_foot
     plain = State(
         hip_x=jnp.zeros_like(theta_1),

@@ -20,7 +20,7 @@ from jaxbiped.gait._origin import FoundBy, Origin
 from jaxbiped.gait._poincare_map import recurring_components, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.linalg._small_matrices import eigenpairs
-from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import Precision
 
 _FIRST, _LARGEST, _SMALLEST = 0.05, 0.3, 1e-3

@@ -14,9 +14,7 @@ from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import exchange_legs
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.simulate._simulate import simulate
 from jaxbiped.solve._trajectory import Trajectory

@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._scene import AbstractScene
 
 _SHORTEST = 0.1
 """Duration of a cycle in units of √(l/g), about 2 for a footstep: a foot may also chatter."""

@@ -34,9 +34,7 @@ from jaxbiped.gait._pseudo_arclength import Change
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._rolling_starts import rolling_starts
 from jaxbiped.gait._settled_walks import component_sizes, settle_walks
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
 from jaxbiped.solve._accuracy import Precision
 
 _STARTS = {Scene: (16, 64), RigidScene: (1024,)}

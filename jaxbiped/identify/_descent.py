@@ -11,7 +11,7 @@ from jaxbiped.identify._gait_fit import LOOSE, FitEnding, GaitFit, information
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
 from jaxbiped.identify._profile import interval_end, linear_step
-from jaxbiped.scene._parameters import parameter_values, with_parameters
+from jaxbiped.scene._parameter_access import parameter_values, with_parameters
 
 _WITHIN = 1.959963984540054
 """Standard errors to each end of a 95 % interval."""

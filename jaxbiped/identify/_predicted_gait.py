@@ -13,9 +13,8 @@ from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_angles import AnglesInTime, clock_zero
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 
 AnyScene: TypeAlias = Scene | RigidScene
 _DIFFERENCE = 3e-3

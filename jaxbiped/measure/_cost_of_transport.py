@@ -12,8 +12,7 @@ from jaxbiped.dynamics._state import State
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._rigid_ledger import kept_strikes, rigid_ledger
 from jaxbiped.measure._samples import evaluate_at, sample
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 

@@ -14,8 +14,7 @@ from jaxbiped.dynamics._forces import foot_forces
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -56,7 +55,7 @@ def trajectory_dataset(scene: Scene | RedundantScene, trajectory: Trajectory) ->
         for name, value in minimal_state(scene, state)._asdict().items()
     }
     if isinstance(scene, RedundantScene):
-        off = np.asarray(violation(scene, cast(LegsState, state)).position)
+        off = np.asarray(violation(scene, cast("LegsState", state)).position)
         variables["violation"] = ("time", off, {"units": "m"})
     for name, value in held._asdict().items():
         variables[f"{name}_energy"] = ("time", np.asarray(value), {"units": "J"})

@@ -2,8 +2,7 @@
 
 from jaxbiped.compiler import count_operations
 from jaxbiped.dynamics._formulation import field_of, state_type
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 
 
 def operation_counts(scene: Scene | RigidScene) -> dict[str, int]:

@@ -14,7 +14,7 @@ from jaxbiped.dynamics._rigid_state import RigidState, whole_state
 from jaxbiped.dynamics._rolling import rolling_hip_motion, rolling_rates
 from jaxbiped.measure._rigid_samples import states_after
 from jaxbiped.measure._samples import NODES, Samples
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 
 
@@ -17,7 +17,7 @@ def states_after(scene: RigidScene, starts: RigidState, durations: np.ndarray) -
     """States so long after their starts [s], within their footsteps; leaves of shape (n,)."""
 
     def walked(start: RigidState, duration: Scalar) -> RigidState:
-        return rigid_walk(scene, start, duration=cast(float, duration), accuracy="tight").final
+        return rigid_walk(scene, start, duration=cast("float", duration), accuracy="tight").final
 
     each: Callable[[RigidState, Scalar], RigidState] = jax.vmap(walked)
     return each(starts, jnp.asarray(durations))

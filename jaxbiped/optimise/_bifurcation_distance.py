@@ -29,13 +29,8 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._pseudo_arclength import CurvePoint
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._jacobian_weights import MODULI
-from jaxbiped.scene._parameters import (
-    parameter_names,
-    parameter_values,
-    with_parameters,
-)
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
 
 KINDS = (BranchEvent.FOLD, BranchEvent.PERIOD_DOUBLING)

@@ -26,9 +26,8 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._optimality import Optimality
 from jaxbiped.optimise._optimum import Optimum
-from jaxbiped.scene._parameters import parameter_names
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_names
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.simulate._simulate import simulate
 from jaxbiped.solve._engine import ENGINES
@@ -266,7 +265,7 @@ def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> Wal
     pushed = state._replace(**faster)
     walk: Trajectory[Any]
     if isinstance(scene, RigidScene):
-        walk = rigid_walk(scene, cast(RigidState, pushed), footsteps=count, max_arrivals=count)
+        walk = rigid_walk(scene, cast("RigidState", pushed), footsteps=count, max_arrivals=count)
     else:
         walk = simulate(
             scene,

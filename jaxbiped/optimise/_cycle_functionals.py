@@ -24,9 +24,8 @@ from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.optimise._augmented_state import MotionSection
 from jaxbiped.optimise._cycle_integrals import AbstractIntegrals, integrals_of
-from jaxbiped.scene._parameters import select_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import select_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, precision_of
 from jaxbiped.variational._hybrid_system import AbstractSystem, section_of
 from jaxbiped.variational._tangents import Seeded

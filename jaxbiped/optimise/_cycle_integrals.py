@@ -19,8 +19,7 @@ from jaxbiped.dynamics._rigid_state import RigidState, WalkerState, whole_state
 from jaxbiped.dynamics._rolling import inertia_of, rolling_hip_motion, support_of
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.optimise._augmented_state import augment, joined, motion_of
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.variational._hybrid_system import AbstractSystem, Rolling, Walking
 
 COMPLIANT = ("slip_distance", "friction_loss", "impact_loss")

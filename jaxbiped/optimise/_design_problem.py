@@ -26,9 +26,8 @@ from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._objectives import Evaluation, evaluate
 from jaxbiped.optimise._requirements import Requirement
 from jaxbiped.optimise._variables import Variables
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 
 KEPT = 1e-6
 """Part of its bound by which a requirement may be missed and still counts as kept, at least."""

@@ -15,7 +15,7 @@ from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.optimise._augmented_state import augment, joined, motion_of
-from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.variational._hybrid_system import AbstractSystem, system_of
 
 

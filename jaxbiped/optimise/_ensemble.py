@@ -20,9 +20,8 @@ from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._jacobian_weights import CLUSTER
 from jaxbiped.optimise._objectives import Evaluation, evaluate, functionals_for
-from jaxbiped.scene._parameters import parameter_names, parameter_values, with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 
 CRITERIA = ("mean", "worst")
 _CORNERS = 6

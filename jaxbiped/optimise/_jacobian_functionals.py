@@ -44,9 +44,8 @@ from jaxbiped.optimise._lowest_swing import (
     with_clearance,
 )
 from jaxbiped.optimise._stepped_cycle import SteppedSection, stepped, unstepped
-from jaxbiped.scene._parameters import select_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import select_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._adjoint_solve import COUNT
 from jaxbiped.variational._hybrid_system import AbstractSystem, section_of

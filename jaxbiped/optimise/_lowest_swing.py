@@ -20,8 +20,7 @@ from jaxbiped.dynamics._switches import Switch
 from jaxbiped.optimise._augmented_state import augment, joined, motion_of
 from jaxbiped.optimise._disturbed_cycle import DisturbedCycle
 from jaxbiped.optimise._stepped_cycle import SteppedCycle
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import AbstractScene, Scene
 from jaxbiped.variational._hybrid_system import AbstractSystem
 
 
@@ -127,7 +126,7 @@ class LowestSwingSection(AbstractSection):
 def _swing_foot(args: AbstractScene, state: PyTree) -> Foot:
     """A compliant walker's, leg 2's: its cycle has the footstep before, and the exchange of legs
     behind."""
-    return feet(cast(Scene, args), state).foot_2
+    return feet(cast("Scene", args), state).foot_2
 
 
 def _swing_height(args: AbstractScene, state: PyTree) -> Scalar:

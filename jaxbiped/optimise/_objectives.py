@@ -15,10 +15,9 @@ from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
 from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
 from jaxbiped.optimise._jacobian_weights import CLEARANCE_NORMS, CLUSTER, SYMMETRIC
-from jaxbiped.scene._parameters import parameter_names, parameter_values
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene.laws.friction._frictionless import Frictionless
+from jaxbiped.scene._parameter_access import parameter_names, parameter_values
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
 
 def _of_any(scene: Scene | RigidScene) -> str | None:

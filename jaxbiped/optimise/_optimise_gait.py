@@ -25,10 +25,9 @@ from jaxbiped.optimise._requirements import Requirement, SubjectTo, requirements
 from jaxbiped.optimise._restarts import scattered_designs
 from jaxbiped.optimise._runs import Runs
 from jaxbiped.optimise._variables import start_of, variables_of
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._scene_identity import scene_identity
+from jaxbiped.scene._parameter_access import scene_identity
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 
 if TYPE_CHECKING:

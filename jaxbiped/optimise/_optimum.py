@@ -9,8 +9,7 @@ from jaxbiped.optimise._objectives import Evaluation
 from jaxbiped.optimise._optimality import Optimality, optimality_of
 from jaxbiped.optimise._optimisers import Ended
 from jaxbiped.optimise._runs import Iteration, Outcome, Runs
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 
 
 class Optimum(NamedTuple):

@@ -10,8 +10,7 @@ from jaxbiped.optimise._objectives import check_objective
 from jaxbiped.optimise._optimise_gait import optimise_gait
 from jaxbiped.optimise._optimum import Optimum
 from jaxbiped.optimise._requirements import SubjectTo, requirements_of
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 
 
 class ParetoFront(NamedTuple):

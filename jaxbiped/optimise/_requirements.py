@@ -6,8 +6,7 @@ from typing import NamedTuple, TypeAlias
 
 from jaxbiped._checks import ArgumentError, check_finite
 from jaxbiped.optimise._objectives import check_objective
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 
 SubjectTo: TypeAlias = Mapping[str, tuple[float | None, float | None]] | Sequence[str] | str | None
 """Bounds by name, or words such as "spectral_radius<0.4"."""

@@ -14,9 +14,8 @@ from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._design_problem import Design, DesignProblem
 from jaxbiped.optimise._ensemble import GaitSettings
-from jaxbiped.scene._parameters import parameter_names, with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_names, with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 
 _DRAWN = 8
 """Designs that are drawn for each one that is kept."""

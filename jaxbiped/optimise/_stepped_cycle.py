@@ -15,8 +15,8 @@ from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.optimise._augmented_state import MotionSection, augment, joined, motion_of
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._stepped_ground import SteppedGround
+from jaxbiped.scene._ground import SteppedGround
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.variational._hybrid_system import AbstractSystem, system_of
 
 _APART = 1e-2

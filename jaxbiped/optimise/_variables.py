@@ -6,9 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
-from jaxbiped.scene._parameters import parameter_names, parameter_values, with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 
 
 class Variables(NamedTuple):

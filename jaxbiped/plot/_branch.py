@@ -18,7 +18,7 @@ from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.plot._symbols import NORMAL_FORCE
 from jaxbiped.plot.style import GROUND_COLOUR, axes_or_new, dress, figure_of, legend_below
-from jaxbiped.scene._parameters import parameter_quantities
+from jaxbiped.scene._parameter_access import parameter_quantities
 
 _MEASURES = {
     "period": Quantity("time of a footstep", r"$T$", "s"),

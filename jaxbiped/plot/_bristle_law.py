@@ -16,7 +16,7 @@ from jaxbiped.plot.style import (
     figure_of,
     legend_above,
 )
-from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
+from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 
 _GIVES = 5.0
 """Travel in one direction, in units of the slip over which the bristles bend."""

@@ -11,7 +11,7 @@ from jaxbiped._checks import check_positive
 from jaxbiped._types import Scalar, as_array, as_float
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.plot._leg_angle import draw_leg_angles
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 
 _SAMPLES = 600

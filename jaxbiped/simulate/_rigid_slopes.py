@@ -13,7 +13,7 @@ from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling_field
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._slopes import LOOSER, Slopes
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._ending import FALL_ANGLE

@@ -15,8 +15,8 @@ from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import as_float, by_numpy
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import check_state
-from jaxbiped.scene._check_scene import check_scene, where_allowed
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
+from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._accurate_rigid_walk import accurate_rigid_walk
 from jaxbiped.simulate._accurate_walk import check_accurate_walk
 from jaxbiped.simulate._rigid_simulation import RigidSimulation

@@ -29,9 +29,8 @@ from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._check_scene import check_scene, where_allowed
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RedundantScene, Scene
+from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._by_lanes import able_request, by_lanes, prepare_lanes
 from jaxbiped.simulate._by_xla import by_xla, trim
 from jaxbiped.simulate._derivatives import with_derivatives

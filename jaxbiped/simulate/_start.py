@@ -13,9 +13,7 @@ from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._consistent_state import Consistent, consistent_state
 from jaxbiped.dynamics._redundant_motion import coordinates_of
 from jaxbiped.scene._ground import Ground
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.actuation._catalogue import ACTUATORS
 from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS

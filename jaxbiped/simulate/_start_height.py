@@ -13,9 +13,8 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._clearance import AbstractClearance
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._ground import AbstractClearance
+from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 _DEEPEST = 0.25

@@ -27,8 +27,8 @@ from jaxbiped.constraints._independence import check_independent
 from jaxbiped.constraints._linkage_constraints import Constraints, constraints_of
 from jaxbiped.constraints._projection import correct_step, nearest_consistent
 from jaxbiped.dynamics._linkage_motion import LinkageState, linkage_field
-from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._linkage_scene import LinkageScene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.simulate._start import check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
 from jaxbiped.solve._projected_solver import check_adjoint, wrap_projected

@@ -15,7 +15,7 @@ from jaxbiped.dynamics._minimal_motion import accelerations
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._clearance import StanceRotation
+from jaxbiped.scene._ground import StanceRotation
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 

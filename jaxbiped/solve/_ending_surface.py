@@ -8,7 +8,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.scene._clearance import StanceRotation
+from jaxbiped.scene._ground import StanceRotation
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._ending import (
     REST_ENERGY,

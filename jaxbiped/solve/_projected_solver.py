@@ -16,7 +16,7 @@ from jaxbiped.constraints._constraint_method import (
     AbstractProjectingMethod,
 )
 from jaxbiped.dynamics._consistent_state import project
-from jaxbiped.scene._redundant_scene import CompliantScene, RedundantScene
+from jaxbiped.scene._scene import CompliantScene, RedundantScene
 
 _Solver = TypeVar("_Solver", bound=diffrax.AbstractSolver[PyTree])
 
@@ -120,7 +120,7 @@ def wrap_projected(
     if kind is not None and getattr(solver, "scan_kind", "none") is None:
         # diffrax would set it, but cannot through a wrapper.
         solver = dataclasses.replace(solver, scan_kind=kind)  # type: ignore[call-arg]
-    return cast(_Solver, Projected(solver, project))  # as adaptive as what it wraps
+    return cast("_Solver", Projected(solver, project))  # as adaptive as what it wraps
 
 
 def projects(scene: CompliantScene) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling_rates
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 
 _TABLEAU = diffrax.Dopri8.tableau
 ORDER = 8

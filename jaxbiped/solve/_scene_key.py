@@ -18,9 +18,7 @@ from jaxbiped._caches import PROGRAMS, OfObjects, bounded_cache
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._identity import identity
 from jaxbiped._types import Scalar, as_array
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._trajectory import Trajectory
 
 _ROUNDING = 1e2

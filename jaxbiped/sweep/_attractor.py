@@ -14,8 +14,7 @@ from jaxbiped.dynamics._feet import feet
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.variational._hybrid_system import section_of
 
 
@@ -130,5 +129,5 @@ def component_scales(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
     sizes = {"hip_vx": speed, "hip_vz": speed, "omega_1": rate, "omega_2": rate}
     sizes |= {"theta_1": 1.0, "theta_2": 1.0, "bristle_1": 1.0, "bristle_2": 1.0}
     if scene.compliant:
-        sizes["hip_z"] = abs(float(feet(cast(Scene, scene), state).foot_2.penetration))
+        sizes["hip_z"] = abs(float(feet(cast("Scene", scene), state).foot_2.penetration))
     return np.array([sizes[name] for name in state._fields[1:]])

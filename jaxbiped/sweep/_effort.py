@@ -8,9 +8,8 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.compiler import DEVICES
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, resolve_slip_speed
 from jaxbiped.solve._engine import engine_for
 from jaxbiped.solve._error_estimate import check_wanted

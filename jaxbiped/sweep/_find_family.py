@@ -8,9 +8,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.scene._parameters import SomeScene, with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import SomeScene, with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._attractor import Attractor, attractor_without_radius, component_scales
 from jaxbiped.sweep._effort import Effort
 from jaxbiped.sweep._family import Family

@@ -8,8 +8,7 @@ from jaxtyping import PyTree
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import as_float
 from jaxbiped.compiler import Program, Request
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._engine import engine_named
 from jaxbiped.solve._final_step import just_before_end

@@ -14,8 +14,8 @@ from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.scene._scene import AbstractScene
 
 _FEW, _MANY = 16, 256
 """Searches in a batch: every size is a program that XLA compiles."""

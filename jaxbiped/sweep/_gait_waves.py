@@ -12,7 +12,7 @@ import numpy as np
 
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.sweep._gait_batch import find_each
 from jaxbiped.sweep._gait_grid import GaitGrid
 from jaxbiped.sweep._grid_waves import Place, Wave, extrapolated, interpolated, neighbours, waves

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._redundant_scene import CompliantScene
+from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_cubic import StepCubic
 

@@ -17,11 +17,9 @@ from jaxbiped.basins._label import Label
 from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._state import State, within_a_turn
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._scene_identity import scene_identity
+from jaxbiped.scene._parameter_access import scene_identity, with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._broadcast import broadcast_leaves
 from jaxbiped.sweep._effort import Effort
 from jaxbiped.sweep._family import Family

@@ -14,8 +14,7 @@ from jaxbiped.basins._label import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock, minimal_fatal_shock
 from jaxbiped.basins._ray_descent import Normal
 from jaxbiped.gait._return_map import return_map
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._attractor import Attractor
 from jaxbiped.sweep._find_family import scene_with
 from jaxbiped.sweep._labelling import Labelling

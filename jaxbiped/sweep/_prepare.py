@@ -10,9 +10,8 @@ from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label import Label
 from jaxbiped.gait._default_guess import default_guess
-from jaxbiped.scene._parameters import parameter_names, with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_names, with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._effort import effort_of
 from jaxbiped.sweep._find_family import find_family, with_gaits

@@ -8,8 +8,7 @@ from jaxtyping import PyTree
 
 from jaxbiped.basins._label import Label
 from jaxbiped.basins._spherical_points import spread_directions
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._attractor import Attractor, component_scales, section_tangents
 from jaxbiped.sweep._broadcast import broadcast_leaves
 from jaxbiped.sweep._effort import Effort

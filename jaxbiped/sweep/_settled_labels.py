@@ -11,8 +11,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped.basins._doubt import Doubt, Witness
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import solver_named

@@ -9,10 +9,8 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._parameters import parameter_names
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_names
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.trade._row import OK, Row, failed_row, row_of
 from jaxbiped.trade._truth import Truth, Values, truth_of

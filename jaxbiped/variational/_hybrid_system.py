@@ -23,10 +23,14 @@ from jaxbiped.dynamics._rolling import rolling, rolling_field
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.dynamics._switches import Switch, switches
-from jaxbiped.scene._abstract_scene import AbstractScene, is_rigid
-from jaxbiped.scene._redundant_scene import CompliantScene, RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import (
+    AbstractScene,
+    CompliantScene,
+    RedundantScene,
+    RigidScene,
+    Scene,
+    is_rigid,
+)
 from jaxbiped.solve._ending import WATCHES, ending_events, rigid_ending
 
 
@@ -151,7 +155,7 @@ def with_leg_names_of(section: AbstractSection, scene: AbstractScene, state: PyT
     """The same motion with the legs' names as the section has them; see `with_leg_2_standing`."""
     if is_rigid(scene) or not section.leg_2_stands:
         return state
-    return with_leg_2_standing(cast(CompliantScene, scene), state)
+    return with_leg_2_standing(cast("CompliantScene", scene), state)
 
 
 class Rolling(AbstractSystem):

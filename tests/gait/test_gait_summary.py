@@ -13,7 +13,7 @@ from jaxbiped.gait._origin import FoundBy, single_stage_origin
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import walking_spec
 from jaxbiped.gait._stability import Stability
-from jaxbiped.scene._parameters import select_parameters
+from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._solve_to_section import Nodes
 

@@ -12,7 +12,7 @@ from jaxbiped.optimise._cycle_functionals import cycle_spec
 from jaxbiped.optimise._cycle_integrals import integrals_of
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._jacobian_weights import CLEARANCE_NORMS
-from jaxbiped.scene._parameters import select_parameters
+from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.solve._accuracy import precision_of
 from jaxbiped.variational._hybrid_system import section_of
 from tests import reference, rigid_reference

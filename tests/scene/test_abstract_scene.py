@@ -7,7 +7,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._formulation import field_of, state_type
-from jaxbiped.scene._abstract_scene import AbstractScene, is_compliant, is_rigid
+from jaxbiped.scene._scene import AbstractScene, is_compliant, is_rigid
 
 SEED = jb.seed_scene()
 BRISTLES = jb.ladder()["bristles"]

@@ -6,7 +6,7 @@ import jax
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.scene._parameters import select_parameters
+from jaxbiped.scene._parameter_access import select_parameters
 
 WALKER = dict(m=1.5, J=0.01, l=0.4, d=0.1, r=0.08, hip_mass=0.7)
 

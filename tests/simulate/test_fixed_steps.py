@@ -11,7 +11,7 @@ import jaxbiped as jb
 from jaxbiped.extremes._case import check_numbers
 from jaxbiped.extremes._check_solve import scales, states_of
 from jaxbiped.extremes._grazing import _START, _TIME, _lowest
-from jaxbiped.scene._clearance import AlwaysTouching
+from jaxbiped.scene._ground import AlwaysTouching
 
 pytestmark = pytest.mark.slow
 

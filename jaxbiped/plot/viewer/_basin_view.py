@@ -18,8 +18,8 @@ from jaxbiped.plot.style import view_colours
 from jaxbiped.plot.viewer._compliant_recording import record_walk
 from jaxbiped.plot.viewer._page import frame_of, page_of
 from jaxbiped.plot.viewer._recording import Recording
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._simulate import simulate
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._coordinates import coordinate_quantities

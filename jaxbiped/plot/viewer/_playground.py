@@ -22,8 +22,8 @@ from jaxbiped.plot.viewer._played_program import (
     played_module,
     played_request,
 )
-from jaxbiped.scene._check_scene import check_scene
 from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene_checks import check_scene
 
 
 class _Slider(NamedTuple):

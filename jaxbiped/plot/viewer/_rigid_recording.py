@@ -17,7 +17,7 @@ from jaxbiped.measure._rigid_samples import states_after
 from jaxbiped.measure._samples import evaluate_along
 from jaxbiped.plot.viewer._knots import Channels
 from jaxbiped.plot.viewer._recording import Footprint, Recording, recording, time_unit
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._trajectory import Trajectory
 
 _EVEN, _MOST = 0.05, 200

@@ -14,9 +14,7 @@ from jaxbiped.plot.viewer._compliant_recording import record_walk
 from jaxbiped.plot.viewer._page import frame_of, page_of
 from jaxbiped.plot.viewer._recording import Recording
 from jaxbiped.plot.viewer._rigid_recording import record_rigid_walk
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 

@@ -7,8 +7,11 @@ from typing import Any, ClassVar, Protocol, cast
 from jaxbiped._checks import check_choice, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene import laws
-from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw, AbstractNormalLaw
-from jaxbiped.scene.laws.bristles._bristle_law import AbstractBristleLaw
+from jaxbiped.scene.laws._abstract_laws import (
+    AbstractBristleLaw,
+    AbstractFrictionLaw,
+    AbstractNormalLaw,
+)
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
 from jaxbiped.scene.laws.normal._weight_on_law import Standing

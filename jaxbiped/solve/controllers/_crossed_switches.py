@@ -12,8 +12,8 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._forces import foot_force
-from jaxbiped.scene._redundant_scene import CompliantScene
-from jaxbiped.scene.laws.friction._frictionless import Frictionless
+from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene.laws.friction._coulomb import Frictionless
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
 
 _SAME_SLIP = 3.0

@@ -12,7 +12,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._feet import feet
-from jaxbiped.scene._redundant_scene import CompliantScene
+from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
 
 _LESS_PAST = 0.03

@@ -12,10 +12,8 @@ from jaxbiped.dynamics._formulation import state_type
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._state import State
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._parameters import parameter_names, parameter_quantities
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities
+from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
 
 COORDINATES = {
     "theta_stance": "theta_2",

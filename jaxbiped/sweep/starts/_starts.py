@@ -13,9 +13,8 @@ from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._arguments import check_whole
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._coordinates import (
     check_coordinates,

@@ -1,15 +1,20 @@
-"""The seed's normal law: Hertz stiffness with a damper that grows with penetration."""
+"""The seed's normal law, Hertz stiffness with damping that grows with depth; its smooth twin."""
 
 from typing import ClassVar, Self
+
+import jax.numpy as jnp
+import numpy as np
 
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import (
+    AbstractNormalLaw,
     depth_in_contact,
     hertz_energy,
     hertz_force,
     power,
     pushing,
+    smooth_ramp,
 )
 from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, Standing
 
@@ -57,3 +62,64 @@ class RistowSchafer(AbstractDampedLaw):
     def like_seed(cls, seed: Self, standing: Standing) -> Self:
         """The seed's law."""
         return seed
+
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+_GAUSS = [(0.5 * (1.0 + float(x)), 0.5 * float(w)) for x, w in zip(_NODES, _WEIGHTS, strict=True)]
+
+
+class SmoothRistowSchafer(AbstractNormalLaw):
+    """`RistowSchafer` made twice continuously differentiable, with the same K, c and n.
+
+    Penetration passes through a C² ramp of width `depth_width` and the force through one of
+    width `force_width`; above both widths the law is the original, and it is exactly zero out of
+    contact. `docs/laws.md` tells how much that changes the gait.
+
+    Attributes (leaves of any batch shape):
+        K: contact stiffness [N/mⁿ].
+        c: contact damping [N·s/m²].
+        n: exponent [–].
+        depth_width: penetration over which touchdown is rounded [m].
+        force_width: force over which the clamp at zero is rounded [N].
+
+    Raises:
+        ArgumentError: K or a width not above 0, c below 0 or n below 1.
+    """
+
+    name: ClassVar[str] = "smooth-ristow-schafer"
+    K: Parameter = parameter("contact stiffness", "$K$", "N/m^n", positive=True)
+    c: Parameter = parameter("contact damping", "$c$", "N s/m^2", minimum=0.0)
+    n: Parameter = parameter("contact exponent", "$n$", minimum=1.0, default=1.5)
+    depth_width: Parameter = parameter(
+        "rounding of depth", r"$w_\delta$", "m", positive=True, default=1e-5
+    )
+    force_width: Parameter = parameter(
+        "rounding of force", "$w_F$", "N", positive=True, default=1.0
+    )
+
+    def force(self, penetration: Scalar, rate: Scalar) -> Scalar:
+        depth = smooth_ramp(penetration, self.depth_width)
+        force = hertz_force(self.K, self.n, depth) + self.c * depth * rate
+        return smooth_ramp(force, self.force_width)
+
+    def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
+        return ()
+
+    def elastic_force(self, penetration: Scalar) -> Scalar:
+        return hertz_force(self.K, self.n, smooth_ramp(penetration, self.depth_width))
+
+    def elastic_energy(self, penetration: Scalar) -> Scalar:
+        # On the ramp by quadrature (the integrand is smooth there), above it in closed form.
+        width = jnp.asarray(self.depth_width)
+        inside = penetration < width
+        upper = jnp.where(inside, jnp.maximum(penetration / width, 0.0), 1.0)
+        on_ramp = sum(
+            weight * upper * self.elastic_force(node * upper * width) for node, weight in _GAUSS
+        )
+        above = hertz_energy(self.K, self.n, jnp.where(inside, width, penetration))
+        return width * on_ramp + above - hertz_energy(self.K, self.n, width)
+
+    @classmethod
+    def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
+        """The seed's own K, c and n."""
+        return cls(K=seed.K, c=seed.c, n=seed.n)

@@ -1,17 +1,19 @@
-"""Parameters of a scene by name."""
+"""Parameters of a scene by name, and the identity of a scene that is made of them."""
 
 import dataclasses
 from collections.abc import Mapping
 from typing import Any, TypeAlias, TypeVar
 
 import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
+from jaxbiped._identity import identity
 from jaxbiped._parameter import parameter_infos
 from jaxbiped._quantity import Quantity
-from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped._types import JsonObject, Parameter, Scalar
+from jaxbiped.scene._scene import AbstractScene
 
 SomeScene = TypeVar("SomeScene", bound=AbstractScene)
 _Path: TypeAlias = tuple[Any, ...]
@@ -177,3 +179,19 @@ def _texts(path: _Path) -> list[str]:
         else:
             texts.append(str(getattr(key, "name", key)))
     return texts
+
+
+def scene_identity(scene: AbstractScene) -> JsonObject:
+    """The numbers of a scene by name, and what it is made of besides: kind, laws, rules, method.
+
+    Args:
+        scene: one of any kind, whose numbers are known.
+
+    Returns:
+        "scene", its parameters and the constants of a constraint method by name; and "model".
+    """
+    numbers = {name: np.asarray(value).tolist() for name, value in parameter_values(scene).items()}
+    if scene.redundant:
+        constants = jtu.tree_flatten_with_path(scene.method)[0]  # type: ignore[attr-defined]
+        numbers |= {f"method{jtu.keystr(at)}": np.asarray(x).tolist() for at, x in constants}
+    return {"scene": numbers, "model": identity(scene)}

@@ -1,4 +1,4 @@
-"""Foot preload: a compliant foot whose set point moves as its leg turns back."""
+"""Actuators at the feet: push-off of rigid ones, preload of compliant ones."""
 
 import dataclasses
 from typing import ClassVar, Self
@@ -7,6 +7,28 @@ from jaxbiped._jax_versions import tanh
 from jaxbiped._parameter import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator
+
+
+class PushOff(AbstractActuator):
+    """An impulse along the trailing leg, from its foot to the hip, at once before heel strike.
+
+    For rigid feet alone. The massless ankle takes its support from the ground under it and lets go.
+
+    Source: Kuo 2002, Energetics of actively powered locomotion using the simplest walking model.
+
+    Attributes (leaves of any batch shape):
+        impulse: [N·s].
+
+    Raises:
+        ArgumentError: impulse below 0.
+    """
+
+    name: ClassVar[str] = "push-off"
+    feet: ClassVar[str] = "rigid"
+    impulse: Parameter = parameter("push-off impulse", "$P$", "N s", minimum=0.0)
+
+    def idle(self) -> Self:
+        return dataclasses.replace(self, impulse=0.0 * self.impulse)
 
 
 class FootPreload(AbstractActuator):

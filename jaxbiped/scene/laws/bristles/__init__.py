@@ -1,1 +1,0 @@
-"""Bristle friction laws."""
