@@ -1,7 +1,7 @@
-"""Animation of a walk."""
+"""Animation of a walk, in an upright view: gravity down the page and the slope inclined."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.animation import FuncAnimation
@@ -12,12 +12,48 @@ from matplotlib.patches import Circle
 
 from jaxbiped._checks import check_positive
 from jaxbiped._paths import check_writable_file
+from jaxbiped.dynamics._feet import feet
+from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.dynamics._state import State
 from jaxbiped.plot._samples import end_time, state_at
-from jaxbiped.plot._upright import Pose, poses, upright
 from jaxbiped.plot.style import GROUND_COLOUR, LEG_COLOURS, LEG_NAMES, LEG_STYLES, new_figure
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
+
+
+class Pose(NamedTuple):
+    """Points of the walker, arrays of shape (n, 2): horizontal and vertical position [m].
+
+    Attributes:
+        hip: the hip.
+        feet: centres of foot 1 and foot 2.
+    """
+
+    hip: np.ndarray
+    feet: tuple[np.ndarray, np.ndarray]
+
+
+def upright(scene: Scene, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Points of the slope's frame [m] with gravity pointing down the page, shape (..., 2)."""
+    slope = float(scene.ground.slope)
+    horizontal = np.cos(slope) * x + np.sin(slope) * z
+    vertical = np.cos(slope) * z - np.sin(slope) * x
+    return np.stack([horizontal, vertical], axis=-1)
+
+
+def poses(scene: Scene, state: State) -> Pose:
+    """The walker at states with leaves of shape (n,)."""
+    foot_1, foot_2 = feet(scene, state)
+    hip = minimal_state(scene, state)
+    return Pose(
+        hip=upright(scene, np.asarray(hip.hip_x), np.asarray(hip.hip_z)),
+        feet=(
+            upright(scene, np.asarray(foot_1.x), np.asarray(foot_1.z)),
+            upright(scene, np.asarray(foot_2.x), np.asarray(foot_2.z)),
+        ),
+    )
+
 
 _TICK = 0.1
 """Distance between the marks on the slope [m], by which one sees the camera move."""

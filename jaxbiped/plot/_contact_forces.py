@@ -1,7 +1,5 @@
 """Contact forces over time, and one heel strike enlarged (paper, figure 8)."""
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
@@ -9,14 +7,13 @@ from matplotlib.figure import Figure, SubFigure
 from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._contacts import Contacts
 from jaxbiped.measure._footsteps import heel_strikes
-from jaxbiped.plot._force_samples import sampled_forces
+from jaxbiped.plot._samples import sampled_forces
 from jaxbiped.plot._symbols import NORMAL_FORCE, TANGENTIAL_FORCE, TIME
 from jaxbiped.plot.style import (
-    LEG_COLOURS,
     LEG_NAMES,
-    LEG_STYLES,
     SHADE_COLOUR,
     dress,
+    leg_line,
     legend_above,
     new_figure,
 )
@@ -85,12 +82,7 @@ def contact_forces(
 
 def _draw_column(axes: np.ndarray, t: np.ndarray, found: Contacts) -> None:
     for k, force in enumerate(found.forces):
-        look: dict[str, Any] = {
-            "color": LEG_COLOURS[k],
-            "linestyle": LEG_STYLES[k],
-            "linewidth": 1.1,
-            "label": LEG_NAMES[k],
-        }
+        look = leg_line(k) | {"linewidth": 1.1, "label": LEG_NAMES[k]}
         axes[0].plot(t, force.normal, **look)
         if force.tangential is not None:
             axes[1].plot(t, force.tangential, **look)

@@ -11,9 +11,8 @@ from matplotlib.figure import Figure
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
 from jaxbiped._quantity import Quantity
 from jaxbiped.basins._fractions import Fraction, wilson_interval
-from jaxbiped.plot._label_colours import in_order, label_colour, label_marker
 from jaxbiped.plot._symbols import axis_label
-from jaxbiped.plot.style import axes_or_new, dress, figure_of
+from jaxbiped.plot.style import axes_or_new, dress, figure_of, in_order, label_colour, label_marker
 
 
 def basin_fractions(

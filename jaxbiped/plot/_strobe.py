@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from jaxbiped._checks import ArgumentError, check_positive
+from jaxbiped.plot._animation import Pose, poses
 from jaxbiped.plot._samples import end_time, state_at
 from jaxbiped.plot._symbols import HEIGHT, HORIZONTAL
-from jaxbiped.plot._upright import Pose, poses
 from jaxbiped.plot.style import (
     GROUND_COLOUR,
     LEG_COLOURS,

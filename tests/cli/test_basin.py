@@ -14,7 +14,7 @@ from matplotlib.colors import to_hex
 import jaxbiped as jb
 from jaxbiped import plot
 from jaxbiped.cli import main
-from jaxbiped.plot._label_colours import label_colour
+from jaxbiped.plot.style import label_colour
 from tests.drawn import assert_is_drawn, saved_figures
 
 pytestmark = pytest.mark.slow

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 import jaxbiped as jb
 from jaxbiped.plot import basin, basin_fractions, refined_basin
-from jaxbiped.plot._label_colours import label_colour, label_marker
+from jaxbiped.plot.style import label_colour, label_marker
 
 AXES = {"names": ("swing angle", "stance rate"), "units": ("rad", "rad/s")}
 CODES = np.array([[0, 0, 1], [3, -1, 0]])

@@ -1,12 +1,16 @@
-"""Samples of a walk for figures, against the walk between its steps."""
+"""Samples of a walk for figures, against the walk between its steps and far finer samplings."""
 
+import dataclasses
+
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.measure._samples import evaluate_along
-from jaxbiped.plot._samples import sample, state_at
+from jaxbiped.measure._samples import evaluate_along, evaluate_at
+from jaxbiped.plot._samples import sample, sampled_forces, state_at
 
 
 def test_samples_hold_every_step_of_the_solver(seed_walk):
@@ -36,3 +40,53 @@ def test_contacts_are_feet_and_forces(seed_walk):
     np.testing.assert_allclose(found.forces.foot_1.normal, np.asarray(forces.foot_1.normal))
     np.testing.assert_allclose(found.forces.foot_2.tangential, np.asarray(forces.foot_2.tangential))
     assert found.touching[0].shape == (11,)
+
+
+@pytest.fixture(scope="module")
+def walk():
+    """A walk at the accuracy that is usual, of eleven footsteps: scene and trajectory."""
+    scene = jb.seed_scene()
+    return scene, jb.simulate(scene, jb.seed_state(), duration=5.0)
+
+
+def _peaks(scene, walk, t, found):
+    """Largest normal and tangential force of each heel strike, of the foot that lands."""
+    for time, foot in zip(*jb.measure.heel_strikes(scene, walk), strict=True):
+        near = (t > time - 1e-4) & (t < time + 5e-3)
+        force = found.forces[foot - 1]
+        yield foot, t[near], force.normal[near], -force.tangential[near]
+
+
+def test_peaks_are_those_of_a_much_finer_sampling(walk):
+    scene, trajectory = walk
+    t, found = sampled_forces(scene, trajectory)
+    assert np.all(np.diff(t) > 0.0)
+    for foot, near, normal, tangential in _peaks(scene, trajectory, t, found):
+        for drawn, name, sign in ((normal, "normal", 1.0), (tangential, "tangential", -1.0)):
+            fine = near[np.argmax(drawn)] + np.linspace(-1e-6, 1e-6, 20_001)
+            finest = getattr(evaluate_at(scene, trajectory, contacts, fine).forces[foot - 1], name)
+            assert drawn.max() == pytest.approx(float(np.max(sign * finest)), rel=2e-5)
+
+
+def test_peaks_do_not_vary_from_step_to_step(walk):
+    scene, trajectory = walk
+    peaks = [
+        (normal.max(), tangential.max())
+        for _, _, normal, tangential in _peaks(
+            scene, trajectory, *sampled_forces(scene, trajectory)
+        )
+    ]
+    settled = np.array(peaks[-3:])
+    # The solver's own steps leave 1.8 % in the tangential ones.
+    assert (np.ptp(settled, axis=0) < 1e-3 * settled.mean(axis=0)).all()
+
+
+def test_between_two_times_and_without_friction(walk):
+    scene, trajectory = walk
+    slippery = eqx.tree_at(lambda s: s.friction, scene, jb.laws.Frictionless())
+    t, found = sampled_forces(slippery, trajectory, start=0.3, stop=0.5)
+    assert (t[0], t[-1]) == (0.3, 0.5)
+    assert found.forces.foot_1.tangential is None
+    assert found.forces.foot_1.normal.shape == t.shape
+    with pytest.raises(ValueError, match='save="steps"'):
+        sampled_forces(scene, dataclasses.replace(trajectory, dense=None))

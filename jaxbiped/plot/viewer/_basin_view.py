@@ -3,21 +3,17 @@
 import base64
 import dataclasses
 import warnings
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_count, check_type
-from jaxbiped._paths import check_writable_file
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._label import label_names
-from jaxbiped.plot._label_colours import in_order, label_colour
-from jaxbiped.plot.style import view_colours
-from jaxbiped.plot.viewer._compliant_recording import record_walk
-from jaxbiped.plot.viewer._page import frame_of, page_of
-from jaxbiped.plot.viewer._recording import Recording
+from jaxbiped.plot.style import in_order, label_colour, view_colours
+from jaxbiped.plot.viewer._page import AbstractPage, frame_of, page_of
+from jaxbiped.plot.viewer._recording import Recording, record_walk
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._simulate import simulate
@@ -30,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True)
-class BasinView:
+class BasinView(AbstractPage):
     """A basin's picture whose starts show their walks.
 
     Attributes:
@@ -47,12 +43,6 @@ class BasinView:
         walks = [each and each.numbers() for each in self.recordings]
         sent = {"basin": self.basin, "walks": walks, "colours": view_colours()}
         return page_of(sent, self.basin["title"])
-
-    def save(self, path: str | Path) -> Path:
-        """Writes that page, and returns its path."""
-        where = check_writable_file("path", path)
-        where.write_text(self.html(), encoding="utf-8")
-        return where
 
     def _repr_html_(self) -> str:
         return frame_of(self.html(), self.basin["title"], 900)

@@ -1,10 +1,13 @@
 """Page and scripts of the viewer: one file of HTML that needs no network."""
 
+import abc
 import html
 import json
 import re
 from importlib.resources import files
+from pathlib import Path
 
+from jaxbiped._paths import check_writable_file
 from jaxbiped._types import JsonObject
 
 _MODULES = (
@@ -50,6 +53,20 @@ body {{ margin: 0; }}
 </body>
 </html>
 """
+
+
+class AbstractPage(abc.ABC):
+    """What is shown as one page of HTML."""
+
+    @abc.abstractmethod
+    def html(self) -> str:
+        """One page of HTML that holds everything and needs no network."""
+
+    def save(self, path: str | Path) -> Path:
+        """Writes that page, and returns its path."""
+        where = check_writable_file("path", path)
+        where.write_text(self.html(), encoding="utf-8")
+        return where
 
 
 def page_of(sent: JsonObject, title: str, *, computes: bool = False) -> str:

@@ -2,28 +2,90 @@
 
 import base64
 import dataclasses
-from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import jax
+import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
+from jaxtyping import PyTree
 
 from jaxbiped._checks import check_count, check_type
 from jaxbiped._ending import Ending
-from jaxbiped._paths import check_writable_file
-from jaxbiped._types import JsonObject
+from jaxbiped._types import JsonObject, Scalar
+from jaxbiped.compiler import LANES, Program, Request, web_module
+from jaxbiped.dynamics._contacts import contacts
+from jaxbiped.dynamics._energy import Energies, energies
 from jaxbiped.dynamics._state import State
 from jaxbiped.plot.style import view_colours
-from jaxbiped.plot.viewer._page import frame_of, page_of
-from jaxbiped.plot.viewer._played_program import (
-    ENDING,
-    RECORDED,
-    STEPS,
-    played_module,
-    played_request,
-)
+from jaxbiped.plot.viewer._page import AbstractPage, frame_of, page_of
+from jaxbiped.plot.viewer._recording import FORCES
 from jaxbiped.scene._scene import Scene
 from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.simulate._simulation import Simulation
+from jaxbiped.solve._adaptive_program import Solve
+
+STEPS = 8192
+"""Attempted steps after which a page gives up."""
+RECORDED = (
+    "t",
+    *State._fields,
+    *FORCES,
+    *Energies._fields,
+    "touches_1",
+    "touches_2",
+    "place_1",
+    "place_2",
+)
+"""What is recorded at the end of every accepted step."""
+ENDING = 1 + len(State._fields)
+"""The place among a solve's outputs of how it ended."""
+
+
+def played_request(scene: Scene, state: State, footsteps: int) -> Request:
+    """What is asked of lanes: one walk of so many footsteps, `RECORDED` step by step."""
+    run = Simulation.prepare(
+        scene, state, footsteps=footsteps, max_solver_steps=STEPS, engine="lanes"
+    )
+    request = run.lane_request()
+    assert request is not None
+    return request._replace(program=_played(request.program), room=STEPS)
+
+
+def played_module(request: Request) -> bytes:
+    """Its program as a module of WebAssembly."""
+    return web_module(LANES.compile(request).graph)
+
+
+def _played(program: Program) -> Program:
+    """The program with records for the viewer in place of the dense output."""
+    steps = program.record
+    assert steps is not None
+
+    def record(solve: Solve, now: PyTree, due: Scalar) -> tuple[Scalar, list[Scalar]]:
+        noted, (t, *values) = steps(solve, now, due)
+        state = State(*values[: len(State._fields)])
+        shown = jax.lax.cond(
+            noted,
+            lambda: _shown(solve.scene, state),
+            lambda: [jnp.zeros_like(t)] * (len(RECORDED) - 1 - len(state)),
+        )
+        return noted, [t, *state, *shown]
+
+    return dataclasses.replace(program, record=record)
+
+
+def _shown(scene: Any, state: State) -> list[Scalar]:
+    found, energy = contacts(scene, state), energies(scene, state)
+    zero = jnp.zeros_like(state.hip_x)
+    normal = [force.normal for force in found.forces]
+    tangential = [
+        zero if force.tangential is None else jnp.asarray(force.tangential)
+        for force in found.forces
+    ]
+    touching = [jnp.where(touches, 1.0, 0.0) for touches in found.touching]
+    places = [foot.x for foot in found.feet]
+    return [zero + value for value in (*normal, *tangential, *energy, *touching, *places)]
 
 
 class _Slider(NamedTuple):
@@ -46,7 +108,7 @@ _SLIDERS = (
 
 
 @dataclasses.dataclass(frozen=True)
-class Playground:
+class Playground(AbstractPage):
     """A page that simulates itself.
 
     Attributes:
@@ -83,12 +145,6 @@ class Playground:
     def html(self) -> str:
         """One page of HTML that holds everything and needs no network."""
         return page_of(self.sent(), "A walk that simulates itself", computes=True)
-
-    def save(self, path: str | Path) -> Path:
-        """Writes that page, and returns its path."""
-        where = check_writable_file("path", path)
-        where.write_text(self.html(), encoding="utf-8")
-        return where
 
     def _repr_html_(self) -> str:
         return frame_of(self.html(), "a walk that simulates itself", 1000)

@@ -7,8 +7,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject
-from jaxbiped.plot.viewer._knots import Channels, Tolerances
+from jaxbiped.dynamics._contacts import Contacts, contacts
+from jaxbiped.dynamics._energy import energies
+from jaxbiped.dynamics._redundant_state import CompliantState, minimal_state
+from jaxbiped.dynamics._state import State
+from jaxbiped.measure._footsteps import heel_strikes
+from jaxbiped.measure._samples import at_steps, evaluate_along
+from jaxbiped.plot._samples import end_time, state_at
+from jaxbiped.plot.viewer._knots import Channels, Tolerances, adaptive_knots
+from jaxbiped.scene._scene import Scene
+from jaxbiped.solve._trajectory import Trajectory
 
 _COORDINATES = {
     "hip_x": "hip_vx",
@@ -127,3 +137,98 @@ def tolerances_for(scene: Any, exact: float) -> Tolerances:
 
 def _encoded(values: np.ndarray, kind: str) -> str:
     return base64.b64encode(np.asarray(values, dtype=kind).tobytes()).decode("ascii")
+
+
+_EXACT, _LOOKS_RIGHT = 1e-5, 1e-4
+"""Errors allowed of angles [rad], and of lengths in parts of the legs'."""
+_EVEN, _MOST = 0.05, 20_000
+"""Even times to begin with [√(l/g)], and their largest number."""
+_STEPS = 5e-3
+"""The solver's steps are begun with, too, as far as they are this far apart [√(l/g)]."""
+
+
+def record_walk(
+    scene: Any, trajectory: Trajectory, name: str, *, motion_only: bool = False
+) -> Recording:
+    """A recording of a compliant walk.
+
+    Args:
+        scene: what was simulated, a `Scene` or a `RedundantScene`.
+        trajectory: the motion, saved step by step.
+        name: what it is called.
+        motion_only: whether to leave out forces and energies, and to be content with a motion that
+            looks right.
+
+    Returns:
+        The recording, as long as the trajectory.
+
+    Raises:
+        ValueError: the trajectory was not saved step by step, or this is a batch.
+    """
+    if end_time(trajectory) <= 0.0:
+        raise ArgumentError("trajectory ends where it begins: there is no motion to look at.")
+    first = _first_times(scene, trajectory)
+    started = evaluate_along(scene, state_at(trajectory, first[:1]), energies)
+
+    def evaluate(t: np.ndarray) -> Channels:
+        states = state_at(trajectory, t)
+        motion = _motion(scene, states)
+        if motion_only:
+            return motion
+        now = evaluate_along(scene, states, energies)
+        return {
+            **motion,
+            **_forces(evaluate_along(scene, states, contacts)),
+            "kinetic": now.kinetic,
+            "elastic": now.elastic,
+            "supplied": started.gravitational - now.gravitational,
+            "lost": started.total - now.total,
+        }
+
+    exact = _LOOKS_RIGHT if motion_only else _EXACT
+    t, channels = adaptive_knots(evaluate, first, tolerances_for(scene, exact))
+    prints = _footprints(scene, trajectory)
+    return recording(scene, name, trajectory.outcome, t, channels, prints)
+
+
+def _first_times(scene: Scene, trajectory: Trajectory) -> np.ndarray:
+    """Even times, and the solver's steps where they are not too close."""
+    last, unit = end_time(trajectory), time_unit(scene)
+    steps = np.asarray(trajectory.t)
+    count = min(max(int(last / (_EVEN * unit)), 2), _MOST)
+    far = np.unique(np.floor(steps / (_STEPS * unit)), return_index=True)[1]
+    times = np.union1d(np.linspace(0.0, last, count + 1), steps[far])
+    times = times[(times >= 0.0) & (times <= last)]
+    apart = np.diff(times) > 1e-6 * unit
+    return times[np.concatenate([[True], apart[:-1] | (times[1:-1] == last), [True]])]
+
+
+def _motion(scene: Scene, states: CompliantState) -> Channels:
+    hip = minimal_state(scene, states)
+    return {field: np.asarray(getattr(hip, field)) for field in State._fields}
+
+
+def _forces(found: Contacts) -> Channels:
+    forces: Channels = {}
+    for leg, force in enumerate(found.forces, 1):
+        forces[f"normal_{leg}"] = np.asarray(force.normal)
+        if force.tangential is not None:
+            forces[f"tangential_{leg}"] = np.asarray(force.tangential)
+    return forces
+
+
+def _footprints(scene: Scene, trajectory: Trajectory) -> list[Footprint]:
+    """Of feet that stand at the start, and of all heel strikes."""
+    start = at_steps(scene, trajectory, contacts)
+    prints = [
+        Footprint(0.0, leg, float(foot.x[0]), strike=False)
+        for leg, (foot, touching) in enumerate(zip(start.feet, start.touching, strict=True), 1)
+        if touching[0]
+    ]
+    strikes = heel_strikes(scene, trajectory)
+    if strikes.time_s.size:
+        feet = evaluate_along(scene, state_at(trajectory, strikes.time_s), contacts).feet
+        for k, (time, leg) in enumerate(zip(*strikes, strict=True)):
+            place = float(feet[leg - 1].x[k])
+            prints.append(Footprint(float(time), int(leg), place, strike=True))
+    return prints

@@ -2,17 +2,14 @@
 
 import dataclasses
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped._paths import check_writable_file
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.plot.style import view_colours
-from jaxbiped.plot.viewer._compliant_recording import record_walk
-from jaxbiped.plot.viewer._page import frame_of, page_of
-from jaxbiped.plot.viewer._recording import Recording
+from jaxbiped.plot.viewer._page import AbstractPage, frame_of, page_of
+from jaxbiped.plot.viewer._recording import Recording, record_walk
 from jaxbiped.plot.viewer._rigid_recording import record_rigid_walk
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of
@@ -20,7 +17,7 @@ from jaxbiped.solve._trajectory import Trajectory
 
 
 @dataclasses.dataclass(frozen=True)
-class View:
+class View(AbstractPage):
     """Walks that can be watched, side by side under one clock. A notebook shows it.
 
     Attributes:
@@ -39,12 +36,6 @@ class View:
     def html(self) -> str:
         """One page of HTML that holds everything and needs no network."""
         return page_of(self.sent(), ", ".join(each.name for each in self.recordings))
-
-    def save(self, path: str | Path) -> Path:
-        """Writes that page, and returns its path."""
-        where = check_writable_file("path", path)
-        where.write_text(self.html(), encoding="utf-8")
-        return where
 
     def widget(self) -> Any:
         """The view as a widget of `anywidget` (`pip install jaxbiped[view]`).

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.plot._upright import poses
+from jaxbiped.plot._animation import poses
 from tests.browser import chromium, require_chromium
 from tests.drawn import leg_pixels
 

@@ -11,7 +11,7 @@ from selenium.webdriver.support.ui import WebDriverWait
 import jaxbiped as jb
 from jaxbiped.compiler import LANES
 from jaxbiped.plot.viewer._page import page_of, script
-from jaxbiped.plot.viewer._played_program import STEPS, played_request
+from jaxbiped.plot.viewer._playground import STEPS, played_request
 from tests.browser import chromium
 
 pytestmark = pytest.mark.slow

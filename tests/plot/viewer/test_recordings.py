@@ -8,7 +8,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 import jaxbiped as jb
-from jaxbiped.plot._upright import poses
+from jaxbiped.plot._animation import poses
 
 pytestmark = pytest.mark.slow
 
