@@ -18,8 +18,7 @@ from jaxbiped.basins._label import label_names
 from jaxbiped.basins._label_errors import LabelErrors, label_errors
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli.commands._basin import Basin
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import RigidState, State
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._accuracy import accuracy_told

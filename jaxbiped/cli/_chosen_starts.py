@@ -8,8 +8,7 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.cli._basin_options import StartsOptions, parse_axis
-from jaxbiped.dynamics._rigid_state import rigid_state
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import State, rigid_state
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep.starts._coordinates import check_coordinates
 from jaxbiped.sweep.starts._given_starts import GivenStarts

@@ -17,7 +17,7 @@ from jaxbiped.compiler import default_threads
 from jaxbiped.constraints._constraint_methods import method_named
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._solvers import solver_named

@@ -9,10 +9,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._bristle_state import MinimalState
 from jaxbiped.dynamics._feet import standing_height
-from jaxbiped.dynamics._rigid_state import WalkerState
-from jaxbiped.dynamics._state import seed_state
+from jaxbiped.dynamics._state import MinimalState, WalkerState, seed_state
 from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 

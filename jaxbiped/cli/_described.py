@@ -14,7 +14,7 @@ from jaxbiped.cli._choices import SEED
 from jaxbiped.cli._default_start import default_start
 from jaxbiped.cli._walk_options import SceneOptions, StartOptions
 from jaxbiped.constraints._constraint_methods import method_named
-from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._ready_scenes import seed_scene

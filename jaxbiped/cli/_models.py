@@ -7,7 +7,7 @@ from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli.commands._models import Models
-from jaxbiped.dynamics._formulation import state_type
+from jaxbiped.dynamics._state import state_type
 from jaxbiped.measure._operation_counts import operation_counts
 from jaxbiped.scene._ready_scenes import ladder, seed_scene
 from jaxbiped.scene._scene import RigidScene, Scene

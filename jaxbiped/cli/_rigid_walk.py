@@ -17,7 +17,7 @@ from jaxbiped.cli._driven import cost_sentence, walk_cost
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SolveOptions
 from jaxbiped.cli._warnings import cut_short
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import RigidState
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.solve._accuracy import ACCURACIES

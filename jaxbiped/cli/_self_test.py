@@ -8,8 +8,7 @@ import numpy as np
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import RigidState, State
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._ready_scenes import seed_scene

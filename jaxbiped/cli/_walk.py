@@ -20,8 +20,7 @@ from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._rigid_walk import run_rigid_walk
 from jaxbiped.cli._warnings import ending_name, relative_residual, walk_warnings
 from jaxbiped.cli.commands._walk import Walk
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import RigidState, State
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._footsteps import Footsteps, footsteps
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene

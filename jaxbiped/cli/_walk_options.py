@@ -28,7 +28,7 @@ from jaxbiped.cli._option_checks import check_accuracy, check_engine
 from jaxbiped.cli._option_fields import Engine, Group, group
 
 if TYPE_CHECKING:
-    from jaxbiped.dynamics._rigid_state import WalkerState
+    from jaxbiped.dynamics._state import WalkerState
     from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 
 MOST_STEPS = 1 << 20

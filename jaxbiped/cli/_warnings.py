@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxbiped._ending import Ending
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._contacts import contacts
+from jaxbiped.dynamics._contact_forces import contacts
 from jaxbiped.measure._energy_ledger import EnergyLedger
 from jaxbiped.measure._samples import at_steps
 from jaxbiped.scene._scene import RedundantScene, Scene

@@ -1,7 +1,5 @@
 """Constraint methods in redundant coordinates, linkages, and the algebra of their constraints."""
 
-from jaxbiped.constraints._augmented import Augmented as Augmented
-from jaxbiped.constraints._baumgarte import Baumgarte as Baumgarte
 from jaxbiped.constraints._constraint_method import (
     AbstractConstraintMethod as AbstractConstraintMethod,
 )
@@ -10,12 +8,14 @@ from jaxbiped.constraints._constraint_method import (
 )
 from jaxbiped.constraints._constraint_method import Constrained as Constrained
 from jaxbiped.constraints._constraint_methods import CONSTRAINT_METHODS as CONSTRAINT_METHODS
-from jaxbiped.constraints._direct_correction import DirectCorrection as DirectCorrection
-from jaxbiped.constraints._index1 import Index1 as Index1
-from jaxbiped.constraints._index1_augmented import Index1Augmented as Index1Augmented
+from jaxbiped.constraints._constraint_methods import Augmented as Augmented
+from jaxbiped.constraints._constraint_methods import Baumgarte as Baumgarte
+from jaxbiped.constraints._constraint_methods import DirectCorrection as DirectCorrection
+from jaxbiped.constraints._constraint_methods import Index1 as Index1
+from jaxbiped.constraints._constraint_methods import Index1Augmented as Index1Augmented
+from jaxbiped.constraints._constraint_methods import Penalty as Penalty
+from jaxbiped.constraints._constraint_methods import Standard as Standard
 from jaxbiped.constraints._linkage import ORIENTATIONS as ORIENTATIONS
 from jaxbiped.constraints._linkage import Body as Body
 from jaxbiped.constraints._linkage import Joint as Joint
 from jaxbiped.constraints._linkage import Linkage as Linkage
-from jaxbiped.constraints._penalty import Penalty as Penalty
-from jaxbiped.constraints._standard import Standard as Standard

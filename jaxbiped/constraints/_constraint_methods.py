@@ -1,14 +1,237 @@
-"""Constraint methods by the paper's names."""
+"""The seven constraint methods, by the paper's names."""
 
-from jaxbiped._checks import check_choice
-from jaxbiped.constraints._augmented import Augmented
-from jaxbiped.constraints._baumgarte import Baumgarte
-from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
-from jaxbiped.constraints._direct_correction import DirectCorrection
-from jaxbiped.constraints._index1 import Index1
-from jaxbiped.constraints._index1_augmented import Index1Augmented
-from jaxbiped.constraints._penalty import Penalty
-from jaxbiped.constraints._standard import Standard
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from jaxbiped._checks import check_at_least, check_choice
+from jaxbiped._parameter import parameter
+from jaxbiped._types import Parameter, Scalar
+from jaxbiped.constraints._constraint_method import (
+    AbstractConstraintMethod,
+    AbstractExactProjection,
+    AbstractProjectingMethod,
+    Constrained,
+    Row,
+    applied_impulse,
+    exact_multipliers,
+    gram,
+    inverse_masses,
+    projection,
+    stabilised,
+)
+from jaxbiped.linalg._symmetric import Factors, factorise, solve
+
+
+class Standard(AbstractConstraintMethod):
+    """[M Jᵀ; J 0] [q̈; λ] = [Q; γ]: the constraints hold at the level of accelerations only.
+
+    Whatever error the integrator makes in positions and velocities stays, and an error of the
+    velocities makes the positions drift without bound.
+
+    Source: the seed paper, section 4, "standard".
+    """
+
+    needs_independent: ClassVar[bool] = True
+
+    def multipliers(self, system: Constrained) -> list[Scalar]:
+        return exact_multipliers(system)
+
+
+class Baumgarte(AbstractConstraintMethod):
+    """As `Standard` with γ − 2 a Φ̇ − b² Φ for γ: a violation decays as Φ̈ + 2 a Φ̇ + b² Φ = 0.
+
+    Source: the seed paper, section 4, "baumgarte"; Baumgarte (1972).
+
+    Attributes:
+        a: damping of a violation [1/s].
+        b: its frequency [1/s]; a = b damps critically.
+
+    Raises:
+        ArgumentError: a or b below 0.
+    """
+
+    a: Parameter = parameter("constraint damping", "$a$", "1/s", minimum=0.0, default=5.0)
+    b: Parameter = parameter("constraint frequency", "$b$", "1/s", minimum=0.0, default=5.0)
+    needs_independent: ClassVar[bool] = True
+
+    def multipliers(self, system: Constrained) -> list[Scalar]:
+        return exact_multipliers(system, stabilised(system, 2.0 * self.a, self.b * self.b))
+
+
+def penalty_system(
+    system: Constrained, A: Scalar, omega: Scalar, zeta: Scalar
+) -> tuple[Factors, list[Scalar]]:
+    """Factors of J M⁻¹ Jᵀ + 1/A, and the violation that the applied forces alone would leave.
+
+    By Woodbury's identity (M + A JᵀJ)⁻¹ asks for no more than that k × k matrix, which is regular
+    whatever the constraints say, and is well conditioned where M + A JᵀJ is not.
+    """
+    right = stabilised(system, 2.0 * zeta * omega, omega * omega)
+    return factorise(gram(system.rows, inverse_masses(system.masses), 1.0 / A)), right
+
+
+class AbstractAugmented(AbstractConstraintMethod):
+    """Accelerations by the augmented Lagrangian: the penalty's, and again for what that leaves.
+
+    Raises:
+        ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
+    """
+
+    A: Parameter = parameter("penalty", "$A$", "kg", positive=True, default=1e7)
+    omega: Parameter = parameter(
+        "constraint frequency", r"$\omega$", "1/s", minimum=0.0, default=10.0
+    )
+    zeta: Parameter = parameter("constraint damping ratio", r"$\zeta$", minimum=0.0, default=1.0)
+    iterations: int = eqx.field(static=True, default=3)
+    needs_independent: ClassVar[bool] = False
+
+    def __check_init__(self) -> None:
+        check_at_least("iterations", self.iterations, "1", 1)
+
+    def multipliers(self, system: Constrained) -> list[Scalar]:
+        factors, right = penalty_system(system, self.A, self.omega, self.zeta)
+        matrix = gram(system.rows, inverse_masses(system.masses))
+        return iterate_multipliers(factors, matrix, right, self.iterations)
+
+
+def iterate_multipliers(
+    factors: Factors,
+    matrix: list[list[Scalar]],
+    right: list[Scalar],
+    iterations: int,
+) -> list[Scalar]:
+    """λ after some iterations of λ ← λ + (S + 1/A)⁻¹(r − S λ) from λ = 0; S by its lower half.
+
+    An error of λ that the constraints feel shrinks by 1/(1 + A s) each time, s the eigenvalue of S
+    that it belongs to.
+    """
+    found = solve(factors, right)
+    size = len(right)
+    for _ in range(iterations - 1):
+        left = []
+        for i in range(size):
+            row = [matrix[max(i, j)][min(i, j)] * found[j] for j in range(size)]
+            left.append(right[i] - sum(row[1:], row[0]))
+        found = [x + dx for x, dx in zip(found, solve(factors, left), strict=True)]
+    return found
+
+
+class Penalty(AbstractConstraintMethod):
+    """(M + A JᵀJ) q̈ = Q − A Jᵀ(J̇ q̇ + 2 ζ ω Φ̇ + ω² Φ): stiff springs in place of constraints.
+
+    What holds the joint is λ = A (Φ̈ + 2 ζ ω Φ̇ + ω² Φ), so a loaded joint is open by about
+    λ/(A ω²), and accelerations and forces are off by a share of 1/(A s), s ≈ 1/m an eigenvalue of
+    J M⁻¹ Jᵀ: 2e-11 at the walker's hip. The A of 1e7 kg that is usual elsewhere belongs to solving
+    with M + A JᵀJ, which a larger one makes ill-conditioned. Here 1/A is added to J M⁻¹ Jᵀ, which
+    it cannot harm; the larger A is, the nearer is `Baumgarte` with a = ζ ω and b = ω. Constraints
+    that say the same twice share the load, to A s roundings.
+
+    Source: the seed paper, section 4, "penalty"; Bayo, García de Jalón and Serna (1988).
+
+    Attributes:
+        A: penalty [kg].
+        omega: ω, the frequency at which a violation decays [1/s].
+        zeta: ζ, its damping [–].
+
+    Raises:
+        ArgumentError: A not above 0, or ω or ζ below 0.
+    """
+
+    A: Parameter = parameter("penalty", "$A$", "kg", positive=True, default=1e10)
+    omega: Parameter = parameter(
+        "constraint frequency", r"$\omega$", "1/s", minimum=0.0, default=10.0
+    )
+    zeta: Parameter = parameter("constraint damping ratio", r"$\zeta$", minimum=0.0, default=1.0)
+    needs_independent: ClassVar[bool] = False
+
+    def multipliers(self, system: Constrained) -> list[Scalar]:
+        return solve(*penalty_system(system, self.A, self.omega, self.zeta))
+
+
+class Augmented(AbstractAugmented):
+    """M q̈⁰ = Q, then (M + A JᵀJ) q̈ᵏ⁺¹ = M q̈ᵏ − A Jᵀ(J̇ q̇ + 2 ζ ω Φ̇ + ω² Φ), repeated.
+
+    The iterations take off what the penalty alone leaves: each shrinks it by about 1/(A s), where
+    s ≈ 1/m is an eigenvalue of J M⁻¹ Jᵀ. Their number is fixed, so that nothing depends on a test
+    and derivatives are those of the same arithmetic: three leave nothing at the usual A.
+
+    Source: the seed paper, section 4, "augmented"; Bayo, García de Jalón and Serna (1988).
+
+    Attributes:
+        A: penalty [kg].
+        omega: ω, the frequency at which a violation decays [1/s].
+        zeta: ζ, its damping [–].
+        iterations: how often.
+
+    Raises:
+        ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
+    """
+
+
+class Index1(AbstractExactProjection):
+    """`Standard` within the step; after it q and q̇ are projected in the mass metric.
+
+    Δq = −M⁻¹Jᵀ(J M⁻¹ Jᵀ)⁻¹ Φ, repeated, then likewise q̇ with Φ̇.
+
+    Source: the seed paper, section 4, names an "index-1 projection method" and does not define it;
+    this is the usual meaning.
+
+    Attributes:
+        iterations: corrections of the positions after each step.
+
+    Raises:
+        ArgumentError: fewer than one iteration.
+    """
+
+    def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
+        return projection(rows, inverse_masses(masses), residual)
+
+
+class Index1Augmented(AbstractAugmented, AbstractProjectingMethod):
+    """`Augmented` within the step; after it q and q̇ are projected in the mass metric.
+
+    The projections are augmented Lagrangian iterations themselves, (M + A JᵀJ) Δq = −A Jᵀ Φ and
+    again with what that leaves, so that constraints which say the same twice do no harm.
+
+    Source: the seed paper, section 4, "index-1 augmented lagrangian"; Bayo and Ledesma (1996).
+
+    Attributes:
+        A: penalty [kg].
+        omega: ω, the frequency at which a violation decays within a step [1/s].
+        zeta: ζ, its damping [–].
+        iterations: how often, for accelerations and for each projection.
+
+    Raises:
+        ArgumentError: A not above 0, ω or ζ below 0, or fewer than one iteration.
+    """
+
+    def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
+        weights = inverse_masses(masses)
+        factors = factorise(gram(rows, weights, 1.0 / self.A))
+        found = iterate_multipliers(factors, gram(rows, weights), residual, self.iterations)
+        return applied_impulse(rows, weights, found)
+
+
+class DirectCorrection(AbstractExactProjection):
+    """`Standard` within the step; after it q ← q − Jᵀ(J Jᵀ)⁻¹ Φ, and q̇ likewise with Φ̇.
+
+    Corrections as small as can be in the coordinates' own numbers, metres and radians alike: a
+    different split between translation and rotation than the mass metric's.
+
+    Source: the seed paper, section 4, "described", the direct correction method.
+
+    Attributes:
+        iterations: corrections of the positions after each step.
+
+    Raises:
+        ArgumentError: fewer than one iteration.
+    """
+
+    def step_back(self, masses: list[Scalar], rows: list[Row], residual: list[Scalar]) -> Row:
+        return projection(rows, [jnp.ones_like(mass) for mass in masses], residual)
+
 
 CONSTRAINT_METHODS: dict[str, type[AbstractConstraintMethod]] = {
     "standard": Standard,

@@ -12,7 +12,7 @@ from jaxbiped.continuation._bifurcations import BifurcationPoint
 from jaxbiped.continuation._branch_dataset import branch_dataset
 from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.continuation._trace import BranchStop
-from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.scene._parameter_access import parameter_quantities, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxbiped._strict_json import strict_json
 from jaxbiped.continuation._bifurcations import EVENTS
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state import STATE_QUANTITIES
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._parameter_access import scene_identity
 

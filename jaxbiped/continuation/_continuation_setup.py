@@ -13,9 +13,7 @@ from jaxbiped.continuation._branch_point import BranchPoint, branch_point, gait_
 from jaxbiped.continuation._cycle import CycleProblem
 from jaxbiped.continuation._limit_cause import limit_cause
 from jaxbiped.continuation._trace import Trace
-from jaxbiped.dynamics._bristle_state import state_for
-from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
-from jaxbiped.dynamics._state import check_state
+from jaxbiped.dynamics._state import RigidState, WalkerState, check_state, state_for
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._engine import orbit_engine

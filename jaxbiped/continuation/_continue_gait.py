@@ -21,7 +21,7 @@ from jaxbiped.continuation._continuation_setup import (
     continuation_setup,
 )
 from jaxbiped.continuation._trace import BranchStop, Trace, trace
-from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._explain_search import explain_search

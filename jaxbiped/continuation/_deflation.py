@@ -24,7 +24,7 @@ from jaxbiped.continuation._continuation_setup import (
     checked_start,
     continuation_setup,
 )
-from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._pseudo_arclength import Change

@@ -5,9 +5,8 @@ from typing import cast
 import numpy as np
 
 from jaxbiped._ending import Ending
-from jaxbiped.dynamics._contacts import contacts
-from jaxbiped.dynamics._rigid_state import WalkerState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._contact_forces import contacts
+from jaxbiped.dynamics._state import State, WalkerState
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import simulate
 

@@ -13,9 +13,7 @@ from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_dataset import NUMBERS
 from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.continuation._trace import BranchStop
-from jaxbiped.dynamics._bristle_state import BristleState
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import BristleState, RigidState, State
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.scene._parameter_access import scene_identity
 from jaxbiped.scene._scene import RigidScene, Scene

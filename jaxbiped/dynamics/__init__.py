@@ -1,9 +1,11 @@
 """Equations of motion and functions of the state: energies, feet, forces, sections, impacts."""
 
-from jaxbiped.dynamics._bristle_state import BristleState as BristleState
 from jaxbiped.dynamics._consistent_state import Consistent as Consistent
 from jaxbiped.dynamics._consistent_state import consistent_state as consistent_state
 from jaxbiped.dynamics._consistent_state import project as project
+from jaxbiped.dynamics._contact_forces import FootForce as FootForce
+from jaxbiped.dynamics._contact_forces import FootForces as FootForces
+from jaxbiped.dynamics._contact_forces import foot_forces as foot_forces
 from jaxbiped.dynamics._energy import Energies as Energies
 from jaxbiped.dynamics._energy import Powers as Powers
 from jaxbiped.dynamics._energy import energies as energies
@@ -13,11 +15,9 @@ from jaxbiped.dynamics._feet import Foot as Foot
 from jaxbiped.dynamics._feet import feet as feet
 from jaxbiped.dynamics._feet import standing_height as standing_height
 from jaxbiped.dynamics._feet import touches as touches
-from jaxbiped.dynamics._forces import FootForce as FootForce
-from jaxbiped.dynamics._forces import FootForces as FootForces
-from jaxbiped.dynamics._forces import foot_forces as foot_forces
 from jaxbiped.dynamics._impact import Impact as Impact
 from jaxbiped.dynamics._impact import impact as impact
+from jaxbiped.dynamics._impact import push_off_work as push_off_work
 from jaxbiped.dynamics._linkage_motion import LinkageMotion as LinkageMotion
 from jaxbiped.dynamics._linkage_motion import LinkageState as LinkageState
 from jaxbiped.dynamics._linkage_motion import linkage_field as linkage_field
@@ -25,7 +25,6 @@ from jaxbiped.dynamics._linkage_motion import linkage_motion as linkage_motion
 from jaxbiped.dynamics._minimal_motion import Accelerations as Accelerations
 from jaxbiped.dynamics._minimal_motion import accelerations as accelerations
 from jaxbiped.dynamics._minimal_motion import vector_field as vector_field
-from jaxbiped.dynamics._push_off import push_off_work as push_off_work
 from jaxbiped.dynamics._redundant_motion import HipForce as HipForce
 from jaxbiped.dynamics._redundant_motion import RedundantMotion as RedundantMotion
 from jaxbiped.dynamics._redundant_motion import Violation as Violation
@@ -39,13 +38,14 @@ from jaxbiped.dynamics._redundant_state import minimal_state as minimal_state
 from jaxbiped.dynamics._redundant_state import redundant_state as redundant_state
 from jaxbiped.dynamics._rigid_checks import RigidChecks as RigidChecks
 from jaxbiped.dynamics._rigid_checks import rigid_checks as rigid_checks
-from jaxbiped.dynamics._rigid_state import RigidState as RigidState
-from jaxbiped.dynamics._rigid_state import rigid_state as rigid_state
-from jaxbiped.dynamics._rigid_state import whole_state as whole_state
 from jaxbiped.dynamics._rolling import RollingMotion as RollingMotion
 from jaxbiped.dynamics._rolling import rolling as rolling
 from jaxbiped.dynamics._rolling import rolling_field as rolling_field
 from jaxbiped.dynamics._section import AbstractSection as AbstractSection
+from jaxbiped.dynamics._state import BristleState as BristleState
+from jaxbiped.dynamics._state import RigidState as RigidState
 from jaxbiped.dynamics._state import exchange_legs as exchange_legs
+from jaxbiped.dynamics._state import rigid_state as rigid_state
+from jaxbiped.dynamics._state import whole_state as whole_state
 from jaxbiped.dynamics._switches import Switch as Switch
 from jaxbiped.dynamics._switches import switches as switches

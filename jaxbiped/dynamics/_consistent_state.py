@@ -11,7 +11,6 @@ from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
 from jaxbiped.constraints._linkage_constraints import masses_of
 from jaxbiped.constraints._projection import correct_step, nearest_consistent
-from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._redundant_motion import (
     Violation,
     coordinates_of,
@@ -26,7 +25,7 @@ from jaxbiped.dynamics._redundant_state import (
     is_redundant,
     redundant_state,
 )
-from jaxbiped.dynamics._state import check_leaves
+from jaxbiped.dynamics._state import check_leaves, state_for
 from jaxbiped.scene._scene import RedundantScene
 
 FURTHEST = Violation(position=0.01, rate=0.1, normalisation=0.01)

@@ -7,9 +7,8 @@ import jax.numpy as jnp
 from jaxbiped._cached_jit import kept_alone
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
+from jaxbiped.dynamics._contact_forces import foot_force, hip_motion, normal_forces
 from jaxbiped.dynamics._feet import Foot, feet, touches
-from jaxbiped.dynamics._forces import foot_force
-from jaxbiped.dynamics._hip_motion import hip_motion, normal_forces
 from jaxbiped.dynamics._redundant_state import legs_of, minimal_state
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import AbstractScene, Scene

@@ -8,12 +8,10 @@ from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.dynamics._actuation import hip_torques
+from jaxbiped.dynamics._contact_forces import foot_force, hip_motion
 from jaxbiped.dynamics._feet import Feet, Foot, feet
-from jaxbiped.dynamics._forces import foot_force
-from jaxbiped.dynamics._formulation import field_of
-from jaxbiped.dynamics._hip_motion import hip_motion
 from jaxbiped.dynamics._redundant_state import CompliantState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import State, field_of
 from jaxbiped.scene._scene import CompliantScene, Scene
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 

@@ -15,13 +15,12 @@ from jaxbiped.constraints._linkage_constraints import (
     torque_on,
 )
 from jaxbiped.dynamics._actuation import hip_torques
+from jaxbiped.dynamics._contact_forces import foot_force, hip_motion
 from jaxbiped.dynamics._feet import feet, feet_of
-from jaxbiped.dynamics._forces import foot_force
-from jaxbiped.dynamics._formulation import field_of
-from jaxbiped.dynamics._hip_motion import hip_motion
 from jaxbiped.dynamics._linkage_motion import LinkageMotion, motion_under
 from jaxbiped.dynamics._minimal_motion import Accelerations, accelerations, bristle_rates
 from jaxbiped.dynamics._redundant_state import Leg, LegsState, legs_of
+from jaxbiped.dynamics._state import field_of
 from jaxbiped.scene._linkage_scene import leg_of
 from jaxbiped.scene._scene import AbstractScene, CompliantScene, RedundantScene
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw

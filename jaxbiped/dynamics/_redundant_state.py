@@ -7,9 +7,7 @@ import jax.numpy as jnp
 from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._bristle_state import BristleState, MinimalState
-from jaxbiped.dynamics._formulation import state_type
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import BristleState, MinimalState, State, state_type
 from jaxbiped.scene._linkage_scene import leg_of
 from jaxbiped.scene._scene import AbstractScene, RedundantScene
 

@@ -10,8 +10,8 @@ from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import check_not_negative, check_type
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling
+from jaxbiped.dynamics._state import RigidState
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene
 

@@ -8,9 +8,8 @@ from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar, Time, VectorField
 from jaxbiped.dynamics._actuation import hip_torques
-from jaxbiped.dynamics._forces import FootForce
-from jaxbiped.dynamics._formulation import field_of
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._contact_forces import FootForce
+from jaxbiped.dynamics._state import RigidState, field_of
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion

@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._feet import feet, touches
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import RigidState
 
 
 class AbstractSection(eqx.Module):

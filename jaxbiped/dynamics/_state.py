@@ -1,13 +1,33 @@
-"""The state of the walker in minimal coordinates, and the seed's start."""
+"""States of the walker in minimal coordinates: compliant, with bristles, rigid; the seed's start.
 
-from typing import NamedTuple, TypeVar
+A formulation registers its kind of scene here, by `state_type` and `field_of`.
+"""
+
+import functools
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._cached_jit import kept_alone
 from jaxbiped._checks import ArgumentError, check_finite, check_type
-from jaxbiped._types import Scalar, as_float, by_numpy
+from jaxbiped._quantity import Quantity
+from jaxbiped._types import Scalar, VectorField, as_float, by_numpy
+from jaxbiped.scene._scene import RigidScene, Scene
+
+
+@functools.singledispatch
+def state_type(scene: object) -> type[PyTree]:
+    """The type of a scene's states, a NamedTuple of scalar leaves."""
+    raise TypeError(f"{type(scene).__name__} has no formulation.")
+
+
+@functools.singledispatch
+def field_of(scene: object) -> VectorField:
+    """A scene's vector field f(t, state, scene), in the form that `diffrax.ODETerm` takes."""
+    raise TypeError(f"{type(scene).__name__} has no formulation.")
 
 
 class State(NamedTuple):
@@ -128,3 +148,132 @@ def check_leaves(state: SomeState, name: str) -> SomeState:
     if traced:  # together, for each operation on what is traced takes long
         check_finite(name, sum(leaves[field] for field in traced))
     return state._replace(**leaves)
+
+
+class BristleState(NamedTuple):
+    """A `State` with the bristles of both feet: ten scalar leaves.
+
+    Attributes:
+        hip_x, hip_z, theta_1, theta_2, hip_vx, hip_vz, omega_1, omega_2: as in `State`.
+        bristle_1, bristle_2: see `AbstractBristleLaw` [–].
+    """
+
+    hip_x: Scalar
+    hip_z: Scalar
+    theta_1: Scalar
+    theta_2: Scalar
+    hip_vx: Scalar
+    hip_vz: Scalar
+    omega_1: Scalar
+    omega_2: Scalar
+    bristle_1: Scalar
+    bristle_2: Scalar
+
+
+MinimalState: TypeAlias = State | BristleState
+"""A state in minimal coordinates of a walker with laws of contact."""
+
+
+@state_type.register
+def _(scene: Scene) -> type[MinimalState]:
+    return BristleState if scene.has_bristles else State
+
+
+def state_for(scene: Scene, state: PyTree, name: str = "state") -> MinimalState:
+    """A checked start of the type that a scene needs: bristles are straight unless given.
+
+    Raises:
+        ArgumentError: not a state, bristles where the scene has none, an entry that is not finite,
+            or leaves of different shapes.
+    """
+    kind = state_type(scene)
+    if kind is BristleState and isinstance(state, State):
+        state = check_state(state, State, name)
+        straight = jnp.zeros_like(state.hip_x)
+        return BristleState(**state._asdict(), bristle_1=straight, bristle_2=straight)
+    if kind is State and isinstance(state, BristleState):
+        raise ArgumentError(
+            f"{name} has bristles, but friction = {type(scene.friction).__name__} has none: give a "
+            "State."
+        )
+    return check_state(state, kind, name)
+
+
+class RigidState(NamedTuple):
+    """Place and leg angles of a walker that rolls on leg 2; five scalar leaves.
+
+    The frame and the angles are those of `State`. The hip's height and velocity follow from the
+    stance leg. Leaves may carry any common batch shape.
+
+    Attributes:
+        hip_x: hip position along the slope [m].
+        theta_1, theta_2: angles of swing leg and stance leg [rad].
+        omega_1, omega_2: their rates [rad/s].
+    """
+
+    hip_x: Scalar
+    theta_1: Scalar
+    theta_2: Scalar
+    omega_1: Scalar
+    omega_2: Scalar
+
+
+WalkerState: TypeAlias = MinimalState | RigidState
+"""A state of a walker in minimal coordinates, compliant or rigid."""
+
+
+@state_type.register
+def _(scene: RigidScene) -> type[RigidState]:
+    return RigidState
+
+
+@kept_alone
+def whole_state(scene: RigidScene, state: RigidState) -> State:
+    """The same motion in the compliant walker's coordinates, its stance foot just touching.
+
+    Args:
+        scene: the rigid walker.
+        state: leaves of any common shape, SI units.
+
+    Returns:
+        A `State`, leaves shaped as the state's.
+    """
+    walker = scene.walker
+    sine, cosine = jnp.sin(state.theta_2), jnp.cos(state.theta_2)
+    return State(
+        hip_x=state.hip_x,
+        hip_z=walker.r + walker.hip_to_foot * cosine,
+        theta_1=state.theta_1,
+        theta_2=state.theta_2,
+        hip_vx=-(walker.r + walker.hip_to_foot * cosine) * state.omega_2,
+        hip_vz=-walker.hip_to_foot * sine * state.omega_2,
+        omega_1=state.omega_1,
+        omega_2=state.omega_2,
+    )
+
+
+def rigid_state(state: State) -> RigidState:
+    """The part of a compliant walker's state that the rigid one keeps, leg 2 standing.
+
+    Args:
+        state: leg 2 standing, leaves of any common shape, SI units.
+
+    Returns:
+        Hip place, angles and rates, leaves shaped as the state's.
+    """
+    return RigidState(state.hip_x, state.theta_1, state.theta_2, state.omega_1, state.omega_2)
+
+
+STATE_QUANTITIES = {
+    "hip_x": Quantity("hip along the slope", r"$x_S$", "m"),
+    "hip_z": Quantity("hip above the slope", r"$z_S$", "m"),
+    "hip_vx": Quantity("hip velocity along the slope", r"$\dot x_S$", "m/s"),
+    "hip_vz": Quantity("hip velocity off the slope", r"$\dot z_S$", "m/s"),
+    "theta_1": Quantity("angle of leg 1", r"$\theta_1$", "rad"),
+    "theta_2": Quantity("angle of leg 2", r"$\theta_2$", "rad"),
+    "omega_1": Quantity("rate of leg 1", r"$\omega_1$", "rad/s"),
+    "omega_2": Quantity("rate of leg 2", r"$\omega_2$", "rad/s"),
+    "bristle_1": Quantity("bristles of foot 1", r"$b_1$"),
+    "bristle_2": Quantity("bristles of foot 2", r"$b_2$"),
+}
+"""By the names that `State`, `BristleState` and `RigidState` give them."""

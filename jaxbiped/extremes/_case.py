@@ -10,8 +10,7 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped.dynamics._bristle_state import BristleState
-from jaxbiped.dynamics._state import State, within_a_turn
+from jaxbiped.dynamics._state import BristleState, State, within_a_turn
 from jaxbiped.extremes._check_equations import (
     FRICTION,
     FRICTION_AT,

@@ -6,11 +6,15 @@ import jax.numpy as jnp
 from jaxbiped._caches import bounded_cache
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._feet import standing_height
-from jaxbiped.dynamics._formulation import state_type
-from jaxbiped.dynamics._rigid_state import WalkerState, rigid_state
-from jaxbiped.dynamics._state import State, seed_state
+from jaxbiped.dynamics._state import (
+    BristleState,
+    State,
+    WalkerState,
+    rigid_state,
+    seed_state,
+    state_type,
+)
 from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.scene._scene import AbstractScene, Scene
 from jaxbiped.scene._walker import Walker

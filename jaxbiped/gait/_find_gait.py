@@ -17,12 +17,10 @@ from jaxbiped._checks import check_choice, check_count, check_unbatched
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._progress import stage
 from jaxbiped.compiler import deferred_checks, host_jit
-from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._consistent_state import consistent_state
 from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
-from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import check_state
+from jaxbiped.dynamics._state import RigidState, WalkerState, check_state, state_for
 from jaxbiped.gait._accurate_gait import accurate_gait
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._engine import orbit_engine

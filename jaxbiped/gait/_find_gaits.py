@@ -11,8 +11,7 @@ from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import RigidState, State, WalkerState
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait

@@ -14,7 +14,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped._summary import summary
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._fixed_point_search import Found, Search
 from jaxbiped.gait._minimal_cycle import crossings_of, minimal_cycle
 from jaxbiped.gait._orbit import Orbit, Slopes, orbit_of, with_parameter_columns

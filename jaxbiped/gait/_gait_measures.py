@@ -11,8 +11,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, as_float
-from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._gradient_modes import AbstractGradient, Implicit

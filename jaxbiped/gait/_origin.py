@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.scene._scene import AbstractScene
 

@@ -7,10 +7,8 @@ import jax.numpy as jnp
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import check_positive
-from jaxbiped.dynamics._bristle_state import state_for
 from jaxbiped.dynamics._feet import standing_height
-from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import RigidState, State, WalkerState, state_for
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._fixed_point_search import Found, Search, search, walks_only

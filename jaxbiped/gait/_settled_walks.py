@@ -11,9 +11,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import MidStance
-from jaxbiped.dynamics._state import exchange_legs
+from jaxbiped.dynamics._state import WalkerState, exchange_legs
 from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.simulate._simulate import simulate

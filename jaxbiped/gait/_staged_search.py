@@ -11,7 +11,7 @@ from jaxtyping import PyTree
 from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._continuation import BranchEnd, FollowedBranch, follow_branch
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._fixed_point_search import ROUGH, Found, Search

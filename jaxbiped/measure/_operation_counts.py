@@ -1,7 +1,7 @@
 """Operation counts: how many operations a scene's vector field takes."""
 
 from jaxbiped.compiler import count_operations
-from jaxbiped.dynamics._formulation import field_of, state_type
+from jaxbiped.dynamics._state import field_of, state_type
 from jaxbiped.scene._scene import RigidScene, Scene
 
 

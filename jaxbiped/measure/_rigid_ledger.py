@@ -9,9 +9,9 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
 from jaxbiped.dynamics._energy import kinetic_and_moment
-from jaxbiped.dynamics._push_off import push_off_work
-from jaxbiped.dynamics._rigid_state import RigidState, whole_state
+from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion, rolling_rates
+from jaxbiped.dynamics._state import RigidState, whole_state
 from jaxbiped.measure._rigid_samples import states_after
 from jaxbiped.measure._samples import NODES, Samples
 from jaxbiped.scene._scene import RigidScene

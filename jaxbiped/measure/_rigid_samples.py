@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import RigidState
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._rigid_walk import rigid_walk
 

@@ -9,8 +9,8 @@ from typing import Any
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, by_numpy
-from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._state import WalkerState
 
 _KINDS: dict[tuple[type, tuple[str, ...]], Any] = {}
 """Of each walker's state the augmented ones: always the same types, or all would compile again."""

@@ -18,8 +18,8 @@ from jaxbiped.continuation._nearest_bifurcation import (
     nearest_bifurcation,
     range_of,
 )
-from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._section import HeelStrike
+from jaxbiped.dynamics._state import RigidState, WalkerState
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait

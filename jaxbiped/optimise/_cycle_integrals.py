@@ -13,10 +13,9 @@ from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._actuation import actuator_powers
 from jaxbiped.dynamics._energy import powers
 from jaxbiped.dynamics._feet import feet, touches
-from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._push_off import push_off_work
-from jaxbiped.dynamics._rigid_state import RigidState, WalkerState, whole_state
+from jaxbiped.dynamics._impact import impact, push_off_work
 from jaxbiped.dynamics._rolling import inertia_of, rolling_hip_motion, support_of
+from jaxbiped.dynamics._state import RigidState, WalkerState, whole_state
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.optimise._augmented_state import augment, joined, motion_of
 from jaxbiped.scene._scene import RigidScene, Scene

@@ -11,7 +11,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.dynamics._formulation import state_type
+from jaxbiped.dynamics._state import state_type
 from jaxbiped.gait._explain_search import explain_search
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search

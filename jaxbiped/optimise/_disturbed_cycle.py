@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
-from jaxbiped.dynamics._rigid_state import WalkerState
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.optimise._augmented_state import augment, joined, motion_of
 from jaxbiped.scene._scene import AbstractScene

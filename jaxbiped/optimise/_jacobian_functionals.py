@@ -10,8 +10,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._rigid_state import WalkerState
 from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._orbit import slopes_of
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,

@@ -8,7 +8,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
-from jaxbiped.dynamics._formulation import state_type
+from jaxbiped.dynamics._state import state_type
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait

@@ -11,8 +11,8 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
-from jaxbiped.dynamics._rigid_state import RigidState, WalkerState
 from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._state import RigidState, WalkerState
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.optimise._augmented_state import MotionSection, augment, joined, motion_of
 from jaxbiped.scene._ground import SteppedGround

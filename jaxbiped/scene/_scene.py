@@ -9,8 +9,7 @@ from equinox import AbstractVar
 
 from jaxbiped._checks import check_choice, check_type
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
-from jaxbiped.constraints._constraint_methods import method_named
-from jaxbiped.constraints._index1 import Index1
+from jaxbiped.constraints._constraint_methods import Index1, method_named
 from jaxbiped.constraints._linkage import ORIENTATIONS, Linkage
 from jaxbiped.scene._ground import AbstractClearance, Ground, StanceRotation
 from jaxbiped.scene._linkage_scene import walker_linkage

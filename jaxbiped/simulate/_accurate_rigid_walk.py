@@ -10,7 +10,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import RigidState
 from jaxbiped.simulate._accurate_walk import Witness, judge_walk
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.solve._accuracy import ACCURACIES

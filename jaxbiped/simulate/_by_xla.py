@@ -11,7 +11,7 @@ from jaxtyping import Array, PyTree
 
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._ending import Ending
-from jaxbiped.dynamics._formulation import field_of
+from jaxbiped.dynamics._state import field_of
 from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.solve._ending import ending_code, ending_events
 from jaxbiped.solve._projected_solver import with_projection

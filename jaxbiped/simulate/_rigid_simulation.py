@@ -11,7 +11,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Parameter, as_float
 from jaxbiped.compiler import Request
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import RigidState
 from jaxbiped.simulate._derivatives import with_derivatives
 from jaxbiped.simulate._rigid_slopes import rigid_slopes_of
 from jaxbiped.simulate._slopes import Slopes

@@ -11,8 +11,8 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, select
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling_field
+from jaxbiped.dynamics._state import RigidState
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._slopes import LOOSER, Slopes
 from jaxbiped.solve._accuracy import Precision

@@ -13,8 +13,7 @@ from jaxbiped._checks import (
 )
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import as_float, by_numpy
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._state import check_state
+from jaxbiped.dynamics._state import RigidState, check_state
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._accurate_rigid_walk import accurate_rigid_walk

@@ -25,10 +25,9 @@ from jaxbiped._checks import (
 )
 from jaxbiped._types import Numbers, Scalar, as_array
 from jaxbiped.compiler import Request
-from jaxbiped.dynamics._bristle_state import BristleState
 from jaxbiped.dynamics._consistent_state import Consistent
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import BristleState, State
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
 from jaxbiped.simulate._by_lanes import able_request, by_lanes, prepare_lanes

@@ -8,10 +8,10 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_positive, check_unbatched, holds_somewhere
 from jaxbiped._types import Scalar
-from jaxbiped.constraints._independence import check_independent
-from jaxbiped.dynamics._bristle_state import state_for
+from jaxbiped.constraints._projection import check_independent
 from jaxbiped.dynamics._consistent_state import Consistent, consistent_state
 from jaxbiped.dynamics._redundant_motion import coordinates_of
+from jaxbiped.dynamics._state import state_for
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._walker import Walker

@@ -11,8 +11,7 @@ import numpy as np
 from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._bristle_state import BristleState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import BristleState, State
 from jaxbiped.scene._ground import AbstractClearance
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw

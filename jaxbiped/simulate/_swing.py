@@ -23,9 +23,8 @@ from jaxbiped._debug_switches import without_switches
 from jaxbiped._ending import Ending
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
-from jaxbiped.constraints._independence import check_independent
 from jaxbiped.constraints._linkage_constraints import Constraints, constraints_of
-from jaxbiped.constraints._projection import correct_step, nearest_consistent
+from jaxbiped.constraints._projection import check_independent, correct_step, nearest_consistent
 from jaxbiped.dynamics._linkage_motion import LinkageState, linkage_field
 from jaxbiped.scene._linkage_scene import LinkageScene
 from jaxbiped.scene._scene_checks import check_scene

@@ -18,7 +18,7 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Numbers, Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._consistent_state import project
-from jaxbiped.dynamics._formulation import field_of
+from jaxbiped.dynamics._state import field_of
 from jaxbiped.solve._ending import ending_code, ending_events
 from jaxbiped.solve._final_step import clip_step
 from jaxbiped.solve._fusion_barrier import without_barriers

@@ -13,8 +13,7 @@ from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._minimal_motion import accelerations
 from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import RigidState, State
 from jaxbiped.scene._ground import StanceRotation
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._fusion_barrier import fusion_barrier

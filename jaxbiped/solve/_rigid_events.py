@@ -11,7 +11,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import RigidState
 from jaxbiped.solve._ending import FALL_ANGLE
 from jaxbiped.solve._quintic import Quintic
 from jaxbiped.solve._rolling_step import Rates

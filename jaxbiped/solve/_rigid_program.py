@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import Program
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import RigidState
 from jaxbiped.solve._rigid_steps import (
     RigidProgress,
     RigidWalk,

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling_rates
+from jaxbiped.dynamics._state import RigidState
 from jaxbiped.scene._scene import RigidScene
 
 _TABLEAU = diffrax.Dopri8.tableau

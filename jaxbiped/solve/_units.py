@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.dynamics._formulation import state_type
+from jaxbiped.dynamics._state import state_type
 from jaxbiped.scene._scene import AbstractScene, is_compliant
 
 _LENGTH = 0.40

@@ -12,16 +12,15 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, Time
+from jaxbiped.dynamics._contact_forces import foot_forces
 from jaxbiped.dynamics._feet import with_leg_2_standing
-from jaxbiped.dynamics._forces import foot_forces
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._redundant_motion import redundant_field
 from jaxbiped.dynamics._redundant_state import LegsState
-from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling, rolling_field
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
-from jaxbiped.dynamics._state import State, exchange_legs
+from jaxbiped.dynamics._state import RigidState, State, exchange_legs
 from jaxbiped.dynamics._switches import Switch, switches
 from jaxbiped.scene._scene import (
     AbstractScene,

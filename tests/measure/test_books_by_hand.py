@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._contacts import Contacts
+from jaxbiped.dynamics._contact_forces import Contacts, FootForce, FootForces
 from jaxbiped.dynamics._energy import Energies, Powers
 from jaxbiped.dynamics._feet import Feet, Foot
-from jaxbiped.dynamics._forces import FootForce, FootForces
 from jaxbiped.measure import _cost_of_transport, _energy_ledger, _footsteps, _rigid_ledger
 from jaxbiped.measure._footsteps import HeelStrikes
 from jaxbiped.measure._samples import NODES, Samples

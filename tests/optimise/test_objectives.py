@@ -9,8 +9,8 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import inertia_of, rolling_field, support_of
+from jaxbiped.dynamics._state import RigidState
 from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
 from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
 from jaxbiped.optimise._objectives import check_objective, evaluate

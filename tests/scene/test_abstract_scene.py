@@ -6,7 +6,7 @@ import jax.tree_util as jtu
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._formulation import field_of, state_type
+from jaxbiped.dynamics._state import field_of, state_type
 from jaxbiped.scene._scene import AbstractScene, is_compliant, is_rigid
 
 SEED = jb.seed_scene()

@@ -10,9 +10,8 @@ from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import Scalar, as_array, as_float
 from jaxbiped.dynamics._energy import kinetic_and_moment
-from jaxbiped.dynamics._rigid_state import RigidState, whole_state
 from jaxbiped.dynamics._rolling import rolling
-from jaxbiped.dynamics._state import check_state
+from jaxbiped.dynamics._state import RigidState, check_state, whole_state
 from jaxbiped.measure._rigid_samples import states_after
 from jaxbiped.measure._samples import evaluate_along
 from jaxbiped.plot.viewer._knots import Channels

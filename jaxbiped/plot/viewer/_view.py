@@ -6,7 +6,7 @@ from typing import Any
 
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import RigidState
 from jaxbiped.plot.style import view_colours
 from jaxbiped.plot.viewer._page import AbstractPage, frame_of, page_of
 from jaxbiped.plot.viewer._recording import Recording, record_walk

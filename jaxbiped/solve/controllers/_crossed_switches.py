@@ -10,8 +10,8 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
+from jaxbiped.dynamics._contact_forces import foot_force
 from jaxbiped.dynamics._feet import Foot, feet
-from jaxbiped.dynamics._forces import foot_force
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl

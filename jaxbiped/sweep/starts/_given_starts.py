@@ -8,9 +8,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._bristle_state import BristleState
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import BristleState, RigidState, State
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._starts import AbstractStarts, Batch
 

@@ -1,4 +1,4 @@
-"""Forces of the ground on the feet."""
+"""Contact forces: those of the ground on both feet, and the loads that actuators see."""
 
 from typing import NamedTuple
 
@@ -7,9 +7,11 @@ import jax.numpy as jnp
 from jaxbiped._cached_jit import kept_alone
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.dynamics._actuation import load_shares
+from jaxbiped.dynamics._feet import Feet, Foot, feet, touches
 from jaxbiped.dynamics._redundant_state import CompliantState
 from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene.actuation._abstract_actuator import HipMotion
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 
@@ -73,3 +75,42 @@ def foot_forces(scene: CompliantScene, state: CompliantState) -> FootForces:
     """
     both = feet(scene, state)
     return FootForces(foot_force(scene, both.foot_1), foot_force(scene, both.foot_2))
+
+
+class Contacts(NamedTuple):
+    """Feet, whether each touches, and the forces on them; leaves shaped as the state's."""
+
+    feet: Feet
+    touching: tuple[Scalar, Scalar]
+    forces: FootForces
+
+    @property
+    def both_carry(self) -> Scalar:
+        """Whether both feet carry something (boolean): double support."""
+        return (self.forces.foot_1.normal > 0.0) & (self.forces.foot_2.normal > 0.0)
+
+
+def contacts(scene: CompliantScene, state: CompliantState) -> Contacts:
+    """Both feet's contacts with the ground."""
+    both = feet(scene, state)
+    first, second = (jnp.broadcast_to(touches(foot), foot.x.shape) for foot in both)
+    return Contacts(both, (first, second), foot_forces(scene, state))
+
+
+def normal_forces(scene: CompliantScene, both: Feet) -> tuple[Scalar | None, Scalar | None]:
+    """Normal force on each foot [N]; None for one that is known never to touch."""
+
+    def force(foot: Foot) -> Scalar | None:
+        return None if foot.admitted is False else foot_force(scene, foot).normal
+
+    return force(both.foot_1), force(both.foot_2)
+
+
+def hip_motion(
+    scene: CompliantScene,
+    both: Feet,
+    angle: tuple[Scalar, Scalar],
+    rate: tuple[Scalar, Scalar],
+) -> HipMotion:
+    """What actuators at the hip of a compliant walker know of it."""
+    return HipMotion(angle, rate, load_shares(scene, normal_forces(scene, both)))
