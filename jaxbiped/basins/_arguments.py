@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError, check_finite
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Label
 
 
 def check_whole(name: str, value: npt.ArrayLike, least: int) -> int:

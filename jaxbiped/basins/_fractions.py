@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError, check_at_least, check_not_negative
 from jaxbiped.basins._arguments import check_confidence, check_known
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Label
 
 
 @dataclasses.dataclass(frozen=True)

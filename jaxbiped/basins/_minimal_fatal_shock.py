@@ -7,10 +7,9 @@ import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError, check_finite, check_positive
 from jaxbiped.basins._arguments import check_vector, check_whole
-from jaxbiped.basins._label_oracle import LabelOf, LabelOracle
+from jaxbiped.basins._label_oracle import LabelOf, LabelOracle, normalise, spread_directions
 from jaxbiped.basins._ray_descent import GivenNormals, Normal, SecantNormals, descend_rays
 from jaxbiped.basins._rays import Brackets, Surroundings, bisect_brackets, first_exits
-from jaxbiped.basins._spherical_points import normalise, spread_directions
 
 _APART = 0.5
 """Angle [rad] between the rays that are improved, so that they lead to different places."""

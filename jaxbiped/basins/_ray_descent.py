@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped.basins._label_oracle import normalise
 from jaxbiped.basins._rays import Brackets, Surroundings, bisect_brackets, nearest_of
-from jaxbiped.basins._spherical_points import normalise
 
 Normal = Callable[[np.ndarray], npt.ArrayLike]
 """Gradients, shape (n, d), of points on the boundary, shape (n, d)."""

@@ -12,10 +12,9 @@ import numpy as np
 from jaxbiped import _clock
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
-from jaxbiped.basins._doubt import Doubt
 from jaxbiped.basins._fractions import fractions as fractions_of
-from jaxbiped.basins._label import label_names
 from jaxbiped.basins._label_errors import LabelErrors, label_errors
+from jaxbiped.basins._labels import Doubt, label_names
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli.commands._basin import Basin
 from jaxbiped.dynamics._state import RigidState, State

@@ -7,7 +7,7 @@ from jaxbiped.cli._report import Report, table
 from jaxbiped.cli.commands._fit import Fit
 from jaxbiped.identify._fit_gait import fit_gait
 from jaxbiped.identify._gait_fit import FitEnding, GaitFit
-from jaxbiped.identify._measured_file import read_measured
+from jaxbiped.identify._measured_gait import read_measured
 from jaxbiped.scene._parameter_access import parameter_quantities
 from jaxbiped.scene._scene import RedundantScene
 

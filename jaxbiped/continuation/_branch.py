@@ -1,20 +1,26 @@
-"""Branch of gaits along a parameter: its points, bifurcations and ends."""
+"""Branch of gaits along a parameter: its points, bifurcations and ends, also as a dataset."""
 
-from typing import TYPE_CHECKING, cast
+import json
+from typing import TYPE_CHECKING, Any, cast
 
 import equinox as eqx
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped._checks import ArgumentError
+from jaxbiped._identity import difference_of
+from jaxbiped._strict_json import strict_json
 from jaxbiped._types import as_float
 from jaxbiped.continuation._axis import Axis
-from jaxbiped.continuation._bifurcations import BifurcationPoint
-from jaxbiped.continuation._branch_dataset import branch_dataset
+from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
 from jaxbiped.continuation._branch_point import BranchPoint
 from jaxbiped.continuation._trace import BranchStop
-from jaxbiped.dynamics._state import WalkerState
-from jaxbiped.scene._parameter_access import parameter_quantities, with_parameters
+from jaxbiped.dynamics._state import STATE_QUANTITIES, BristleState, RigidState, State, WalkerState
+from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._stability import Bifurcation
+from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 
 if TYPE_CHECKING:
     import xarray
@@ -107,3 +113,179 @@ class Branch(eqx.Module):
             critical multiplier and its error; all else in the attributes.
         """
         return branch_dataset(self)
+
+
+_STABLE = {True: 1, False: 0, None: -1}
+NUMBERS = {
+    "period": "s",
+    "step_length": "m",
+    "peak_normal": "N",
+    "unit_multiplier_error": "",
+    "residual": "SI",
+}
+
+
+def branch_dataset(branch: Branch) -> "xarray.Dataset":
+    """A branch as a dataset; see `Branch.dataset`."""
+    import xarray
+
+    names = branch.state_type._fields[1:]  # type: ignore[attr-defined]
+    units = {name: STATE_QUANTITIES[name].unit for name in names}
+    variables = _columns(branch, branch.points, "", "point", units)
+    kinds = [EVENTS.index(each.kind) for each in branch.bifurcations]
+    variables["event_kind"] = (
+        "event",
+        np.array(kinds, np.int8),
+        _flags(EVENTS, range(len(EVENTS))),
+    )
+    special = [each.point for each in branch.bifurcations]
+    variables |= _columns(branch, special, "event_", "event", units)
+    multipliers = np.array([each.multiplier for each in branch.bifurcations], complex)
+    variables["event_multiplier_real"] = ("event", multipliers.real, {"units": ""})
+    variables["event_multiplier_imag"] = ("event", multipliers.imag, {"units": ""})
+    errors = np.array([each.error for each in branch.bifurcations], float)
+    variables["event_error"] = ("event", errors, {"units": ""})
+    offs = np.array([each.value_error for each in branch.bifurcations], float)
+    variables["event_value_error"] = ("event", offs, {"units": branch.unit})
+    beyond = np.array([each.beyond for each in branch.bifurcations], float)
+    variables["event_beyond"] = ("event", beyond, {"units": branch.unit})
+    settings = {
+        "along": branch.along,
+        "axis": branch.axis._asdict(),
+        "stops": [[int(each.end), each.cause, each.value] for each in branch.stops],
+        **scene_identity(branch.scene),
+        "state_type": branch.state_type.__name__,
+        "footsteps": branch.footsteps,
+        "accuracy": branch.accuracy,
+        "engine": branch.engine,
+    }
+    return xarray.Dataset(variables, attrs={"branch": strict_json(settings, unknown=str)})
+
+
+def _flags(names: Any, codes: Any = None) -> dict[str, Any]:
+    meanings = " ".join(str(name).replace(" ", "_") for name in names)
+    codes = range(len(meanings.split())) if codes is None else codes
+    return {"flag_values": list(codes), "flag_meanings": meanings}
+
+
+def _columns(
+    branch: Branch, points: Any, before: str, along: str, units: dict[str, str]
+) -> dict[str, Any]:
+    """Variables of points along a dimension."""
+    m, n = len(units), len(points)
+
+    def table(name: str, width: int, kind: type) -> np.ndarray:
+        rows = [getattr(point, name) for point in points]
+        return np.array(rows, kind).reshape(n, width)
+
+    columns: dict[str, Any] = {
+        branch.along: (along, [point.value for point in points], {"units": branch.unit}),
+    }
+    for name, unit in NUMBERS.items():
+        columns[name] = (along, [getattr(point, name) for point in points], {"units": unit})
+    speeds = [point.step_length / point.period for point in points]
+    columns["speed"] = (along, speeds, {"units": "m/s"})
+    recurring = table("recurring", m, float)
+    for k, (name, unit) in enumerate(units.items()):
+        columns[f"state_{name}"] = (along, recurring[:, k], {"units": unit})
+    values = table("multipliers", m - 1, complex)
+    errors = table("multiplier_errors", m - 1, float)
+    for name, array in (("real", values.real), ("imag", values.imag), ("error", errors)):
+        columns[f"multipliers_{name}"] = ((along, "multiplier"), array, {"units": ""})
+    stable = np.array([_STABLE[point.stable] for point in points], np.int8)
+    words = ("undecided", "unstable", "stable")
+    columns["stable"] = (along, stable, _flags(words, (-1, 0, 1)))
+    codes = np.array([point.bifurcation for point in points], np.int8)
+    columns["bifurcation"] = (along, codes, _flags(Bifurcation))
+    for name in ("place", "tangent"):
+        columns[name] = ((along, "component"), table(name, m + 1, float), {"units": "scaled"})
+    return {before + name: column for name, column in columns.items()}
+
+
+_STATES = {kind.__name__: kind for kind in (State, BristleState, RigidState)}
+
+
+def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
+    """The branch that a dataset holds, to be drawn, or followed on by `resume_branch`.
+
+    Args:
+        dataset: from `Branch.dataset`, also one that was stored and opened again.
+        scene: the walker that it was made with.
+
+    Returns:
+        The branch.
+
+    Raises:
+        ArgumentError: a dataset of something else, of another scene, or that lacks a variable.
+    """
+    scene = check_scene(scene, Scene, RigidScene)
+    if "branch" not in dataset.attrs:
+        raise ArgumentError("dataset is not allowed: it must be that of a branch.")
+    settings = json.loads(dataset.attrs["branch"])
+    own = scene_identity(scene)
+    difference = difference_of({name: settings.get(name) for name in own}, own)
+    if difference is not None:
+        raise ArgumentError(
+            f"scene is not allowed: it differs from the branch's own in {difference}."
+        )
+    state_type = _STATES[settings["state_type"]]
+    special = _points(dataset, state_type, settings["along"], "event_")
+    events = [
+        BifurcationPoint(EVENTS[int(kind)], point, complex(real, imaginary), *map(float, errors))
+        for kind, point, real, imaginary, *errors in zip(
+            _column(dataset, "event_kind"),
+            special,
+            _column(dataset, "event_multiplier_real"),
+            _column(dataset, "event_multiplier_imag"),
+            _column(dataset, "event_error"),
+            _column(dataset, "event_value_error"),
+            _column(dataset, "event_beyond"),
+            strict=True,
+        )
+    ]
+    first, last = (BranchStop(BranchEnd(end), why, float(at)) for end, why, at in settings["stops"])
+    return Branch(
+        scene=scene,
+        points=tuple(_points(dataset, state_type, settings["along"], "")),
+        bifurcations=tuple(events),
+        stops=(first, last),
+        axis=Axis(**settings["axis"]),
+        state_type=state_type,
+        footsteps=settings["footsteps"],
+        accuracy=settings["accuracy"],
+        engine=settings["engine"],
+    )
+
+
+def _column(dataset: "xarray.Dataset", name: str) -> np.ndarray:
+    if name not in dataset.variables:
+        raise ArgumentError(
+            f"dataset is not allowed: it has no variable {name!r}, as branches of this version do."
+        )
+    return np.asarray(dataset[name].values)
+
+
+def _points(
+    dataset: "xarray.Dataset", state_type: Any, along: str, before: str
+) -> list[BranchPoint]:
+    def column(name: str) -> np.ndarray:
+        return _column(dataset, before + name)
+
+    recurring = np.stack([column(f"state_{name}") for name in state_type._fields[1:]], axis=1)
+    values = column("multipliers_real") + 1j * column("multipliers_imag")
+    errors, codes = column("multipliers_error"), column("bifurcation")
+    numbers = {name: column(name) for name in NUMBERS}
+    value, place, tangent = column(along), column("place"), column("tangent")
+    return [
+        BranchPoint(
+            value=float(value[k]),
+            recurring=recurring[k],
+            multipliers=values[k],
+            multiplier_errors=errors[k],
+            bifurcation=int(codes[k]),
+            place=place[k],
+            tangent=tangent[k],
+            **{name: float(numbers[name][k]) for name in NUMBERS},
+        )
+        for k in range(len(value))
+    ]

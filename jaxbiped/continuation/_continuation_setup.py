@@ -11,8 +11,7 @@ from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import BranchPoint, branch_point, gait_curve
 from jaxbiped.continuation._cycle import CycleProblem
-from jaxbiped.continuation._limit_cause import limit_cause
-from jaxbiped.continuation._trace import Trace
+from jaxbiped.continuation._trace import Trace, limit_cause
 from jaxbiped.dynamics._state import RigidState, WalkerState, check_state, state_for
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._default_guess import default_guess

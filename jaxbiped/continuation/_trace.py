@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from itertools import islice
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -16,10 +16,101 @@ from jaxbiped.continuation._bifurcations import (
     not_located,
 )
 from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint, branch_point
-from jaxbiped.continuation._limit_cause import NOT_SMOOTH, OF_ENDINGS
-from jaxbiped.continuation._retrace import passed_before
+from jaxbiped.dynamics._contact_forces import contacts
+from jaxbiped.dynamics._state import State, WalkerState
 from jaxbiped.gait._continuation import BranchEnd
-from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, follow
+from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, correct, follow
+from jaxbiped.scene._scene import Scene
+from jaxbiped.simulate._simulate import simulate
+
+NOT_SMOOTH = "grazing: the return map is not smooth"
+OF_ENDINGS = {
+    Ending.TIMED_OUT: "no touch: no footstep comes (timed out)",
+    Ending.STUMBLED: "scuffing: the foot behind comes down (stumbled)",
+}
+"""Endings of the walk beyond that are told in more words."""
+_UNLOADED = 1e-3
+"""Share of the weight on the stance foot from which it carries nothing."""
+_SLIDES = 1.5
+"""Factor of the load that slips from which feet slide beyond a limit that they do not before."""
+_LITTLE = 0.01
+
+
+def limit_cause(
+    here: Scene, before: Scene, beyond: Scene, state: WalkerState, period: float
+) -> str | None:
+    """What a limit between two scenes comes from; None where neither touch nor slip tells.
+
+    Args:
+        here: the scene of the last gait; at the limit itself rounding decides whether feet slide.
+        before, beyond: scenes as far before the limit as behind it.
+        state: of the last gait, on the section.
+        period: of its cycle [s].
+    """
+    if _load(here, state) < _UNLOADED:
+        return "no touch: the stance foot carries nothing on the section"
+    known, found = (_slipping(scene, state, period) for scene in (before, beyond))
+    if found > max(_SLIDES * known, known + _LITTLE):
+        return "slip: beyond, a foot that lands slides on"
+    return None
+
+
+def _load(scene: Scene, state: WalkerState) -> float:
+    """Force on both feet, in units of the weight."""
+    both = contacts(scene, cast(State, state)).forces
+    weight = float(scene.walker.total_mass * scene.ground.g)
+    return sum(float(force.normal) for force in both) / weight
+
+
+def _slipping(scene: Scene, state: WalkerState, period: float) -> float:
+    """Share of the load, summed over a cycle's time, on feet that slip faster than the speed over
+    which friction builds up."""
+    walk = simulate(scene, cast(State, state), duration=period)
+    found = contacts(scene, walk.state)
+    normal = np.stack([np.asarray(force.normal) for force in found.forces])
+    slip = np.stack([np.abs(np.asarray(foot.slip_speed)) for foot in found.feet])
+    name = getattr(scene.friction, "builds_up_over", None)
+    slow = float(getattr(scene.friction, name)) if name is not None else 0.0
+    load = normal[:, 1:] * np.diff(np.asarray(walk.t))
+    return float(np.sum(load * (slip[:, 1:] > slow)) / max(float(np.sum(load)), 1e-300))
+
+
+_CHORD_ASIDE = 0.1
+"""Distance from a chord between two points, in its length, up to which the curve is asked."""
+_SAME, _CORRECTIONS = 1e-7, 10.0
+"""Distance of two gaits that are one, at least; and in units of the corrector's last step."""
+
+
+def passed_before(curve: Curve, passed: Sequence[BranchPoint], there: CurvePoint) -> float | None:
+    """Whether a point lies on the curve through points that are passed, in their order.
+
+    Returns:
+        The cosine between the tangents there; None where it is another gait than all of them.
+    """
+    if len(passed) < 2:
+        return None
+    places, tangents = (
+        np.stack([getattr(p, name) for p in passed]) for name in ("place", "tangent")
+    )
+    chords = np.diff(places, axis=0)
+    lengths = np.linalg.norm(chords, axis=1)
+    off = there.place - places[:-1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = np.sum(off * chords, axis=1) / lengths**2
+    aside = np.linalg.norm(off - shares[:, None] * chords, axis=1)
+    for k in np.flatnonzero((shares >= 0.0) & (shares <= 1.0) & (aside < _CHORD_ASIDE * lengths)):
+        # In the plane through the point normal to the chord, which is crossed once, also at a fold.
+        t, along = shares[k], chords[k] / lengths[k]
+        bend = lengths[k] * ((1.0 - t) * tangents[k] - t * tangents[k + 1])
+        guess = places[k] + t * chords[k] + t * (1.0 - t) * (bend - (bend @ along) * along)
+        known = correct(curve, guess, along, along).found
+        if known is None:
+            continue
+        apart = np.linalg.norm(known.place - there.place)
+        if apart < max(_SAME, _CORRECTIONS * curve.converged):
+            return float(known.tangent @ there.tangent)
+    return None
+
 
 _SMALLEST = 1e-6
 _FIRST = 0.25

@@ -7,10 +7,16 @@ from jaxtyping import PyTree
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.identify._gait_fit import LOOSE, FitEnding, GaitFit, information
+from jaxbiped.identify._gait_fit import (
+    LOOSE,
+    FitEnding,
+    GaitFit,
+    information,
+    interval_end,
+    linear_step,
+)
 from jaxbiped.identify._measured_gait import MeasuredGait
 from jaxbiped.identify._predicted_gait import AnyScene, Prediction, predict
-from jaxbiped.identify._profile import interval_end, linear_step
 from jaxbiped.scene._parameter_access import parameter_values, with_parameters
 
 _WITHIN = 1.959963984540054

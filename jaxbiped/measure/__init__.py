@@ -3,10 +3,10 @@
 from jaxbiped.measure._cost_of_transport import CostOfTransport as CostOfTransport
 from jaxbiped.measure._cost_of_transport import cost_of_transport as cost_of_transport
 from jaxbiped.measure._energy_ledger import EnergyLedger as EnergyLedger
+from jaxbiped.measure._energy_ledger import RigidLedger as RigidLedger
+from jaxbiped.measure._energy_ledger import rigid_ledger as rigid_ledger
 from jaxbiped.measure._footsteps import Footsteps as Footsteps
 from jaxbiped.measure._footsteps import HeelStrikes as HeelStrikes
 from jaxbiped.measure._footsteps import heel_strikes as heel_strikes
 from jaxbiped.measure._operation_counts import operation_counts as operation_counts
-from jaxbiped.measure._rigid_ledger import RigidLedger as RigidLedger
-from jaxbiped.measure._rigid_ledger import rigid_ledger as rigid_ledger
 from jaxbiped.solve._trajectory import Arrivals as Arrivals

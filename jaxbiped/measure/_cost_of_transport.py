@@ -8,8 +8,8 @@ from jaxbiped._checks import ArgumentError, check_increasing, check_type
 from jaxbiped.dynamics._energy import energies, powers
 from jaxbiped.dynamics._redundant_state import EulerState, RedundantState, minimal_state
 from jaxbiped.dynamics._state import BristleState, State
+from jaxbiped.measure._energy_ledger import kept_strikes, rigid_ledger
 from jaxbiped.measure._footsteps import heel_strikes
-from jaxbiped.measure._rigid_ledger import kept_strikes, rigid_ledger
 from jaxbiped.measure._samples import evaluate_at, sample
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of

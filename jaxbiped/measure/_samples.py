@@ -1,17 +1,19 @@
 """Samples of a trajectory between its steps: values, integrals and moments of change."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
+import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._cached_jit import cached_jit
-from jaxbiped._types import as_float
-from jaxbiped.dynamics._state import State
-from jaxbiped.scene._scene import Scene
+from jaxbiped._types import Scalar, as_float
+from jaxbiped.dynamics._state import RigidState, State
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.simulate._rigid_walk import rigid_walk
 from jaxbiped.solve._dense_output import AT_ONCE, join_parts, split_evenly
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -130,3 +132,13 @@ def _apply(function: Callable[..., PyTree], scene: Scene, states: State) -> PyTr
     values = function(scene, states)
     shape = jnp.shape(jtu.tree_leaves(states)[0])
     return jtu.tree_map(lambda leaf: jnp.broadcast_to(leaf, shape), values)
+
+
+def states_after(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> RigidState:
+    """States so long after their starts [s], within their footsteps; leaves of shape (n,)."""
+
+    def walked(start: RigidState, duration: Scalar) -> RigidState:
+        return rigid_walk(scene, start, duration=cast("float", duration), accuracy="tight").final
+
+    each: Callable[[RigidState, Scalar], RigidState] = jax.vmap(walked)
+    return each(starts, jnp.asarray(durations))

@@ -11,7 +11,7 @@ from tqdm import tqdm
 from jaxbiped._checks import check_choice, check_not_negative, check_positive, check_type
 from jaxbiped._types import as_float
 from jaxbiped.basins._fractions import Fraction, wilson_interval
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock
 from jaxbiped.continuation._nearest_bifurcation import (
     NearestBifurcation,

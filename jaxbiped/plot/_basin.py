@@ -16,7 +16,7 @@ from jaxbiped._checks import ArgumentError, check_finite
 from jaxbiped._quantity import Quantity
 from jaxbiped.basins._arguments import check_known
 from jaxbiped.basins._fractions import fractions as fractions_of
-from jaxbiped.basins._label import Label, label_names
+from jaxbiped.basins._labels import Label, label_names
 from jaxbiped.plot._symbols import axis_label
 from jaxbiped.plot.style import GAIT_SUFFIX, axes_or_new, figure_of, in_order, label_colour
 

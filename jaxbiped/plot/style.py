@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Label
 
 LEG_COLOURS = ("#0072B2", "#D55E00")
 """Leg 1 blue, leg 2 vermilion: two of Okabe and Ito's colours, distinct to colour-blind readers."""

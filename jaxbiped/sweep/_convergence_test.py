@@ -8,7 +8,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Label
 from jaxbiped.sweep._goals import NO_GAIT, Goals
 
 DEPTH = 4

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped.basins._doubt import Doubt
-from jaxbiped.basins._label import Label
 from jaxbiped.basins._label_oracle import LabelOf
+from jaxbiped.basins._labels import Doubt, Label
 from jaxbiped.sweep._labelled import Labelled
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._coordinates import check_coordinates

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxbiped.basins._label import label_names
+from jaxbiped.basins._labels import label_names
 
 
 class Labelled(NamedTuple):

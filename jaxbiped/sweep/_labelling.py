@@ -13,7 +13,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject, as_float
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Label
 from jaxbiped.dynamics._state import BristleState, State, state_type, within_a_turn
 from jaxbiped.scene._parameter_access import scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Parameter, Scalar, select
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Label
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve

@@ -8,7 +8,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped.basins._arguments import check_whole
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Label
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.scene._parameter_access import parameter_names, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene

@@ -6,8 +6,8 @@ A start that comes within it need be followed no further.
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped.basins._label import Label
-from jaxbiped.basins._spherical_points import spread_directions
+from jaxbiped.basins._label_oracle import spread_directions
+from jaxbiped.basins._labels import Label
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._attractor import Attractor, component_scales, section_tangents
 from jaxbiped.sweep._broadcast import broadcast_leaves

@@ -10,7 +10,7 @@ from typing import Any
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped.basins._doubt import Doubt, Witness
+from jaxbiped.basins._labels import Doubt, Witness
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER

@@ -13,8 +13,8 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._paths import user_path
 from jaxbiped._provenance import provenance
 from jaxbiped.basins._arguments import check_whole
-from jaxbiped.basins._label import Label
 from jaxbiped.basins._label_errors import ERRORS
+from jaxbiped.basins._labels import Label
 from jaxbiped.sweep._array_layout import Layout, fields_of
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._memory_store import MemoryStore

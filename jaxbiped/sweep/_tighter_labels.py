@@ -6,8 +6,8 @@ from concurrent.futures import Executor
 
 import numpy as np
 
-from jaxbiped.basins._doubt import Doubt, Witness
 from jaxbiped.basins._label_errors import LabelErrors, Seen, estimate_label_errors
+from jaxbiped.basins._labels import Doubt, Witness
 from jaxbiped.sweep._array_layout import DOUBT_FIELDS, Layout
 from jaxbiped.sweep._effort import FINEST_FIRST
 from jaxbiped.sweep._labelling import Labelling

@@ -12,10 +12,8 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._parameter_access import parameter_names
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._accuracy import Precision
-from jaxbiped.trade._row import OK, Row, failed_row, row_of
-from jaxbiped.trade._truth import Truth, Values, truth_of
-from jaxbiped.trade._way import Way
-from jaxbiped.trade._work import work_of
+from jaxbiped.trade._reference_solution import Truth, Values, truth_of
+from jaxbiped.trade._study_row import OK, Row, Way, failed_row, row_of, work_of
 
 TANGENT_SHARE = 10.0
 """Tolerance of the columns, in units of the state's, as in the named accuracies."""

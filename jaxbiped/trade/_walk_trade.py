@@ -14,10 +14,8 @@ from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulation import CompiledSimulation, Simulation
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.trade._row import OK, Row, failed_row, row_of
-from jaxbiped.trade._truth import Truth, Values, truth_of
-from jaxbiped.trade._way import Way
-from jaxbiped.trade._work import work_of
+from jaxbiped.trade._reference_solution import Truth, Values, truth_of
+from jaxbiped.trade._study_row import OK, Row, Way, failed_row, row_of, work_of
 
 _FINEST = 1e-12
 _REFERENCES = ("rodas5p", "rodas4p")

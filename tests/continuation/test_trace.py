@@ -6,8 +6,7 @@ import pytest
 from jaxbiped._ending import Ending
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch_point import NO_WALK, is_stable
-from jaxbiped.continuation._retrace import passed_before
-from jaxbiped.continuation._trace import trace
+from jaxbiped.continuation._trace import passed_before, trace
 from jaxbiped.gait._continuation import BranchEnd
 from tests.continuation.maps import (
     begin_at,

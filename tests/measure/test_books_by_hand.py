@@ -10,7 +10,7 @@ import jaxbiped as jb
 from jaxbiped.dynamics._contact_forces import Contacts, FootForce, FootForces
 from jaxbiped.dynamics._energy import Energies, Powers
 from jaxbiped.dynamics._feet import Feet, Foot
-from jaxbiped.measure import _cost_of_transport, _energy_ledger, _footsteps, _rigid_ledger
+from jaxbiped.measure import _cost_of_transport, _energy_ledger, _footsteps
 from jaxbiped.measure._footsteps import HeelStrikes
 from jaxbiped.measure._samples import NODES, Samples
 from jaxbiped.solve._trajectory import Trajectory
@@ -150,12 +150,12 @@ def test_a_rigid_ledger_closes_with_its_push_off(monkeypatch):
         (np.array([1.0]), np.array([9.0])), (np.array([3.0]), np.array([6.5])),
         (np.array([1.5]), np.array([6.5])),
     ])  # fmt: skip
-    monkeypatch.setattr(_rigid_ledger, "kept_strikes", lambda *_: (np.array([1.0, 2.0]), states))
-    monkeypatch.setattr(_rigid_ledger, "_before_impact", lambda *_: states)
-    monkeypatch.setattr(_rigid_ledger, "_energies", lambda *_: next(known))
-    monkeypatch.setattr(_rigid_ledger, "push_off_work", lambda *_: np.array([0.25]))
+    monkeypatch.setattr(_energy_ledger, "kept_strikes", lambda *_: (np.array([1.0, 2.0]), states))
+    monkeypatch.setattr(_energy_ledger, "_before_impact", lambda *_: states)
+    monkeypatch.setattr(_energy_ledger, "_energies", lambda *_: next(known))
+    monkeypatch.setattr(_energy_ledger, "push_off_work", lambda *_: np.array([0.25]))
     monkeypatch.setattr(
-        _rigid_ledger, "_hip_works", lambda *_: (np.array([-0.5]), np.array([0.125]))
+        _energy_ledger, "_hip_works", lambda *_: (np.array([-0.5]), np.array([0.125]))
     )
     books = jb.measure.rigid_ledger(scene, None)
     assert [float(part[0]) for part in books] == pytest.approx(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Label
 from jaxbiped.sweep._convergence_test import UNDECIDED, after_arrival, empty_history
 from jaxbiped.sweep._goals import NO_GAIT, Goals
 from jaxbiped.sweep._labelling_loop import CompliantLabelling, Progress, Start, _outcome

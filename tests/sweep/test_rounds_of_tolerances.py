@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.basins._doubt import Doubt, Witness
 from jaxbiped.basins._label_errors import Seen
+from jaxbiped.basins._labels import Doubt, Witness
 from jaxbiped.sweep import _tighter_labels
 from jaxbiped.sweep._array_layout import Layout
 from jaxbiped.sweep._memory_store import MemoryStore

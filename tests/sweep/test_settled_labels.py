@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.basins._doubt import Witness
+from jaxbiped.basins._labels import Witness
 from jaxbiped.sweep._effort import effort_of
 from jaxbiped.sweep._labelled import Labelled
 from jaxbiped.sweep._settled_labels import settled_labels

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Label
 from jaxbiped.sweep import _nearest_failure, _zarr_store
 from jaxbiped.sweep._attractor import attractor_without_radius, component_scales
 from jaxbiped.sweep._effort import effort_of

@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_count, check_type
 from jaxbiped._types import JsonObject
-from jaxbiped.basins._label import label_names
+from jaxbiped.basins._labels import label_names
 from jaxbiped.plot.style import in_order, label_colour, view_colours
 from jaxbiped.plot.viewer._page import AbstractPage, frame_of, page_of
 from jaxbiped.plot.viewer._recording import Recording, record_walk

@@ -12,8 +12,7 @@ from jaxbiped._types import Scalar, as_array, as_float
 from jaxbiped.dynamics._energy import kinetic_and_moment
 from jaxbiped.dynamics._rolling import rolling
 from jaxbiped.dynamics._state import RigidState, check_state, whole_state
-from jaxbiped.measure._rigid_samples import states_after
-from jaxbiped.measure._samples import evaluate_along
+from jaxbiped.measure._samples import evaluate_along, states_after
 from jaxbiped.plot.viewer._knots import Channels
 from jaxbiped.plot.viewer._recording import Footprint, Recording, recording, time_unit
 from jaxbiped.scene._scene import RigidScene

@@ -1,4 +1,4 @@
-"""Truth that errors are told against, and how well it is known."""
+"""Reference solution: the truth that errors are told against, and how well it is known."""
 
 from collections.abc import Mapping
 from typing import NamedTuple

@@ -1,0 +1,203 @@
+"""Rows of a study: ways of solving at one setting, their errors and work, and the cheapest."""
+
+import itertools
+import math
+import statistics
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from jaxbiped._types import JsonObject
+from jaxbiped.trade._reference_solution import Truth, Values
+
+
+class Way(NamedTuple):
+    """A way of solving at one setting.
+
+    Attributes:
+        solver: a name in `SOLVERS`.
+        engine: "lanes" or "xla".
+        setting: what a user would write for the tolerance, such as "tight" or "rtol=1e-8".
+        rtol: the relative tolerance that it stands for.
+    """
+
+    solver: str
+    engine: str
+    setting: str
+    rtol: float
+
+    @property
+    def name(self) -> str:
+        """Method and engine, without the setting."""
+        return f"{self.solver} by {self.engine}"
+
+
+_ENOUGH = 3.0
+"""Runs that took so long together are not repeated again [s]."""
+
+
+class Work(NamedTuple):
+    """What a solve took.
+
+    Attributes:
+        seconds: median time of a warm run [s].
+        cpu_s: median CPU time of a warm run, of all threads together [s].
+        compile_s: by how much the first run took longer than a warm one [s].
+    """
+
+    seconds: float
+    cpu_s: float
+    compile_s: float
+
+
+def work_of(run: Callable[[], Any], repeats: int) -> tuple[Any, Work]:
+    """What `run` returns, and the work that it took.
+
+    Args:
+        run: solves; what it compiles is kept for its next call.
+        repeats: warm runs of which the median counts; fewer where they take over 3 s together.
+
+    Returns:
+        What it returned last, and its work.
+    """
+    first, found = _timed(run)
+    spans: list[tuple[float, float]] = []
+    while not spans or (len(spans) < repeats and sum(wall for wall, _ in spans) < _ENOUGH):
+        span, found = _timed(run)
+        spans.append(span)
+    wall, cpu = (statistics.median(span[k] for span in spans) for k in range(2))
+    return found, Work(wall, cpu, max(first[0] - wall, 0.0))
+
+
+def _timed(run: Callable[[], Any]) -> tuple[tuple[float, float], Any]:
+    """Time and CPU time of a run [s], and what it returned."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    found = jax.block_until_ready(run())
+    return (time.perf_counter() - wall, time.process_time() - cpu), found
+
+
+OK = "ok"
+ASTRAY = 0.05
+"""Error, in the units of its axis, from which a solve that came to its end has still failed."""
+
+
+class Row(NamedTuple):
+    """One way of solving at one setting. A way that failed has a row all the same.
+
+    Attributes:
+        way: method and engine.
+        setting: its tolerance or its step, as a user would write it.
+        outcome: "ok", or in words what happened instead.
+        errors: by the name of the error axis, in that axis's units; None where it is not finite.
+        seconds, cpu_s, compile_s: as in `Work`; None where nothing ran.
+        attempted, rejected: steps of the solver, None where they are not known.
+    """
+
+    way: str
+    setting: str
+    outcome: str
+    errors: dict[str, float | None]
+    seconds: float | None = None
+    cpu_s: float | None = None
+    compile_s: float | None = None
+    attempted: int | None = None
+    rejected: int | None = None
+
+    def numbers(self) -> JsonObject:
+        """The row ready for JSON."""
+        return dict(self._asdict())
+
+
+def row_of(
+    way: str,
+    setting: str,
+    outcome: str,
+    truth: Truth,
+    values: Values,
+    work: Work,
+    *,
+    attempted: int | None = None,
+    rejected: int | None = None,
+) -> Row:
+    """The row of a solve, told against the truth.
+
+    Args:
+        way: method and engine.
+        setting: its tolerance or its step.
+        outcome: "ok" where it came to its end, else what happened.
+        truth: what its values are compared with.
+        values: what it gave, by the name of the error axis.
+        work: what it took.
+        attempted: steps; rejected: those of them that were.
+
+    Returns:
+        A row whose outcome is "wrong" where an error is 0.05 or more although it came to its end.
+    """
+    errors = truth.errors(values)
+    if outcome == OK and any(not error < ASTRAY for error in errors.values()):
+        outcome = "wrong"
+    told = {name: error if math.isfinite(error) else None for name, error in errors.items()}
+    return Row(way, setting, outcome, told, *work, attempted, rejected)
+
+
+def failed_row(way: str, setting: str, outcome: str) -> Row:
+    """The row of a way that was refused or is not installed."""
+    return Row(way, setting, outcome, {})
+
+
+Cost = Callable[[Row], float | None]
+
+
+def cheapest(rows: Iterable[Row], axis: str, error: float, cost: Cost) -> Row | None:
+    """The cheapest row among those that reach an error; None where none does.
+
+    Args:
+        rows: of any ways.
+        axis: name of the error axis.
+        error: largest error allowed, in that axis's units.
+        cost: of a row; None where it is not known.
+    """
+    good = [row for row in rows if _reaches(row, axis, error) and cost(row) is not None]
+    return min(good, key=lambda row: _known(cost(row)), default=None)
+
+
+def cost_at(rows: Sequence[Row], axis: str, error: float, cost: Cost) -> float | None:
+    """Cost of one way at an error, between its settings along straight lines of the logarithms.
+
+    Compared ways must be compared so: at one tolerance they have different errors.
+
+    Args:
+        rows: of one way, from its loosest setting to its finest.
+        axis: name of the error axis.
+        error: that every compared way is to have, in that axis's units.
+        cost: of a row; None where it is not known.
+
+    Returns:
+        The least cost at which the way passes that error, None where it never does. A way whose
+        loosest setting has a smaller error costs what that costs.
+    """
+    points = [
+        (np.log(_known(row.errors[axis])), np.log(_known(cost(row))))
+        for row in rows
+        if _reaches(row, axis, np.inf) and cost(row) is not None
+    ]
+    if not points:
+        return None
+    aim = np.log(error)
+    found = [points[0][1]] if points[0][0] <= aim else []
+    for (e0, c0), (e1, c1) in itertools.pairwise(points):
+        if e1 <= aim < e0:
+            found.append(c0 + (c1 - c0) * (e0 - aim) / (e0 - e1))
+    return float(np.exp(min(found))) if found else None
+
+
+def _reaches(row: Row, axis: str, error: float) -> bool:
+    reached = row.errors.get(axis)
+    return row.outcome == OK and reached is not None and 0.0 < reached <= error
+
+
+def _known(value: Any) -> float:
+    return float(value)

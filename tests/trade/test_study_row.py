@@ -1,0 +1,102 @@
+"""Rows of a study, against power laws and solves that are close, far off, failed or never ran."""
+
+import json
+
+import numpy as np
+import pytest
+
+from jaxbiped.trade import Row, Way, Work, cheapest, cost_at, failed_row, row_of, truth_of, work_of
+
+
+def test_a_way_is_named_apart_from_its_setting():
+    tight, draft = (Way("rodas4", "lanes", s, r) for s, r in (("tight", 2e-9), ("draft", 1e-5)))
+    assert tight.name == draft.name == "rodas4 by lanes"
+
+
+def test_the_first_run_does_not_count_as_a_warm_one():
+    calls = []
+    found, work = work_of(lambda: calls.append(0) or len(calls), repeats=3)
+    assert (found, len(calls)) == (4, 4)
+    assert min(work) >= 0.0
+
+
+TRUTH = truth_of({"state": np.array([1.0, 0.0])}, {})
+WORK = Work(1.0, 2.0, 3.0)
+
+
+def _row(value, outcome="ok"):
+    found = {"state": np.array([value, 0.0])}
+    return row_of("a", "rtol=1", outcome, TRUTH, found, WORK, attempted=7)
+
+
+def test_a_solve_that_is_close_is_ok():
+    row = _row(1.001)
+    assert row.outcome == "ok"
+    assert row.errors["state"] == pytest.approx(1e-3)
+    assert (row.seconds, row.cpu_s, row.compile_s, row.attempted) == (1.0, 2.0, 3.0, 7)
+
+
+@pytest.mark.parametrize(("value", "error"), [(1.5, 0.5), (np.nan, None)])
+def test_a_solve_that_ends_far_off_is_wrong_and_kept(value, error):
+    row = _row(value)
+    assert row.outcome == "wrong"
+    assert row.errors == {"state": error}
+    assert json.loads(json.dumps(row.numbers()))["errors"] == {"state": error}
+
+
+def test_a_solve_that_says_that_it_failed_keeps_its_word():
+    assert _row(1.5, "out of steps").outcome == "out of steps"
+
+
+def test_what_never_ran_has_no_errors_and_took_no_time():
+    row = failed_row("a", "rtol=1", "not installed")
+    assert (row.errors, row.cpu_s, row.outcome) == ({}, None, "not installed")
+
+
+def test_a_solve_that_is_far_off_in_one_of_its_numbers_is_wrong():
+    values = {"state": np.array([1.0, 0.0]), "period": np.array([2.0])}
+    for period, outcome in ((2.08, "ok"), (2.12, "wrong")):
+        found = values | {"period": np.array([period])}
+        row = row_of("a", "rtol=1", "ok", truth_of(values, {}), found, WORK)
+        assert row.outcome == outcome
+        assert row.errors == pytest.approx({"state": 0.0, "period": 0.5 * period - 1.0})
+
+
+def _cheap_row(error, steps, way="a", outcome="ok"):
+    return Row(way, f"{error:g}", outcome, {"state": error}, attempted=steps)
+
+
+def _steps(row):
+    return row.attempted
+
+
+def test_a_power_law_is_followed_between_settings():
+    """Steps = error^(-1/4), a method of order four."""
+    rows = [_cheap_row(error, error**-0.25) for error in (1e-2, 1e-4, 1e-8)]
+    for error in (1e-3, 1e-4, 1e-6):
+        assert cost_at(rows, "state", error, _steps) == pytest.approx(error**-0.25)
+
+
+def test_an_error_that_is_never_reached_has_no_cost():
+    rows = [_cheap_row(1e-2, 10), _cheap_row(1e-4, 20)]
+    assert cost_at(rows, "state", 1e-5, _steps) is None
+    assert cost_at(rows, "state", 1e-1, _steps) == pytest.approx(10)
+    assert cost_at(rows, "energy", 1e-3, _steps) is None
+    assert cost_at([], "state", 1e-3, _steps) is None
+
+
+def test_failures_are_not_on_the_way():
+    rows = [_cheap_row(1e-2, 10), _cheap_row(1e-9, 1, outcome="wrong"), _cheap_row(1e-4, 40)]
+    assert cost_at(rows, "state", 1e-3, _steps) == pytest.approx(20)
+
+
+def test_the_cheapest_row_that_reaches_the_error():
+    rows = [
+        _cheap_row(1e-3, 5),
+        _cheap_row(1e-5, 50),
+        _cheap_row(1e-6, 30, way="b"),
+        _cheap_row(0.0, 1),
+    ]
+    assert cheapest(rows, "state", 1e-4, _steps).way == "b"
+    assert cheapest(rows, "state", 1e-2, _steps).attempted == 5
+    assert cheapest(rows, "state", 1e-7, _steps) is None
