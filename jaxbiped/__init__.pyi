@@ -20,8 +20,8 @@ from jaxbiped.solve import solvers as solvers
 from jaxbiped.sweep import starts as starts
 
 # Memory.
-from jaxbiped._caches import cache_info as cache_info
-from jaxbiped._caches import clear_caches as clear_caches
+from jaxbiped.caching._caches import cache_info as cache_info
+from jaxbiped.caching._caches import clear_caches as clear_caches
 
 # What is modelled.
 from jaxbiped.scene._ground import Ground as Ground

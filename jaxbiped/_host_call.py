@@ -17,8 +17,8 @@ from typing import Any, Protocol
 import jax
 import numpy as np
 
-from jaxbiped._caches import Once
-from jaxbiped._fingerprint import fingerprint
+from jaxbiped.caching._caches import Once
+from jaxbiped.caching._fingerprint import fingerprint
 
 TARGET = "jaxbiped_host_call"
 """Name of all such calls in compiled programs."""
@@ -44,7 +44,7 @@ class HostFunction(Protocol):
         """Runs it."""
 
     def __fingerprint__(self) -> object:
-        """See `jaxbiped._fingerprint`."""
+        """See `jaxbiped.caching._fingerprint`."""
 
     def ready(self) -> bool:
         """Whether it runs without compiling anything first."""

@@ -1,10 +1,18 @@
-"""Quantities: what a number stands for, in words, as a symbol and with its SI unit.
+"""Quantities: what a number stands for, in words, as a symbol and with its SI unit; and its range.
 
 The one place that knows how a unit is written: in files, in text and in figures.
 """
 
 import re
 from typing import NamedTuple
+
+from jaxbiped._checks import (
+    check_at_least,
+    check_below,
+    check_finite,
+    check_not_negative,
+    check_positive,
+)
 
 _EXPONENT = re.compile(r"\^([\w.]+)")
 _SUPERSCRIPTS = dict(zip("0123456789n", "⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True))
@@ -51,3 +59,33 @@ def _in_figure(found: re.Match[str]) -> str:
     if exponent.isdigit() and exponent in _SUPERSCRIPTS:
         return _SUPERSCRIPTS[exponent]
     return f"$^{exponent}$" if len(exponent) == 1 else f"$^{{{exponent}}}$"
+
+
+class ParameterInfo(NamedTuple):
+    """What the field of a parameter carries.
+
+    Attributes:
+        quantity: words, symbol and unit.
+        positive: whether it must be above 0.
+        minimum: the smallest value allowed, None for none.
+        size_below: what its absolute value must be below, None for any.
+    """
+
+    quantity: Quantity
+    positive: bool
+    minimum: float | None
+    size_below: float | None
+
+    def check(self, name: str, value: object) -> None:
+        """Raises `ArgumentError` unless every entry is a finite number that is allowed."""
+        unit = self.quantity.unit
+        if self.size_below is not None:
+            check_below(name, value, self.size_below, "radians" if unit == "rad" else unit)
+        elif self.positive:
+            check_positive(name, value, unit)
+        elif self.minimum is None:
+            check_finite(name, value)
+        elif self.minimum == 0.0:
+            check_not_negative(name, value, unit)
+        else:
+            check_at_least(name, value, f"{self.minimum:g}", self.minimum)

@@ -12,7 +12,7 @@ import jax
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._disk_cache import CACHE_VARIABLE
+from jaxbiped.caching._disk_cache import CACHE_VARIABLE
 from tests.nightly import Share
 from tests.reference import reference_states
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker

@@ -7,6 +7,7 @@ import jaxbiped as jb
 
 PACKAGE = Path(jb.__file__).parent
 LAYERS = [
+    "caching",
     "linalg",
     "constraints",
     "scene",

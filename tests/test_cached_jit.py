@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped import _compiled_store
-from jaxbiped._cached_jit import cached_jit
-from jaxbiped._disk_cache import CACHE_VARIABLE, disk_use
+from jaxbiped.caching import _compiled_store
+from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.caching._disk_cache import CACHE_VARIABLE, disk_use
 from jaxbiped.simulate._by_xla import by_xla
 from jaxbiped.solve._final_step import just_before_end
 
@@ -33,7 +33,7 @@ def test_what_was_compiled_is_loaded(cache, monkeypatch):
     (kept,) = cache.iterdir()
     just_before_end.clear()
     monkeypatch.setattr(_compiled_store, "trace_call", _refuse)
-    monkeypatch.setattr("jaxbiped._cached_jit.trace_call", _refuse)
+    monkeypatch.setattr("jaxbiped.caching._cached_jit.trace_call", _refuse)
     assert just_before_end(np.float64(2.0)) == first < 2.0
     assert just_before_end(np.float64(-3.0)) < -3.0
     assert list(cache.iterdir()) == [kept]
@@ -50,7 +50,7 @@ def test_a_walk_by_xla_is_loaded(cache, monkeypatch):
     by_xla.clear()
     first = walk()
     by_xla.clear()
-    monkeypatch.setattr("jaxbiped._cached_jit.trace_call", _refuse)
+    monkeypatch.setattr("jaxbiped.caching._cached_jit.trace_call", _refuse)
     assert walk() == first
     by_xla.clear()
 

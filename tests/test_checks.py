@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._paths import check_writable_directory
+from jaxbiped._files import check_writable_directory
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from jaxbiped import _disk_cache
-from jaxbiped._disk_cache import (
+from jaxbiped.caching import _disk_cache
+from jaxbiped.caching._disk_cache import (
     CACHE_VARIABLE,
     cache_folder,
     clear_disk,

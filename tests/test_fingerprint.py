@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped import _fingerprint
-from jaxbiped._fingerprint import Leaf, as_leaves, fingerprint
+from jaxbiped.caching import _fingerprint
+from jaxbiped.caching._fingerprint import Leaf, as_leaves, fingerprint
 from jaxbiped.optimise._augmented_state import augment
 from jaxbiped.solve._ending import WATCHES, ending_events
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._parameter import parameter_infos
+from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._quantity import Quantity
 
 SEED = jb.seed_scene()

@@ -6,7 +6,7 @@ import jax
 import numpy as np
 import pytest
 
-from jaxbiped._fingerprint import fingerprint, settings
+from jaxbiped.caching._fingerprint import fingerprint, settings
 
 
 def _scaled(x, y=1.0, *, factor=2.0):

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 import jaxbiped as jb
-from jaxbiped import _fingerprint, _source_digest
-from jaxbiped._disk_cache import CACHE_VARIABLE
-from jaxbiped._fingerprint import as_leaves, fingerprint
-from jaxbiped._source_digest import SourceDigests
+from jaxbiped.caching import _fingerprint, _source_digest
+from jaxbiped.caching._disk_cache import CACHE_VARIABLE
+from jaxbiped.caching._fingerprint import as_leaves, fingerprint
+from jaxbiped.caching._source_digest import SourceDigests
 
 PACKAGE = Path(jb.__file__).parent
 LATER = time.time_ns() + 10**15
@@ -35,7 +35,7 @@ CODE = {
     "string": ("gait/_find_gait.py", '"newton"', '"newtons"'),
     "registered for a class": ("dynamics/_rolling.py", "return rolling_field", "return None"),
     "compiler": ("compiler/passes/_liveness.py", "value.op in", "value.op not in"),
-    "how programs are kept": ("_compiled_store.py", '_KIND = "xla"', '_KIND = "lax"'),
+    "how programs are kept": ("caching/_compiled_store.py", '_KIND = "xla"', '_KIND = "lax"'),
     "what laws there are": ("scene/laws/__init__.py", "Tsuji as Tsuji", "Tsuji as Fuji"),
 }
 ELSEWHERE = {

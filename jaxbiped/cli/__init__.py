@@ -13,7 +13,7 @@ from tyro.conf import subcommand
 
 from jaxbiped._checks import ArgumentError, ResourceError
 from jaxbiped._environment import check_environment
-from jaxbiped._paths import user_path
+from jaxbiped._files import user_path
 from jaxbiped._progress import tell_stages
 from jaxbiped.cli._refusal import one_sentence
 from jaxbiped.cli._report import Report as Report

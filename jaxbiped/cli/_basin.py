@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jaxbiped import _clock
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._fractions import fractions as fractions_of
 from jaxbiped.basins._label_errors import LabelErrors, label_errors
 from jaxbiped.basins._labels import Doubt, label_names
+from jaxbiped.caching import _import_time
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli.commands._basin import Basin
 from jaxbiped.dynamics._state import RigidState, State
@@ -81,7 +81,7 @@ def run(options: Basin) -> int:
             paths = _write_results(found, known, starts, options.output.out)
         for path in paths:
             report.say(f"wrote {path}")
-    numbers["wall_s"] = time.perf_counter() - _clock.IMPORT_BEGAN
+    numbers["wall_s"] = time.perf_counter() - _import_time.IMPORT_BEGAN
     report.finish(numbers)
     return 0
 

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from jaxbiped._parameter_info import ParameterInfo
-from jaxbiped._quantity import Quantity
+from jaxbiped._quantity import ParameterInfo, Quantity
 
 MODELS = ("compliant", "rigid")
 FORMULATIONS = ("minimal", "redundant")

@@ -4,8 +4,8 @@ import math
 import time
 from pathlib import Path
 
-from jaxbiped import _clock
 from jaxbiped._types import JsonObject
+from jaxbiped.caching import _import_time
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli.commands._continue import ContinueGait
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
@@ -37,8 +37,8 @@ def run(options: ContinueGait) -> int:
         progress=True,
     )
     wall = {
-        "import": imported - _clock.IMPORT_BEGAN,
-        "total": time.perf_counter() - _clock.IMPORT_BEGAN,
+        "import": imported - _import_time.IMPORT_BEGAN,
+        "total": time.perf_counter() - _import_time.IMPORT_BEGAN,
     }
     report = Report(options.output.json)
     if len(branch):

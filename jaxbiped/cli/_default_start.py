@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._state import MinimalState, WalkerState, seed_state
 from jaxbiped.scene._ready_scenes import seed_scene

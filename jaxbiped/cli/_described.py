@@ -7,7 +7,7 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._parameter import parameter_infos
+from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._types import as_float
 from jaxbiped.cli._actuation_options import ActuationOptions, named_text
 from jaxbiped.cli._choices import SEED

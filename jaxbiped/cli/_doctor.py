@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 import jax
 
-from jaxbiped._disk_cache import cache_folder, disk_use
+from jaxbiped.caching._disk_cache import cache_folder, disk_use
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._self_test import Truth, self_test
 from jaxbiped.cli.commands._doctor import Doctor

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jaxbiped import _clock
 from jaxbiped._types import JsonObject
+from jaxbiped.caching import _import_time
 from jaxbiped.cli._driven import cost_sentence, gait_cost
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli.commands._gait import FindGait
@@ -61,8 +61,8 @@ def run(options: FindGait) -> int:
         )
     found = gait.outcome is Search.FOUND  # waits for the result
     wall = {
-        "import": imported - _clock.IMPORT_BEGAN,
-        "total": time.perf_counter() - _clock.IMPORT_BEGAN,
+        "import": imported - _import_time.IMPORT_BEGAN,
+        "total": time.perf_counter() - _import_time.IMPORT_BEGAN,
     }
     numbers = gait_numbers(gait) | {"search": explain_search(scene, gait), "wall_s": wall}
     if gait.error is not None:

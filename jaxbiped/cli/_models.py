@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from jaxbiped._parameter import parameter_infos
+from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
 from jaxbiped.cli._report import Report, table

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jaxbiped._strict_json import strict_json
+from jaxbiped._files import strict_json
 
 if TYPE_CHECKING:
     from jaxbiped._types import JsonObject

@@ -8,11 +8,11 @@ from typing import Any
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped import _clock
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
+from jaxbiped.caching import _import_time
 from jaxbiped.cli._driven import cost_sentence, walk_cost
 from jaxbiped.cli._report import Report, table
 from jaxbiped.cli._walk_options import OutputOptions, SolveOptions
@@ -69,7 +69,7 @@ def run_rigid_walk(
     finished = time.perf_counter()
     # The first run compiles; what a run takes by itself is the second one's.
     wall = {
-        "import": prepared - _clock.IMPORT_BEGAN,
+        "import": prepared - _import_time.IMPORT_BEGAN,
         "compile": 2.0 * compiled - prepared - finished,
         "run": finished - compiled,
     }

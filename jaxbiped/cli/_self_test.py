@@ -6,8 +6,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import RigidState, State
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._parameter_access import with_parameters

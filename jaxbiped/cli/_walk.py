@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped import _clock
 from jaxbiped._ending import Ending
 from jaxbiped._progress import stage
 from jaxbiped._types import JsonObject
+from jaxbiped.caching import _import_time
 from jaxbiped.cli._driven import cost_sentence, walk_cost
 from jaxbiped.cli._held import constraint_numbers, constraint_sentence
 from jaxbiped.cli._report import Report, table
@@ -54,7 +54,7 @@ def run(options: Walk) -> int:
     began = time.perf_counter()
     trajectory, seconds = _simulate(request, options.solve.wanted())
     wall = {
-        "import": imported - _clock.IMPORT_BEGAN,
+        "import": imported - _import_time.IMPORT_BEGAN,
         "compile": time.perf_counter() - began - seconds,
         "run": seconds,
     }

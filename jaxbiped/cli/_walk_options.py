@@ -12,7 +12,7 @@ from jaxbiped._checks import (
     check_pair,
     check_positive,
 )
-from jaxbiped._paths import check_writable_directory, check_writable_file
+from jaxbiped._files import check_writable_directory, check_writable_file
 from jaxbiped.cli._actuation_options import ActuationOptions
 from jaxbiped.cli._choices import (
     CONSTRAINT_METHODS,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 import equinox as eqx
 
 from jaxbiped._checks import check_at_least
-from jaxbiped._parameter import check_parameters
+from jaxbiped._parameter_declaration import check_parameters
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.linalg._symmetric import factorise, solve
 

@@ -7,7 +7,7 @@ from jaxbiped._checks import (
     check_choice,
     check_type,
 )
-from jaxbiped._parameter import check_parameters, parameter
+from jaxbiped._parameter_declaration import check_parameters, parameter
 from jaxbiped._types import Parameter
 
 ORIENTATIONS = ("angle", "euler")

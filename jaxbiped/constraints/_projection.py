@@ -6,9 +6,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped._cached_jit import cached_jit, kept_alone
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import cached_jit, kept_alone
 from jaxbiped.constraints._constraint_method import (
     AbstractConstraintMethod,
     AbstractProjectingMethod,

@@ -8,8 +8,8 @@ import jax.tree_util as jtu
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._files import strict_json
 from jaxbiped._identity import difference_of
-from jaxbiped._strict_json import strict_json
 from jaxbiped._types import as_float
 from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint

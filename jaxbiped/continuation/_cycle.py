@@ -12,8 +12,8 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Numbers, Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.gait._fixed_point_search import LOOSER
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped._cached_jit import kept_alone
 from jaxbiped._checks import ArgumentError, holds_somewhere
 from jaxbiped._types import Scalar, by_numpy
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
 from jaxbiped.constraints._linkage_constraints import masses_of
 from jaxbiped.constraints._projection import correct_step, nearest_consistent

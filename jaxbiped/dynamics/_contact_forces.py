@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from jaxbiped._cached_jit import kept_alone
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._actuation import load_shares
 from jaxbiped.dynamics._feet import Feet, Foot, feet, touches
 from jaxbiped.dynamics._redundant_state import CompliantState

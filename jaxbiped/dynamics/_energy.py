@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from jaxbiped._cached_jit import kept_alone
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
 from jaxbiped.dynamics._contact_forces import foot_force, hip_motion, normal_forces
 from jaxbiped.dynamics._feet import Foot, feet, touches

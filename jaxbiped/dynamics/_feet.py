@@ -4,8 +4,8 @@ from typing import NamedTuple, cast
 
 import jax.numpy as jnp
 
-from jaxbiped._cached_jit import kept_alone
 from jaxbiped._types import Scalar, select
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._actuation import preload
 from jaxbiped.dynamics._redundant_state import CompliantState, Leg, legs_of
 from jaxbiped.dynamics._state import SomeState, exchange_legs

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._actuation import actuators_of
 from jaxbiped.dynamics._rolling import Support, inertia_of, support_of
 from jaxbiped.dynamics._state import RigidState

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from jaxbiped._cached_jit import kept_alone
 from jaxbiped._types import Scalar, Time
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod, Constrained
 from jaxbiped.constraints._linkage import Linkage
 from jaxbiped.constraints._linkage_constraints import Heading, constraints_of, masses_of

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar, Time, VectorField
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._actuation import hip_torques
 from jaxbiped.dynamics._contact_forces import foot_force, hip_motion
 from jaxbiped.dynamics._feet import Feet, Foot, feet

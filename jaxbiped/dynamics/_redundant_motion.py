@@ -5,9 +5,9 @@ from typing import NamedTuple, cast
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.constraints._linkage_constraints import (
     constraints_of,
     headings_of,

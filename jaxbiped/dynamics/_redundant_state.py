@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias, cast
 
 import jax.numpy as jnp
 
-from jaxbiped._cached_jit import kept_alone
 from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._state import BristleState, MinimalState, State, state_type
 from jaxbiped.scene._linkage_scene import leg_of
 from jaxbiped.scene._scene import AbstractScene, RedundantScene

@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import check_not_negative, check_type
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._rolling import rolling
 from jaxbiped.dynamics._state import RigidState

@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import kept_alone
 from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar, VectorField, as_float, by_numpy
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.scene._scene import RigidScene, Scene
 
 

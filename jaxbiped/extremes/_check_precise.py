@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxbiped._caches import bounded_cache
+from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.extremes import _check_equations
 
 _DIGITS, _STAGES = 40, 7

@@ -11,8 +11,8 @@ from typing import Any
 
 from tqdm import tqdm
 
-from jaxbiped._provenance import DECISIVE, provenance
-from jaxbiped._strict_json import strict_json
+from jaxbiped._files import strict_json
+from jaxbiped._identity import DECISIVE, provenance
 from jaxbiped._types import JsonObject
 
 

@@ -3,8 +3,8 @@
 import jax
 import jax.numpy as jnp
 
-from jaxbiped._caches import bounded_cache
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._state import (

@@ -12,10 +12,10 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped._checks import check_choice, check_count, check_unbatched
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._progress import stage
+from jaxbiped.caching._caches import PROGRAMS, Once, bounded_cache
 from jaxbiped.compiler import deferred_checks, host_jit
 from jaxbiped.dynamics._consistent_state import consistent_state
 from jaxbiped.dynamics._redundant_state import LegsState, minimal_state

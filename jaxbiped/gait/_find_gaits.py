@@ -7,10 +7,10 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import RigidState, State, WalkerState
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search

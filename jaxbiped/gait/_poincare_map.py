@@ -11,8 +11,8 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar, by_numpy
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import Recorded
 from jaxbiped.dynamics._redundant_state import minimal_state, redundant_state
 from jaxbiped.gait._return_map_spec import ReturnMapSpec

@@ -5,8 +5,8 @@ from typing import cast
 import jax
 import jax.numpy as jnp
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import check_positive
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._feet import standing_height
 from jaxbiped.dynamics._state import RigidState, State, WalkerState, state_for
 from jaxbiped.gait._default_guess import default_guess

@@ -9,8 +9,8 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar, select
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import WalkerState, exchange_legs
 from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene

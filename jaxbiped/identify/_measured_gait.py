@@ -18,7 +18,7 @@ from jaxbiped._checks import (
     check_type,
     holds_somewhere,
 )
-from jaxbiped._paths import read_json
+from jaxbiped._files import read_json
 from jaxbiped._types import JsonObject
 
 MEASURES = ("period", "step_length", "speed", "peak_normal")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from jaxbiped._checks import check_type
-from jaxbiped._parameter import parameter_infos
+from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._contact_forces import foot_forces
 from jaxbiped.dynamics._energy import energies

@@ -9,8 +9,8 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar, as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import RigidState, State
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.simulate._rigid_walk import rigid_walk

@@ -20,7 +20,7 @@ def _augmented(walker: Any, names: tuple[str, ...]) -> Any:
     if (walker, names) not in _KINDS:
         place, *recurring = walker._fields
         fields: Any = namedtuple("_Augmented", (place, *names, *recurring))  # type: ignore[misc]
-        # By this other processes know it, see `jaxbiped._fingerprint`.
+        # By this other processes know it, see `jaxbiped.caching._fingerprint`.
         made_by = (_augmented, walker, names)
         own = {"__slots__": (), "__made_by__": made_by, "__reduce__": _taken_apart}
         _KINDS.setdefault((walker, names), type("_Augmented", (fields,), own))

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped._files import failure_kind, strict_json
 from jaxbiped._identity import difference_of
-from jaxbiped._paths import failure_kind
-from jaxbiped._strict_json import strict_json
 from jaxbiped._types import JsonObject
 from jaxbiped.optimise._objectives import Evaluation
 

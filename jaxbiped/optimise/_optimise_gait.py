@@ -12,8 +12,8 @@ from jaxbiped._checks import (
     check_not_negative,
     check_type,
 )
-from jaxbiped._paths import user_path
-from jaxbiped._provenance import DECISIVE, provenance
+from jaxbiped._files import user_path
+from jaxbiped._identity import DECISIVE, provenance
 from jaxbiped._types import JsonObject
 from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, ensemble_of

@@ -6,8 +6,8 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 
 from jaxbiped._checks import check_positive
-from jaxbiped._paths import check_writable_file
+from jaxbiped._files import check_writable_file
 from jaxbiped.dynamics._feet import feet
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._state import State

@@ -3,7 +3,7 @@
 Symbols are the paper's; those of laws that it does not have are the ones of their sources.
 """
 
-from jaxbiped._parameter import parameter_infos
+from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._state import STATE_QUANTITIES
 from jaxbiped.scene._ground import Ground

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxbiped._checks import check_choice
-from jaxbiped._parameter import check_parameters, parameter
+from jaxbiped._parameter_declaration import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import equinox as eqx
 
 from jaxbiped._checks import check_type
-from jaxbiped._parameter import check_parameters, parameter
+from jaxbiped._parameter_declaration import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
 from jaxbiped.constraints._linkage import Body, Joint, Linkage

@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._identity import identity
-from jaxbiped._parameter import parameter_infos
+from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._quantity import Quantity
 from jaxbiped._types import JsonObject, Parameter, Scalar
 from jaxbiped.scene._scene import AbstractScene

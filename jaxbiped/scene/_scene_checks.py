@@ -12,9 +12,9 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import ArrayLike
 
-from jaxbiped._caches import OfObjects
 from jaxbiped._checks import ArgumentError, check_type, is_number, traced_rules
 from jaxbiped._types import SomeTree, as_float
+from jaxbiped.caching._caches import OfObjects
 
 SomeModule = TypeVar("SomeModule", bound=eqx.Module)
 

@@ -7,7 +7,7 @@ from jaxbiped._checks import (
     are_zero_together,
     check_pair,
 )
-from jaxbiped._parameter import check_parameters, parameter
+from jaxbiped._parameter_declaration import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
 
 

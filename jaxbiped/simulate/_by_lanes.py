@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import LaneEngine, Request
 from jaxbiped.dynamics._state import State
 from jaxbiped.simulate._recorded_steps import recorded_steps

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import Array, PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._ending import Ending
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import field_of
 from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.solve._ending import ending_code, ending_events

@@ -17,10 +17,10 @@ import numpy as np
 from jax.custom_derivatives import SymbolicZero
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
 from jaxbiped._jax_versions import unbatched, untraced
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.simulate._slopes import Slopes
 from jaxbiped.solve._trajectory import Trajectory
 

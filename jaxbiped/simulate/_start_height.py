@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import BristleState, State
 from jaxbiped.scene._ground import AbstractClearance
 from jaxbiped.scene._scene import RedundantScene, Scene

@@ -9,7 +9,6 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import (
     ArgumentError,
     check_count,
@@ -22,6 +21,7 @@ from jaxbiped._checks import (
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._ending import Ending
 from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
 from jaxbiped.constraints._linkage_constraints import Constraints, constraints_of
 from jaxbiped.constraints._projection import check_independent, correct_step, nearest_consistent

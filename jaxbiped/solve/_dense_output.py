@@ -9,8 +9,8 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 
 AT_ONCE = 4096
 """Times or states in one call of a compiled function: one size for all lengths."""

@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._minimal_motion import accelerations

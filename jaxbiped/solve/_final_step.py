@@ -4,8 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Numbers, Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 
 _CLIPPED_ULPS = 100
 """A step that would end this near the end, in units in the last place, ends there."""

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._state import RigidState
 from jaxbiped.solve._rigid_steps import (

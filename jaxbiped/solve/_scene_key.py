@@ -14,10 +14,10 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTreeDef
 
-from jaxbiped._caches import PROGRAMS, OfObjects, bounded_cache
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._identity import identity
 from jaxbiped._types import Scalar, as_array
+from jaxbiped.caching._caches import PROGRAMS, OfObjects, bounded_cache
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._trajectory import Trajectory
 

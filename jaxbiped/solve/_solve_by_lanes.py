@@ -5,7 +5,7 @@ from typing import NamedTuple, cast
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._caches import PROGRAMS, bounded_cache
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import CUDA, LANES, LaneEngine, Program, Recorded, Request
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved
 from jaxbiped.solve._saved_outputs import Saved

@@ -7,9 +7,9 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._feet import feet
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._fixed_point_search import Search

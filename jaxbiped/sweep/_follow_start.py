@@ -5,8 +5,8 @@ import numpy as np
 import numpy.typing as npt
 from jaxtyping import PyTree
 
-from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import as_float
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import Program, Request
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._adaptive_program import Solve

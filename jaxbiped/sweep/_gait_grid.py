@@ -15,7 +15,7 @@ import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._strict_json import strict_json
+from jaxbiped._files import strict_json
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state import STATE_QUANTITIES
 from jaxbiped.gait._continuation import BranchEnd

@@ -11,8 +11,8 @@ from jaxtyping import PyTree
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
-from jaxbiped._paths import user_path
-from jaxbiped._provenance import provenance
+from jaxbiped._files import user_path
+from jaxbiped._identity import provenance
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search

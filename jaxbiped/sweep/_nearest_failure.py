@@ -7,12 +7,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import as_float
 from jaxbiped.basins._labels import Label
 from jaxbiped.basins._minimal_fatal_shock import FatalShock, minimal_fatal_shock
 from jaxbiped.basins._ray_descent import Normal
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.gait._return_map import return_map
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._attractor import Attractor

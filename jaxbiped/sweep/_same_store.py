@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._identity import difference_of
-from jaxbiped._provenance import DECISIVE
-from jaxbiped._strict_json import strict_json
+from jaxbiped._files import strict_json
+from jaxbiped._identity import DECISIVE, difference_of
 from jaxbiped._types import JsonObject
 
 SETTINGS = "settings"

@@ -10,8 +10,8 @@ import numpy as np
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped._paths import user_path
-from jaxbiped._provenance import provenance
+from jaxbiped._files import user_path
+from jaxbiped._identity import provenance
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label_errors import ERRORS
 from jaxbiped.basins._labels import Label

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, ResourceError
-from jaxbiped._disk_cache import ABANDONED
-from jaxbiped._paths import failure_kind
-from jaxbiped._strict_json import strict_json
+from jaxbiped._files import failure_kind, strict_json
 from jaxbiped._types import JsonObject
+from jaxbiped.caching._disk_cache import ABANDONED
 from jaxbiped.sweep._array_layout import Layout, empty_dataset
 from jaxbiped.sweep._same_store import ALSO, GAITS, SETTINGS, check_same, check_writers
 from jaxbiped.sweep._store import COMPLETE, AbstractStore

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 from jax.flatten_util import ravel_pytree
 from jaxtyping import PyTree, PyTreeDef
 
-from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import AbstractEngine, Program, Recorded, Recording, Request
 from jaxbiped.variational._adjoint_step import Adjoints, adjoint_step
 from jaxbiped.variational._collocated_step import Rows, linearise_about
@@ -137,7 +137,7 @@ class _AdjointSolve:
         self.size = len(row)
 
     def __fingerprint__(self) -> object:
-        """See `jaxbiped._fingerprint`: a row is read as one of a step of this size."""
+        """See `jaxbiped.caching._fingerprint`: a row is read as one of a step of this size."""
         return self.engine, self.flow, self.size
 
     def program(self) -> Program:

@@ -3,8 +3,8 @@
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
-from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import RealScalarLike, Scalar, Time
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import LANES, XLA, AbstractEngine, Program, Recorded, Recording, Request
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._final_step import just_before_end

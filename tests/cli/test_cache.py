@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from jaxbiped._disk_cache import CACHE_VARIABLE, read_entry, write_entry
+from jaxbiped.caching._disk_cache import CACHE_VARIABLE, read_entry, write_entry
 from jaxbiped.cli import main
 
 

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._parameter import parameter_infos
+from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped.cli import _choices
 from jaxbiped.cli import _gait as gait_command
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import pytest
 
-from jaxbiped._disk_cache import CACHE_VARIABLE, _digest
+from jaxbiped.caching._disk_cache import CACHE_VARIABLE, _digest
 
 COMMANDS = (
     ("walk", "--duration", "0.5", "--json", "-"),

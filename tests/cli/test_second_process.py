@@ -11,7 +11,7 @@ import sys
 
 import pytest
 
-from jaxbiped._disk_cache import CACHE_VARIABLE
+from jaxbiped.caching._disk_cache import CACHE_VARIABLE
 
 pytestmark = pytest.mark.slow
 

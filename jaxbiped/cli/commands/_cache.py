@@ -3,8 +3,8 @@
 import dataclasses
 from pathlib import Path
 
-from jaxbiped._disk_cache import BYTES, CACHE_VARIABLE, cache_folder, clear_disk, disk_use
-from jaxbiped._paths import check_writable_file
+from jaxbiped._files import check_writable_file
+from jaxbiped.caching._disk_cache import BYTES, CACHE_VARIABLE, cache_folder, clear_disk, disk_use
 from jaxbiped.cli._report import Report, table
 
 _CONTENT = {

@@ -3,7 +3,7 @@
 import dataclasses
 from pathlib import Path
 
-from jaxbiped._paths import check_writable_file
+from jaxbiped._files import check_writable_file
 
 
 @dataclasses.dataclass(frozen=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 from tyro.conf import Positional
 
 from jaxbiped._checks import ArgumentError, check_count
-from jaxbiped._paths import read_json
+from jaxbiped._files import read_json
 from jaxbiped.cli._option_checks import check_engine, check_gait_accuracy
 from jaxbiped.cli._option_fields import Engine, GaitAccuracy, Group, group
 from jaxbiped.cli._walk_options import OutputOptions, SceneOptions

@@ -6,7 +6,7 @@ Kernels call it only where their own formulae do not hold, which is hardly ever.
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from jaxbiped._caches import bounded_cache
+from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler.codegen._graph_codegen import GraphWriter
 from jaxbiped.compiler.codegen._kernel_target import OWN_LIBRARY, KernelTarget
 from jaxbiped.compiler.codegen._llvm_function import literal

@@ -6,7 +6,7 @@ done, all go through the refill together, in which those that are not keep what 
 
 from typing import NamedTuple
 
-from jaxbiped._caches import bounded_cache
+from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler.codegen._device_library import library_text
 from jaxbiped.compiler.codegen._kernel_target import OWN_LIBRARY, WARP_ANY, KernelTarget
 from jaxbiped.compiler.codegen._lane_kernel import ENTRY

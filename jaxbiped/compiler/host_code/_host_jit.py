@@ -5,10 +5,10 @@ import threading
 from collections.abc import Callable, Hashable
 from typing import Any, Generic, ParamSpec, TypeVar
 
-from jaxbiped import _caches
-from jaxbiped._cached_jit import Arguments, arguments_of, cached_jit
-from jaxbiped._caches import Once, register_programs
 from jaxbiped._debug_switches import without_switches
+from jaxbiped.caching import _caches
+from jaxbiped.caching._cached_jit import Arguments, arguments_of, cached_jit
+from jaxbiped.caching._caches import Once, register_programs
 from jaxbiped.compiler.host_code._host_program import (
     HostProgram,
     read_host_program,

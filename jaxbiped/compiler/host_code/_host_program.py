@@ -12,10 +12,10 @@ from typing import Any, Protocol, runtime_checkable
 import jax
 import numpy as np
 
-from jaxbiped._compiled_store import Skeleton
-from jaxbiped._disk_cache import read_entry, write_entry
-from jaxbiped._fingerprint import fingerprint
-from jaxbiped._long_trace import long_trace
+from jaxbiped.caching._collector_pause import long_trace
+from jaxbiped.caching._compiled_store import Skeleton
+from jaxbiped.caching._disk_cache import read_entry, write_entry
+from jaxbiped.caching._fingerprint import fingerprint
 from jaxbiped.compiler.host_code._control_flow import CONTROL_FLOW
 from jaxbiped.compiler.host_code._host_writer import NAMES, HostWriter, Rule, Value
 from jaxbiped.compiler.host_code._indexing import INDEXING

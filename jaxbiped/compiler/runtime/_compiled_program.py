@@ -93,7 +93,7 @@ class CompiledProgram:
         return CompiledProgram.kept, (self._kernel.digest, self._processor)
 
     def __fingerprint__(self) -> object:
-        """See `jaxbiped._fingerprint`."""
+        """See `jaxbiped.caching._fingerprint`."""
         digest = self._kernel.digest
         return object() if digest is None else (digest, self._processor.name)
 

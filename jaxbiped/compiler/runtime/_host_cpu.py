@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import llvmlite.binding as llvm
 
-from jaxbiped._caches import bounded_cache
 from jaxbiped._environment import VECTOR_VARIABLE, environment_number
+from jaxbiped.caching._caches import bounded_cache
 
 
 class Host(NamedTuple):

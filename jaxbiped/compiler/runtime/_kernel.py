@@ -7,9 +7,9 @@ import jax
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._caches import Once
-from jaxbiped._fingerprint import as_leaves, fingerprint
-from jaxbiped._long_trace import long_trace
+from jaxbiped.caching._caches import Once
+from jaxbiped.caching._collector_pause import long_trace
+from jaxbiped.caching._fingerprint import as_leaves, fingerprint
 from jaxbiped.compiler.codegen._kernel_target import host_target
 from jaxbiped.compiler.codegen._lane_kernel import ENTRY, kernel_text
 from jaxbiped.compiler.codegen._ptx_kernel import (

@@ -6,8 +6,8 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
-from jaxbiped._caches import PROGRAMS, bounded_cache
 from jaxbiped._types import Scalar
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.compiler.passes._vertex_elimination import jacobian
 from jaxbiped.compiler.runtime._compiled_program import HOST, CompiledProgram

@@ -10,8 +10,8 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import Array, PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result
 from jaxbiped.compiler.runtime._program import Program
 from jaxbiped.compiler.runtime._recorded import Recorded

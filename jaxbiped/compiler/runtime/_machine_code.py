@@ -7,8 +7,8 @@ import weakref
 import llvmlite
 import llvmlite.binding as llvm
 
-from jaxbiped._caches import Once
-from jaxbiped._disk_cache import read_entry, write_entry
+from jaxbiped.caching._caches import Once
+from jaxbiped.caching._disk_cache import read_entry, write_entry
 from jaxbiped.compiler.runtime._host_cpu import Host
 
 

@@ -7,7 +7,7 @@ import re
 from importlib.resources import files
 from pathlib import Path
 
-from jaxbiped._paths import check_writable_file
+from jaxbiped._files import check_writable_file
 from jaxbiped._types import JsonObject
 
 _MODULES = (

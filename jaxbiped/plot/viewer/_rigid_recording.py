@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._types import Scalar, as_array, as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._energy import kinetic_and_moment
 from jaxbiped.dynamics._rolling import rolling
 from jaxbiped.dynamics._state import RigidState, check_state, whole_state

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 from equinox import AbstractVar
 
 from jaxbiped._checks import ArgumentError, check_choice, check_type
-from jaxbiped._parameter import check_parameters
+from jaxbiped._parameter_declaration import check_parameters
 from jaxbiped._types import Scalar
 
 LegTorques: TypeAlias = tuple[Scalar, Scalar]

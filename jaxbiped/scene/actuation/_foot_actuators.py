@@ -4,7 +4,7 @@ import dataclasses
 from typing import ClassVar, Self
 
 from jaxbiped._jax_versions import tanh
-from jaxbiped._parameter import parameter
+from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.actuation._abstract_actuator import AbstractActuator
 

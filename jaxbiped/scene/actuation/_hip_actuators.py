@@ -7,7 +7,7 @@ import equinox as eqx
 import jax.numpy as jnp
 
 from jaxbiped._checks import ArgumentError, holds_somewhere
-from jaxbiped._parameter import parameter
+from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.actuation._abstract_actuator import (
     AbstractHipActuator,

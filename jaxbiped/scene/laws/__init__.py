@@ -5,7 +5,7 @@ line below is its registration: `NORMAL_LAWS`, `FRICTION_LAWS` and the command l
 `name`, in the order of the lines.
 """
 
-from jaxbiped._parameter import parameter as parameter
+from jaxbiped._parameter_declaration import parameter as parameter
 from jaxbiped._quantity import Quantity as Quantity
 from jaxbiped.scene._ground import AbstractClearance as AbstractClearance
 from jaxbiped.scene._ground import AlwaysTouching as AlwaysTouching

@@ -6,7 +6,7 @@ from typing import ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 
-from jaxbiped._parameter import check_parameters
+from jaxbiped._parameter_declaration import check_parameters
 from jaxbiped._types import Scalar
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from equinox.internal import ω
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import BoolScalarLike, Scalar, SomeTree, Time
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.rosenbrock._linearisation import (
     AbstractLinearisation,

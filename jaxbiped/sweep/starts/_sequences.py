@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from jaxbiped._caches import bounded_cache
+from jaxbiped.caching._caches import bounded_cache
 
 SAMPLINGS = ("uniform", "latin-hypercube", "sobol", "halton")
 """Ways to draw samples."""

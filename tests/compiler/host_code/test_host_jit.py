@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._cached_jit import cached_jit
-from jaxbiped._disk_cache import CACHE_VARIABLE
+from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.caching._disk_cache import CACHE_VARIABLE
 from jaxbiped.compiler import host_jit
 from jaxbiped.compiler.host_code import _host_jit
 
@@ -77,7 +77,7 @@ def test_shapes_are_known_before_it_runs():
 def test_kept_for_the_next_process(monkeypatch, tmp_path):
     """A gait search, whose host programs hold programs of lanes; XLA compiles none of it."""
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
-    monkeypatch.setattr("jaxbiped._cached_jit.trace_call", _refuse)
+    monkeypatch.setattr("jaxbiped.caching._cached_jit.trace_call", _refuse)
 
     jb.clear_caches()
     first = _rigid_gait()

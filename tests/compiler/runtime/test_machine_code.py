@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped._disk_cache import CACHE_VARIABLE
+from jaxbiped.caching._disk_cache import CACHE_VARIABLE
 from jaxbiped.compiler.runtime import _machine_code
 from tests.compiler.one_shot import compiled
 

@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 import jax.numpy as jnp
 
 from jaxbiped._checks import check_positive
-from jaxbiped._parameter import parameter
+from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene.laws._abstract_laws import AbstractBristleLaw
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 
 from jaxbiped._checks import check_positive
 from jaxbiped._jax_versions import tanh
-from jaxbiped._parameter import check_parameters, parameter
+from jaxbiped._parameter_declaration import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
 from jaxbiped.scene.laws._abstract_laws import AbstractFrictionLaw
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay

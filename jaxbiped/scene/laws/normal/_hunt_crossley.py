@@ -12,7 +12,7 @@ from typing import ClassVar, Self
 import jax.numpy as jnp
 
 from jaxbiped._checks import check_choice, check_positive, check_within
-from jaxbiped._parameter import parameter
+from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene.laws._abstract_laws import (
     depth_in_contact,

@@ -4,7 +4,7 @@ from typing import ClassVar, Self
 
 import jax.numpy as jnp
 
-from jaxbiped._parameter import parameter
+from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar
 from jaxbiped.scene.laws._abstract_laws import depth_in_contact, hertz_energy, hertz_force, pushing
 from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 
 import jax.numpy as jnp
 
-from jaxbiped._cached_jit import kept_alone
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ from typing import Any
 
 import equinox as eqx
 
-from jaxbiped._parameter_info import ParameterInfo
-from jaxbiped._quantity import Quantity
+from jaxbiped._quantity import ParameterInfo, Quantity
 from jaxbiped._types import Parameter, Scalar, as_float
 
 _KEY = "parameter"

@@ -21,9 +21,9 @@ import jax
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._caches import bounded_cache
-from jaxbiped._clock import IMPORT_BEGAN_AT
-from jaxbiped._source_digest import SourceDigests
+from jaxbiped.caching._caches import bounded_cache
+from jaxbiped.caching._import_time import IMPORT_BEGAN_AT
+from jaxbiped.caching._source_digest import SourceDigests
 
 _PACKAGE = "jaxbiped"
 _LIBRARIES = (
@@ -212,7 +212,7 @@ def _source_of(module: Any) -> str:
 
 @bounded_cache(1)
 def _sources() -> SourceDigests:
-    return SourceDigests(Path(__file__).parent, loaded=IMPORT_BEGAN_AT)
+    return SourceDigests(Path(__file__).parents[1], loaded=IMPORT_BEGAN_AT)
 
 
 def settings() -> tuple[object, ...]:

@@ -1,8 +1,10 @@
-"""Paths that a user gives: read and checked, "~" expanded, one clear sentence each."""
+"""Files: paths that a user gives, checked; and JSON, read and written as its standard has it."""
 
 import errno
 import json
+import math
 import os
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -71,3 +73,32 @@ def check_writable_file(name: str, path: str | Path) -> Path:
             f"{name} = {str(path)!r} cannot be written: its folder must exist and be writable."
         )
     return path
+
+
+def strict_json(
+    value: object, *, indent: int | None = None, unknown: Callable[[float], Any] = lambda _: None
+) -> str:
+    """A value as JSON.
+
+    Args:
+        value: plain values, arrays and numbers of NumPy, in mappings and sequences.
+        indent: of each level; all on one line unless given.
+        unknown: what stands for a number that is not finite; null unless given.
+
+    Returns:
+        The text, without a line's end.
+    """
+    plain = _plain(value, unknown)
+    return json.dumps(plain, indent=indent, ensure_ascii=False, allow_nan=False)
+
+
+def _plain(value: Any, unknown: Callable[[float], Any]) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each, unknown) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each, unknown) for each in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist(), unknown)
+    if isinstance(value, float) and not math.isfinite(value):
+        return unknown(value)
+    return value

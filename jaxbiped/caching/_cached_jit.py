@@ -14,14 +14,14 @@ import jax
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped import _caches
-from jaxbiped._caches import Once, register_programs
-from jaxbiped._compiled_store import CompiledCall, Skeleton, read_call, trace_call
 from jaxbiped._debug_switches import without_switches
-from jaxbiped._disk_cache import cache_folder
-from jaxbiped._fingerprint import fingerprint, settings
 from jaxbiped._jax_versions import nothing_is_traced
-from jaxbiped._long_trace import long_trace
+from jaxbiped.caching import _caches
+from jaxbiped.caching._caches import Once, register_programs
+from jaxbiped.caching._collector_pause import long_trace
+from jaxbiped.caching._compiled_store import CompiledCall, Skeleton, read_call, trace_call
+from jaxbiped.caching._disk_cache import cache_folder
+from jaxbiped.caching._fingerprint import fingerprint, settings
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")

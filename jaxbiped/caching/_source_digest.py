@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from jaxbiped._disk_cache import read_entry, write_entry
+from jaxbiped.caching._disk_cache import read_entry, write_entry
 
 _KIND = "sources"
 _SETTLED = 1_000_000_000

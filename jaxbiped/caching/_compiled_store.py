@@ -14,11 +14,11 @@ import jax
 import jax.tree_util as jtu
 from jax.experimental import serialize_executable
 
-from jaxbiped._disk_cache import read_entry, write_entry
-from jaxbiped._fingerprint import Leaf, leaf_of
 from jaxbiped._host_call import TARGET, HostCall, host_call, lowered_host_calls
 from jaxbiped._jax_versions import custom_call_targets, load_lapack
-from jaxbiped._long_trace import long_trace
+from jaxbiped.caching._collector_pause import long_trace
+from jaxbiped.caching._disk_cache import read_entry, write_entry
+from jaxbiped.caching._fingerprint import Leaf, leaf_of
 
 _KIND = "xla"
 _LAPACK = "lapack_"
