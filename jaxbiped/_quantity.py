@@ -15,6 +15,7 @@ from jaxbiped._checks import (
 )
 
 _EXPONENT = re.compile(r"\^([\w.]+)")
+_BASES, _PLAIN = ("m", "s"), ("rad", "1")
 _SUPERSCRIPTS = dict(zip("0123456789n", "⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ", strict=True))
 
 
@@ -40,6 +41,19 @@ class Quantity(NamedTuple):
     def unit_in_figure(self) -> str:
         """The unit as figures show it, "N s/m²"; "–" for a pure number."""
         return _EXPONENT.sub(_in_figure, self.unit) or "–"
+
+    @property
+    def length_and_time(self) -> tuple[float, float]:
+        """Powers of the metre and of the second in the unit, which has no mass in it."""
+        powers = [0.0, 0.0]
+        for sign, part in zip((1.0, -1.0), f"{self.unit}/".split("/"), strict=False):
+            for factor in part.split():
+                base, _, power = factor.partition("^")
+                if base in _BASES:
+                    powers[_BASES.index(base)] += sign * float(power or 1.0)
+                elif base not in _PLAIN:
+                    raise ValueError(f"{self.unit!r} is not made of lengths and times alone")
+        return powers[0], powers[1]
 
     def in_row(self) -> str:
         """Words and symbol."""

@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError, check_finite, check_type
-from jaxbiped._quantity import Quantity
 from jaxbiped._types import Scalar, VectorField, as_float, by_numpy
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -262,18 +261,3 @@ def rigid_state(state: State) -> RigidState:
         Hip place, angles and rates, leaves shaped as the state's.
     """
     return RigidState(state.hip_x, state.theta_1, state.theta_2, state.omega_1, state.omega_2)
-
-
-STATE_QUANTITIES = {
-    "hip_x": Quantity("hip along the slope", r"$x_S$", "m"),
-    "hip_z": Quantity("hip above the slope", r"$z_S$", "m"),
-    "hip_vx": Quantity("hip velocity along the slope", r"$\dot x_S$", "m/s"),
-    "hip_vz": Quantity("hip velocity off the slope", r"$\dot z_S$", "m/s"),
-    "theta_1": Quantity("angle of leg 1", r"$\theta_1$", "rad"),
-    "theta_2": Quantity("angle of leg 2", r"$\theta_2$", "rad"),
-    "omega_1": Quantity("rate of leg 1", r"$\omega_1$", "rad/s"),
-    "omega_2": Quantity("rate of leg 2", r"$\omega_2$", "rad/s"),
-    "bristle_1": Quantity("bristles of foot 1", r"$b_1$"),
-    "bristle_2": Quantity("bristles of foot 2", r"$b_2$"),
-}
-"""By the names that `State`, `BristleState` and `RigidState` give them."""

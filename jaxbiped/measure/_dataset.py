@@ -13,7 +13,7 @@ from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._feet import feet, touches
 from jaxbiped.dynamics._redundant_motion import violation
 from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
-from jaxbiped.dynamics._state import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory

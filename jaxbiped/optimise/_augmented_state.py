@@ -22,7 +22,9 @@ def _augmented(walker: Any, names: tuple[str, ...]) -> Any:
         fields: Any = namedtuple("_Augmented", (place, *names, *recurring))  # type: ignore[misc]
         # By this other processes know it, see `jaxbiped.caching._fingerprint`.
         made_by = (_augmented, walker, names)
-        own = {"__slots__": (), "__made_by__": made_by, "__reduce__": _taken_apart}
+        own: dict[str, Any] = {"__slots__": (), "__made_by__": made_by, "__reduce__": _taken_apart}
+        # Whatever they are, their errors count in SI units.
+        own["own_units"] = getattr(walker, "own_units", {}) | dict.fromkeys(names, "")
         _KINDS.setdefault((walker, names), type("_Augmented", (fields,), own))
     return _KINDS[walker, names]
 

@@ -15,7 +15,7 @@ from jaxbiped.continuation._bifurcation_curve import BifurcationCurve
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import BranchPoint
-from jaxbiped.dynamics._state import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.plot._symbols import NORMAL_FORCE
 from jaxbiped.plot.style import GROUND_COLOUR, axes_or_new, dress, figure_of, legend_below
 from jaxbiped.scene._parameter_access import parameter_quantities

@@ -5,7 +5,7 @@ Symbols are the paper's; those of laws that it does not have are the ones of the
 
 from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped._quantity import Quantity
-from jaxbiped.dynamics._state import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS

@@ -17,7 +17,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._state import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait

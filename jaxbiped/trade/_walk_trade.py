@@ -1,6 +1,5 @@
 """Trade of a walk: state at its end, times of its heel strikes and energy ledger, against cost."""
 
-import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -8,12 +7,13 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
-from jaxbiped.dynamics._state import State
+from jaxbiped.dynamics._state import MinimalState, State
 from jaxbiped.measure._energy_ledger import energy_ledger
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulation import CompiledSimulation, Simulation
 from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.solve._units import sizes_of
 from jaxbiped.trade._reference_solution import Truth, Values, truth_of
 from jaxbiped.trade._study_row import OK, Row, Way, failed_row, row_of, work_of
 
@@ -77,22 +77,16 @@ class WalkTrade(NamedTuple):
 
     def in_units(self, walk: Trajectory) -> np.ndarray:
         """The state at the end in l, √(l/g) and their quotients, shape (8,) or longer."""
-        return np.array([float(x) for x in walk.final]) / self.units(walk.final._fields)
+        return np.array([float(x) for x in walk.final]) / self.units(walk.final)
 
-    def units(self, names: tuple[str, ...] = State._fields) -> np.ndarray:
-        """Units of the state's components: l, rad, l/√(l/g), 1/√(l/g); 1 of bristles."""
-        length, time = float(self.scene.walker.l), self.time_unit()
-        units = dict.fromkeys(("hip_x", "hip_z"), length)
-        units |= dict.fromkeys(("hip_vx", "hip_vz"), length / time)
-        units |= dict.fromkeys(("omega_1", "omega_2"), 1.0 / time)
-        return np.array([units.get(name, 1.0) for name in names])
-
-    def time_unit(self) -> float:
-        """√(l/g) [s]."""
-        return math.sqrt(float(self.scene.walker.l) / float(self.scene.ground.g))
+    def units(self, state: MinimalState | None = None) -> np.ndarray:
+        """Units of a state's components, of the start's unless given: see `sizes_of`."""
+        _, sizes = sizes_of(self.scene, self.start if state is None else state)
+        return np.array(sizes)
 
     def _books(self, walk: Trajectory) -> dict[str, np.ndarray]:
         ledger = energy_ledger(self.scene, walk)
+        time_unit, _ = sizes_of(self.scene, walk.final)
         shares = (
             ledger.gravity_work,
             ledger.damper_loss,
@@ -100,7 +94,7 @@ class WalkTrade(NamedTuple):
             ledger.stored_change,
         )
         return {
-            "step_time": heel_strikes(self.scene, walk).time_s / self.time_unit(),
+            "step_time": heel_strikes(self.scene, walk).time_s / time_unit,
             "energy": np.array([float(each[0]) for each in shares]),
         }
 

@@ -1,6 +1,7 @@
 """A walker of any size, against the seed's: as exact, in the same steps."""
 
 import dataclasses
+from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -48,12 +49,25 @@ def test_the_units_of_the_seed_are_one():
         assert [float(each) for each in units.inverse] == [1.0] * 8
 
 
+def test_a_leaf_of_no_known_unit_is_refused():
+    class Odd(NamedTuple):
+        hip_x: float = 0.0
+        mood: float = 0.0
+
+    with pytest.raises(TypeError, match=r"Odd\.mood is not known"):
+        units_of(SEED, Odd())
+
+
 def test_units_have_the_dimensions_of_what_they_measure():
     scene, start, expected = sized(2.0**-10, 2.0**-5)
     units = units_of(scene, start)
     np.testing.assert_allclose(1.0 / np.array(units.inverse), expected, rtol=1e-15)
     np.testing.assert_allclose(recurring_inverse_units(scene, 7), 1.0 / expected[1:], rtol=1e-15)
     assert float(units.time) == 2.0**-5
+    legs = jb.dynamics.redundant_state(jb.RedundantScene(scene), start)
+    by_name = units_of(jb.RedundantScene(scene), legs).inverse._asdict()
+    assert by_name["vx_2"] == units.inverse.hip_vx
+    assert by_name["x_1"] == units.inverse.hip_x
     still = dataclasses.replace(scene, ground=jb.Ground(slope=0.02, g=0.0))
     assert np.isfinite(np.array(units_of(still, start).inverse)).all()
 

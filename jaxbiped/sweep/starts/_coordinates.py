@@ -7,7 +7,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import check_choice
 from jaxbiped._quantity import Quantity
-from jaxbiped.dynamics._state import STATE_QUANTITIES, BristleState, RigidState, State, state_type
+from jaxbiped.dynamics._state import BristleState, RigidState, State, state_type
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities
 from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
 
