@@ -26,7 +26,7 @@ from jaxbiped.caching._caches import clear_caches as clear_caches
 # What is modelled.
 from jaxbiped.scene._ground import Ground as Ground
 from jaxbiped.scene._ready_scenes import ladder as ladder
-from jaxbiped.scene._linkage_scene import LinkageScene as LinkageScene
+from jaxbiped.scene._walker import LinkageScene as LinkageScene
 from jaxbiped.scene._parameter_access import parameter_names as parameter_names
 from jaxbiped.scene._parameter_access import parameter_quantities as parameter_quantities
 from jaxbiped.scene._parameter_access import parameter_values as parameter_values
@@ -36,7 +36,7 @@ from jaxbiped.scene._scene import RigidScene as RigidScene
 from jaxbiped.scene._scene import Scene as Scene
 from jaxbiped.scene._ready_scenes import seed_scene as seed_scene
 from jaxbiped.scene._walker import Walker as Walker
-from jaxbiped.scene._linkage_scene import walker_linkage as walker_linkage
+from jaxbiped.scene._walker import walker_linkage as walker_linkage
 
 # States and the sections that they cross.
 from jaxbiped.dynamics._section import HeelStrike as HeelStrike

@@ -1,6 +1,5 @@
 """Continuation of gaits in a parameter: branches, bifurcations, and what branches off there."""
 
-from jaxbiped.continuation._axis import Axis as Axis
 from jaxbiped.continuation._bifurcation_curve import BifurcationCurve as BifurcationCurve
 from jaxbiped.continuation._bifurcation_curve import bifurcation_curve as bifurcation_curve
 from jaxbiped.continuation._bifurcation_sensitivities import (
@@ -13,6 +12,7 @@ from jaxbiped.continuation._bifurcations import BifurcationPoint as BifurcationP
 from jaxbiped.continuation._bifurcations import BranchEvent as BranchEvent
 from jaxbiped.continuation._branch import Branch as Branch
 from jaxbiped.continuation._branch import open_branch as open_branch
+from jaxbiped.continuation._branch_point import Axis as Axis
 from jaxbiped.continuation._branch_point import BranchPoint as BranchPoint
 from jaxbiped.continuation._continue_gait import resume_branch as resume_branch
 from jaxbiped.continuation._deflation import IsolatedGait as IsolatedGait

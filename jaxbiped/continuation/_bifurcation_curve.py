@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive, check_type
-from jaxbiped.continuation._axis import Axis, axis_of
 from jaxbiped.continuation._bifurcations import (
     BifurcationPoint,
     BranchEvent,
@@ -18,7 +17,14 @@ from jaxbiped.continuation._bifurcations import (
     multiplier_test,
 )
 from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._branch_point import BranchPoint, branch_point, change_of, multipliers_of
+from jaxbiped.continuation._branch_point import (
+    Axis,
+    BranchPoint,
+    axis_of,
+    branch_point,
+    change_of,
+    multipliers_of,
+)
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
 from jaxbiped.continuation._trace import BOUND, BranchStop, is_bound, leaves_range, reason_of
 from jaxbiped.gait._continuation import BranchEnd

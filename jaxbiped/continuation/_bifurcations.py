@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._branch_point import (
+    Axis,
     BranchPoint,
     branch_point,
     multipliers_of,

@@ -11,9 +11,8 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
 from jaxbiped._identity import difference_of
 from jaxbiped._types import as_float
-from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
-from jaxbiped.continuation._branch_point import BranchPoint
+from jaxbiped.continuation._branch_point import Axis, BranchPoint
 from jaxbiped.continuation._trace import BranchStop
 from jaxbiped.dynamics._state import BristleState, RigidState, State, WalkerState
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES

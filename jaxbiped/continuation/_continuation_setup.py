@@ -7,9 +7,8 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_unbatched
 from jaxbiped._types import as_float
-from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._branch_point import BranchPoint, branch_point, gait_curve
+from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point, gait_curve
 from jaxbiped.continuation._cycle import CycleProblem
 from jaxbiped.continuation._trace import Trace, limit_cause
 from jaxbiped.dynamics._state import RigidState, WalkerState, check_state, state_for

@@ -9,10 +9,9 @@ from tqdm import tqdm
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive, check_within
 from jaxbiped._progress import stage
 from jaxbiped._types import as_float
-from jaxbiped.continuation._axis import Axis, axis_of, start_of
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._branch_point import BranchPoint
+from jaxbiped.continuation._branch_point import Axis, BranchPoint, axis_of, start_of
 from jaxbiped.continuation._continuation_setup import (
     ContinuationSetup,
     check_followed,

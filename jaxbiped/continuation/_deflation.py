@@ -16,8 +16,7 @@ from jaxbiped._checks import (
     check_count,
 )
 from jaxbiped._progress import stage
-from jaxbiped.continuation._axis import axis_of
-from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint
+from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint, axis_of
 from jaxbiped.continuation._continuation_setup import (
     ContinuationSetup,
     check_followed,

@@ -7,7 +7,6 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from jaxbiped._ending import Ending
-from jaxbiped.continuation._axis import Axis
 from jaxbiped.continuation._bifurcations import (
     BifurcationPoint,
     BranchEvent,
@@ -15,7 +14,7 @@ from jaxbiped.continuation._bifurcations import (
     explains,
     not_located,
 )
-from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint, branch_point
+from jaxbiped.continuation._branch_point import NO_WALK, Axis, BranchPoint, branch_point
 from jaxbiped.dynamics._contact_forces import contacts
 from jaxbiped.dynamics._state import State, WalkerState
 from jaxbiped.gait._continuation import BranchEnd

@@ -12,7 +12,7 @@ from jaxbiped.scene.actuation._abstract_actuator import (
     HipMotion,
     LegTorques,
 )
-from jaxbiped.scene.actuation._foot_actuators import FootPreload
+from jaxbiped.scene.actuation._actuators import FootPreload
 
 WalkerScene: TypeAlias = CompliantScene | RigidScene
 """A walker that may be driven."""

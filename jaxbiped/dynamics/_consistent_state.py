@@ -9,7 +9,7 @@ from jaxbiped._checks import ArgumentError, holds_somewhere
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
-from jaxbiped.constraints._linkage_constraints import masses_of
+from jaxbiped.constraints._linkage import masses_of
 from jaxbiped.constraints._projection import correct_step, nearest_consistent
 from jaxbiped.dynamics._redundant_motion import (
     Violation,

@@ -11,7 +11,7 @@ from jaxbiped.dynamics._actuation import actuators_of
 from jaxbiped.dynamics._rolling import Support, inertia_of, support_of
 from jaxbiped.dynamics._state import RigidState
 from jaxbiped.scene._scene import RigidScene
-from jaxbiped.scene.actuation._foot_actuators import PushOff
+from jaxbiped.scene.actuation._actuators import PushOff
 
 
 class Impulse(NamedTuple):

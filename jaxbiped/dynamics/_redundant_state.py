@@ -8,8 +8,8 @@ from jaxbiped._circular import sine_cosine
 from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._state import BristleState, MinimalState, State, state_type
-from jaxbiped.scene._linkage_scene import leg_of
 from jaxbiped.scene._scene import AbstractScene, RedundantScene
+from jaxbiped.scene._walker import leg_of
 
 if TYPE_CHECKING:
     from typing_extensions import TypeIs

@@ -12,7 +12,6 @@ import numpy as np
 
 from jaxbiped._checks import check_choice
 from jaxbiped._types import as_float
-from jaxbiped.continuation._axis import Axis, axis_of, start_of
 from jaxbiped.continuation._bifurcation_sensitivities import fold_forcing
 from jaxbiped.continuation._bifurcations import (
     BifurcationPoint,
@@ -20,6 +19,7 @@ from jaxbiped.continuation._bifurcations import (
     advance,
     locate_near,
 )
+from jaxbiped.continuation._branch_point import Axis, axis_of, start_of
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
 from jaxbiped.continuation._nearest_bifurcation import range_of
 from jaxbiped.continuation._trace import LIMITS, Trace, trace

@@ -16,10 +16,11 @@ from jaxbiped.plot._branch import bifurcation_curves as bifurcation_curves
 from jaxbiped.plot._branch import branch as branch
 from jaxbiped.plot._contact_forces import contact_forces as contact_forces
 from jaxbiped.plot._fractions import basin_fractions as basin_fractions
+from jaxbiped.plot._gait_charts import elasticities as elasticities
+from jaxbiped.plot._gait_charts import multipliers as multipliers
 from jaxbiped.plot._laws import bristle_law as bristle_law
 from jaxbiped.plot._laws import friction_law as friction_law
 from jaxbiped.plot._laws import normal_law as normal_law
-from jaxbiped.plot._multipliers import multipliers as multipliers
 from jaxbiped.plot._phase_portrait import gait_orbit as gait_orbit
 from jaxbiped.plot._phase_portrait import phase_portrait as phase_portrait
 from jaxbiped.plot._refined_basin import refined_basin as refined_basin
@@ -27,7 +28,6 @@ from jaxbiped.plot._strobe import gait_strobe as gait_strobe
 from jaxbiped.plot._time_series import leg_angles as leg_angles
 from jaxbiped.plot._time_series import penetrations as penetrations
 from jaxbiped.plot._time_series import rigid_leg_angles as rigid_leg_angles
-from jaxbiped.plot._tornado import elasticities as elasticities
 from jaxbiped.plot._work_precision import constraint_runs as constraint_runs
 from jaxbiped.plot._work_precision import work_precision as work_precision
 from jaxbiped.plot.viewer._basin_view import BasinView as BasinView

@@ -12,7 +12,7 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Numbers
 from jaxbiped.gait._gait import Gait
 from jaxbiped.measure._footsteps import heel_strikes
-from jaxbiped.plot._multipliers import check_drawable
+from jaxbiped.plot._gait_charts import check_drawable
 from jaxbiped.plot._samples import sample
 from jaxbiped.plot._symbols import LEG_ANGLE, LEG_RATE
 from jaxbiped.plot.style import (

@@ -12,8 +12,7 @@ from jaxbiped.constraints._constraint_method import AbstractConstraintMethod
 from jaxbiped.constraints._constraint_methods import Index1, method_named
 from jaxbiped.constraints._linkage import ORIENTATIONS, Linkage
 from jaxbiped.scene._ground import AbstractClearance, Ground, StanceRotation
-from jaxbiped.scene._linkage_scene import walker_linkage
-from jaxbiped.scene._walker import Walker
+from jaxbiped.scene._walker import Walker, walker_linkage
 from jaxbiped.scene.actuation._abstract_actuator import Actuation, actuation_of, check_actuation
 from jaxbiped.scene.laws._abstract_laws import (
     AbstractBristleLaw,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.constraints._linkage_constraints import constraints_of, masses_of
+from jaxbiped.constraints._linkage import constraints_of, masses_of
 
 SCENE = jb.RedundantScene(jb.seed_scene())
 

@@ -10,14 +10,14 @@ from jaxbiped.scene.actuation._abstract_actuator import AbstractPhaseTorque as A
 from jaxbiped.scene.actuation._abstract_actuator import HipMotion as HipMotion
 
 # At the hip.
-from jaxbiped.scene.actuation._hip_actuators import HipSpring as HipSpring
-from jaxbiped.scene.actuation._hip_actuators import HipTorque as HipTorque
-from jaxbiped.scene.actuation._hip_actuators import HipPulse as HipPulse
-from jaxbiped.scene.actuation._hip_actuators import HipSpline as HipSpline
+from jaxbiped.scene.actuation._actuators import HipSpring as HipSpring
+from jaxbiped.scene.actuation._actuators import HipTorque as HipTorque
+from jaxbiped.scene.actuation._actuators import HipPulse as HipPulse
+from jaxbiped.scene.actuation._actuators import HipSpline as HipSpline
 
 # At the feet: rigid ones, compliant ones.
-from jaxbiped.scene.actuation._foot_actuators import PushOff as PushOff
-from jaxbiped.scene.actuation._foot_actuators import FootPreload as FootPreload
+from jaxbiped.scene.actuation._actuators import PushOff as PushOff
+from jaxbiped.scene.actuation._actuators import FootPreload as FootPreload
 
 # What is made of them: behind the parts, which the catalogue looks up here.
 from jaxbiped.scene.actuation._catalogue import ACTUATORS as ACTUATORS
