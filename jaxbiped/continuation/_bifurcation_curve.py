@@ -25,7 +25,7 @@ from jaxbiped.continuation._branch_point import (
     change_of,
     multipliers_of,
 )
-from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
+from jaxbiped.continuation._continuation_setup import ContinuationSetup, setup_of
 from jaxbiped.continuation._trace import BOUND, BranchStop, is_bound, leaves_range, reason_of
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._pseudo_arclength import (
@@ -117,9 +117,7 @@ def bifurcation_curve(
     own = float(parameter_values(branch.scene)[along])
     if not second.first <= own <= second.last:
         raise ArgumentError(f"bounds = {bounds!r} is not allowed: {along} = {own:g} is outside.")
-    setup = continuation_setup(
-        branch.scene, branch.axis, footsteps=branch.footsteps, accuracy=accuracy, engine=engine
-    )
+    setup = setup_of(branch, accuracy=accuracy, engine=engine)
     curve = _extended_curve(setup, second, bifurcation.kind)
     begin = correct(
         curve,

@@ -13,7 +13,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_choice, check_type
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
+from jaxbiped.continuation._continuation_setup import ContinuationSetup, setup_of
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.scene._parameter_access import parameter_values, select_parameters, with_parameters
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
@@ -95,13 +95,7 @@ def _of_fold(
     branch: Branch, fold: BifurcationPoint, names: tuple[str, ...], accuracy: str
 ) -> list[np.ndarray]:
     """Of the fine and of the looser solve, each of shape (p + 1,)."""
-    setup = continuation_setup(
-        branch.scene,
-        branch.axis,
-        footsteps=branch.footsteps,
-        accuracy=accuracy,
-        engine=branch.engine,
-    )
+    setup = setup_of(branch, accuracy=accuracy)
     rows = fold_forcing(setup, fold.point.recurring, fold.value, names)
     if rows is None:
         raise ArgumentError(

@@ -1,6 +1,6 @@
 """Setup of a continuation: whose gaits are followed along which axis, and how exactly."""
 
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import jax.tree_util as jtu
 import numpy as np
@@ -117,6 +117,12 @@ def continuation_setup(
     spec = walking_spec(scene, section, solver, runs_on, steps=1, most=most)
     problem = CycleProblem(spec, scene, like, precision_of(accuracy, scene))
     return ContinuationSetup(scene, axis, footsteps, accuracy, problem)
+
+
+def setup_of(branch: Branch, **others: Any) -> ContinuationSetup:
+    """The setup by which a branch was followed, with other settings where these are given."""
+    own = {name: getattr(branch, name) for name in ("axis", "footsteps", "accuracy", "engine")}
+    return continuation_setup(branch.scene, **own | others)
 
 
 def checked_start(scene: Scene | RigidScene, start: object) -> WalkerState:

@@ -17,6 +17,7 @@ from jaxbiped.continuation._continuation_setup import (
     check_followed,
     checked_start,
     continuation_setup,
+    setup_of,
 )
 from jaxbiped.continuation._trace import LIMITS, BranchStop, Trace, trace
 from jaxbiped.dynamics._state import WalkerState
@@ -202,13 +203,7 @@ def resume_branch(
     limits = (old.first, old.last) if bounds is None else bounds
     axis = axis_of(branch.scene, old.name, limits, old.log)
     check_within(f"{old.name} at {at}", branch.points[at].value, axis.first, axis.last)
-    setup = continuation_setup(
-        branch.scene,
-        axis,
-        footsteps=branch.footsteps,
-        accuracy=branch.accuracy,
-        engine=branch.engine,
-    )
+    setup = setup_of(branch, axis=axis)
     forward = direction == "forward"
     kept = branch.points[: at + 1] if forward else branch.points[at:]
     points = [_rescaled(point, old, axis) for point in kept]

@@ -11,7 +11,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_count, check_positive, check_type
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
+from jaxbiped.continuation._continuation_setup import ContinuationSetup, setup_of
 from jaxbiped.continuation._trace import BranchStop, Trace, trace
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._pseudo_arclength import CurvePoint, correct
@@ -141,13 +141,7 @@ def _switched(
     until: BranchEvent | None = None,
     near: float = _NEAR,
 ) -> Branch:
-    setup = continuation_setup(
-        branch.scene,
-        branch.axis,
-        footsteps=2 * branch.footsteps,
-        accuracy=branch.accuracy,
-        engine=branch.engine,
-    )
+    setup = setup_of(branch, footsteps=2 * branch.footsteps)
     begin = _doubled(setup, branch.footsteps, doubling, near)
     if begin is None:
         raise ArgumentError(

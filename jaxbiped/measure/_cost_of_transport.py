@@ -105,9 +105,6 @@ def _compliant(
     driven = np.zeros(count)
     if scene.actuation is not None:
         flows = sample(scene, walk, powers, ends)
-        interval = np.searchsorted(ends, 0.5 * (flows.edges[1:] + flows.edges[:-1])) - 1
-        inside = (interval >= 0) & (interval < count)
         for power in flows.values.motors:
-            work = flows.positive_integral(power)
-            driven += np.bincount(interval[inside], work[inside], minlength=count)
+            driven += flows.totals(flows.positive_integral(power), ends)
     return np.diff(place), gravity, driven

@@ -80,12 +80,9 @@ def energy_ledger(
     ends = np.asarray(trajectory.t)[[0, -1]] if times is None else np.asarray(times)
     held = evaluate_at(scene, trajectory, energies, ends)
     flows = sample(scene, trajectory, powers, ends)
-    interval = np.searchsorted(ends, 0.5 * (flows.edges[1:] + flows.edges[:-1])) - 1
-    inside = (interval >= 0) & (interval < len(ends) - 1)
 
     def between(power: np.ndarray) -> np.ndarray:
-        work = flows.integral(power)
-        return np.bincount(interval[inside], work[inside], minlength=len(ends) - 1)
+        return flows.totals(flows.integral(power), ends)
 
     gravity = -np.diff(held.gravitational)
     damper = between(flows.values.indentation) - np.diff(held.elastic)

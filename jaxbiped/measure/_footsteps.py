@@ -121,7 +121,6 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
     place = np.where(foot == 1, both.foot_1.x, both.foot_2.x)
     period, length = np.diff(time), np.diff(place)
     loads = sample(scene, trajectory, contacts, time)
-    step = np.searchsorted(time, 0.5 * (loads.edges[1:] + loads.edges[:-1])) - 1
     ledger = energy_ledger(scene, trajectory, time)
     own = jax.tree_util.tree_map(np.asarray, (scene.walker, scene.ground))
     weight = float(own[0].total_mass * own[1].g)
@@ -130,8 +129,8 @@ def footsteps(scene: Scene, trajectory: Trajectory) -> Footsteps:
         period_s=period,
         length_m=length,
         speed_m_s=length / period,
-        peak_normal_N=_largest(_normal(loads.values), step, count),
-        max_penetration_m=_largest(_depth(loads.values), step, count),
+        peak_normal_N=_largest(_normal(loads.values), loads, time),
+        max_penetration_m=_largest(_depth(loads.values), loads, time),
         double_support_s=_double_support(scene, trajectory, time, loads),
         cost_of_transport=(ledger.damper_loss + ledger.friction_loss) / (weight * length),
         energy_residual_J=ledger.residual,
@@ -156,10 +155,10 @@ def _depth(now: Contacts) -> np.ndarray:
     return np.maximum(*depths)
 
 
-def _largest(values: np.ndarray, step: np.ndarray, count: int) -> np.ndarray:
+def _largest(values: np.ndarray, loads: Samples, time: np.ndarray) -> np.ndarray:
     """The largest value in each footstep."""
-    largest = np.zeros(count)
-    inside = (step >= 0) & (step < count)
+    largest = np.zeros(len(time) - 1)
+    step, inside = loads.stretches(time)
     np.maximum.at(largest, step[inside], values[inside].max(axis=1))
     return largest
 

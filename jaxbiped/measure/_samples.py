@@ -54,6 +54,16 @@ class Samples(NamedTuple):
             found[row] = halves[row] * parts[parts > 0.0].sum()
         return found
 
+    def stretches(self, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Which stretch between consecutive ends [s] each interval lies in, and whether in any."""
+        stretch = np.searchsorted(ends, 0.5 * (self.edges[1:] + self.edges[:-1])) - 1
+        return stretch, (stretch >= 0) & (stretch < len(ends) - 1)
+
+    def totals(self, integrals: np.ndarray, ends: np.ndarray) -> np.ndarray:
+        """Of integrals over the intervals those over the stretches between n + 1 ends, (n,)."""
+        stretch, inside = self.stretches(ends)
+        return np.bincount(stretch[inside], integrals[inside], minlength=len(ends) - 1)
+
 
 def sample(
     scene: Scene,

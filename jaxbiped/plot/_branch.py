@@ -167,12 +167,7 @@ def _legend(ax: Axes, given: list[Branch], kinds: list[BranchEvent], counts: lis
     ]
     if len(counts) > 1:
         handles += [
-            Line2D(
-                [],
-                [],
-                color=_COLOURS[k % len(_COLOURS)],
-                label=f"{count} footstep" + "s" * (count > 1),
-            )
+            Line2D([], [], color=_COLOURS[k % len(_COLOURS)], label=_footsteps(count))
             for k, count in enumerate(counts)
         ]
     handles += [
