@@ -81,16 +81,16 @@ from jaxbiped.identify._fit_gait import fit_gait as fit_gait
 
 # Basins and sweeps.
 from jaxbiped.sweep._attractor import Attractor as Attractor
-from jaxbiped.sweep._cluster import cluster_executor as cluster_executor
-from jaxbiped.sweep._cluster import local_executor as local_executor
-from jaxbiped.sweep._family import Family as Family
+from jaxbiped.sweep._workers import cluster_executor as cluster_executor
+from jaxbiped.sweep._workers import local_executor as local_executor
+from jaxbiped.sweep._gait_family import Family as Family
 from jaxbiped.sweep._gait_sweep import gait_sweep as gait_sweep
-from jaxbiped.sweep._label_at import label_at as label_at
-from jaxbiped.sweep._labelled import Labelled as Labelled
+from jaxbiped.sweep._label_function import label_at as label_at
+from jaxbiped.sweep._follow_starts import Labelled as Labelled
 from jaxbiped.sweep._labelling import Labelling as Labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure as nearest_failure
-from jaxbiped.sweep._prepare import labelling as labelling
-from jaxbiped.sweep._prepare import with_gaits_met as with_gaits_met
+from jaxbiped.sweep._labelling_preparation import labelling as labelling
+from jaxbiped.sweep._labelling_preparation import with_gaits_met as with_gaits_met
 from jaxbiped.sweep._sweep import sweep as sweep
 
 # Optimisation.

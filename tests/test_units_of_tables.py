@@ -7,7 +7,7 @@ from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.optimise._objectives import OBJECTIVES
 from jaxbiped.plot import _branch, _symbols
 from jaxbiped.solve._units import units_of
-from jaxbiped.sweep._array_layout import FIELDS
+from jaxbiped.sweep._stored_fields import FIELDS
 from jaxbiped.sweep.starts._coordinates import COORDINATES, START_QUANTITIES
 
 METRES, SECONDS, KILOGRAMS = 2.0, 3.0, 5.0

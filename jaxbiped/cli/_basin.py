@@ -21,14 +21,13 @@ from jaxbiped.dynamics._state import RigidState, State
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.solve._accuracy import accuracy_told
-from jaxbiped.sweep._effort import effort_of
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._prepare import labelling
+from jaxbiped.sweep._labelling_preparation import labelling
+from jaxbiped.sweep._labelling_settings import effort_of
+from jaxbiped.sweep._store_files import check_store
 from jaxbiped.sweep._sweep import sweep
-from jaxbiped.sweep._zarr_store import check_store
 from jaxbiped.sweep.starts._coordinates import COORDINATES, coordinate_quantities
-from jaxbiped.sweep.starts._given_starts import GivenStarts
-from jaxbiped.sweep.starts._starts import AbstractStarts
+from jaxbiped.sweep.starts._starts import AbstractStarts, GivenStarts
 
 if TYPE_CHECKING:
     import xarray

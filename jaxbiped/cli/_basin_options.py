@@ -116,7 +116,7 @@ class SweepOptions:
         """What runs the chunks, and how many at once; raises `ArgumentError`."""
         if self.scheduler is None and self.workers == 1:
             return None, 1
-        from jaxbiped.sweep._cluster import cluster_executor, local_executor
+        from jaxbiped.sweep._workers import cluster_executor, local_executor
 
         if self.scheduler is not None:
             return cluster_executor(self.scheduler)

@@ -11,8 +11,8 @@ from jaxbiped.cli._basin_options import StartsOptions, parse_axis
 from jaxbiped.dynamics._state import State, rigid_state
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep.starts._coordinates import check_coordinates
-from jaxbiped.sweep.starts._given_starts import GivenStarts
-from jaxbiped.sweep.starts._starts import AbstractStarts, grid, sample
+from jaxbiped.sweep.starts._samples import sample
+from jaxbiped.sweep.starts._starts import AbstractStarts, GivenStarts, grid
 
 _USUAL = ("theta_swing=-0.5:0.3:100", "omega_swing=-2:4:100")
 """Axes of a basin that nobody chose, and as many starts on each."""

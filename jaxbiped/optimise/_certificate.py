@@ -33,9 +33,9 @@ from jaxbiped.simulate._simulate import simulate
 from jaxbiped.solve._engine import ENGINES
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.sweep._labelling import Labelling
+from jaxbiped.sweep._labelling_preparation import labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure
-from jaxbiped.sweep._prepare import labelling
-from jaxbiped.sweep.starts._starts import sample
+from jaxbiped.sweep.starts._samples import sample
 
 _SETTLED = 1e-4
 """Relative difference between a walk's last footstep and the gait's that counts as none."""

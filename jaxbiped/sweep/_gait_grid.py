@@ -1,7 +1,6 @@
 """Gaits on a grid of parameters as a dataset, in memory or in a Zarr store."""
 
 import contextlib
-import json
 import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,8 +21,15 @@ from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._origin import FoundBy
-from jaxbiped.sweep._same_store import ALSO, SETTINGS, check_same, check_writers
-from jaxbiped.sweep._zarr_store import consolidate, create_store, open_store, unwritable
+from jaxbiped.sweep._store_files import (
+    SETTINGS,
+    check_same,
+    check_writers,
+    consolidate,
+    create_store,
+    open_store,
+    writing,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -124,7 +130,7 @@ class GaitGrid:
         if self._path is None:
             return
         began = time.monotonic()
-        try:
+        with writing(self._path):
             group: Any = zarr.open_group(str(self._path), mode="r+", use_consolidated=False)
             # What says that points are known is written after what is known of them.
             names = [str(name) for name in self._dataset.data_vars if name != _DONE]
@@ -132,8 +138,6 @@ class GaitGrid:
             with zarr.config.set({"array.write_empty_chunks": True}):
                 for name in (*names, _DONE):
                     group[name][...] = self._dataset[name].data
-        except OSError as error:
-            raise unwritable(self._path, error) from None
         self._written = time.monotonic()
         # All is written each time: that must not take longer than what is searched between.
         self._pause = max(_PAUSE, _SHARE * (self._written - began))
@@ -165,19 +169,16 @@ def open_gait_grid(
     if path is None:
         return GaitGrid(dataset, state, None)
     path = path.absolute()
-    try:
+    with writing(path):
         if path.exists() and any(path.iterdir()):
             check_same(path, settings)
             new = check_writers(path, writer, any_version)
             dataset = _same_variables(_load(path, dataset), dataset, path)
             if new:
-                others = [*json.loads(dataset.attrs.get(ALSO, "[]")), dict(writer)]
-                _note(path, {ALSO: json.dumps(others)})
+                _note(path, new)
         else:
             empty = dataset
             create_store(path, lambda half: empty.to_zarr(half, consolidated=False, zarr_format=3))
-    except OSError as error:
-        raise unwritable(path, error) from None
     return GaitGrid(dataset, state, path)
 
 

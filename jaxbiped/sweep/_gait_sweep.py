@@ -10,26 +10,24 @@ import numpy as np
 from jaxtyping import PyTree
 from tqdm import tqdm
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite
-from jaxbiped._files import user_path
-from jaxbiped._identity import provenance
+from jaxbiped._checks import ArgumentError
+from jaxbiped._paths import user_path
+from jaxbiped._provenance import provenance
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._parameter_access import (
-    parameter_names,
-    parameter_quantities,
-    parameter_values,
-    scene_identity,
-    with_parameters,
-)
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.scene._check_scene import check_scene
+from jaxbiped.scene._parameters import parameter_quantities, parameter_values, with_parameters
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene_identity import scene_identity
 from jaxbiped.sweep._gait_grid import open_gait_grid
 from jaxbiped.sweep._gait_waves import GaitWaves
 from jaxbiped.sweep._grid_waves import LARGE, Place, neighbours, rings
-from jaxbiped.sweep._zarr_store import check_store
+from jaxbiped.sweep._store_files import check_store
+from jaxbiped.sweep.starts._coordinates import parameter_axes
 
 if TYPE_CHECKING:
     import xarray
@@ -169,17 +167,7 @@ def _check_values(
             f"over = {over!r} is not allowed: map one parameter's name or more to its values, "
             'such as {"K": [1e6, 2e6]}.'
         )
-    values = {}
-    for name, column in dict(over).items():
-        check_choice("over", name, parameter_names(scene))
-        check_finite(name, column)
-        if np.ndim(column) != 1 or not np.size(column):
-            raise ArgumentError(
-                f"{name} has values of shape {np.shape(column)}: it must be (k,), k at least 1."
-            )
-        values[name] = np.asarray(column, dtype=np.float64)
-        with_parameters(scene, {name: values[name]})
-    return values
+    return parameter_axes(scene, over, "over")
 
 
 def _nearest(scene: AnyScene, values: dict[str, np.ndarray]) -> Place:

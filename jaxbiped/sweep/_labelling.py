@@ -13,17 +13,19 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject, as_float
-from jaxbiped.basins._labels import Label
-from jaxbiped.dynamics._state import BristleState, State, state_type, within_a_turn
-from jaxbiped.scene._parameter_access import scene_identity, with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.scene._scene_checks import check_scene
-from jaxbiped.sweep._broadcast import broadcast_leaves
-from jaxbiped.sweep._effort import Effort
-from jaxbiped.sweep._family import Family
-from jaxbiped.sweep._follow_start import follow_starts
-from jaxbiped.sweep._labelled import Labelled
-from jaxbiped.sweep._settled_labels import settled_labels
+from jaxbiped.basins._label import Label
+from jaxbiped.dynamics._bristle_state import BristleState
+from jaxbiped.dynamics._formulation import state_type
+from jaxbiped.dynamics._state import State, within_a_turn
+from jaxbiped.scene._check_scene import check_scene
+from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene_identity import scene_identity
+from jaxbiped.sweep._doubtful_labels import relabel_doubtful
+from jaxbiped.sweep._follow_starts import Labelled, broadcast_leaves, follow_starts
+from jaxbiped.sweep._gait_family import Family
+from jaxbiped.sweep._labelling_settings import Effort
 
 
 class Labelling(eqx.Module):
@@ -47,7 +49,7 @@ class Labelling(eqx.Module):
         Each is followed until its label is certain: until it comes within a known gait's radius,
         and nearer than a cycle before; until it falls, stops, stumbles or slides; or until all the
         footsteps are walked. No start's result depends on another's; one that is no number is
-        labelled "solver failed". To an accuracy that is a number, see `settled_labels`.
+        labelled "solver failed". To an accuracy that is a number, see `relabel_doubtful`.
 
         Args:
             states: leaves of shape (n,).
@@ -71,7 +73,7 @@ class Labelling(eqx.Module):
         every = np.arange(count)
         if self.effort.wanted is None:
             return follow(every, self.effort)
-        return settled_labels(follow, count, self.effort, self.scene)
+        return relabel_doubtful(follow, count, self.effort, self.scene)
 
     def _followed(
         self, states: PyTree, given: Mapping[str, np.ndarray], effort: Effort

@@ -27,11 +27,14 @@ from jaxbiped.solve._rigid_steps import (
 )
 from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.sweep._arrival_time import arrival_time
-from jaxbiped.sweep._convergence_test import UNDECIDED, ArrivalHistory, after_arrival, empty_history
-from jaxbiped.sweep._goals import Goals
-from jaxbiped.sweep._grazes import grazes
-from jaxbiped.sweep._sliding import contact_places, slip_distances
+from jaxbiped.sweep._convergence_test import (
+    UNDECIDED,
+    ArrivalHistory,
+    Goals,
+    after_arrival,
+    empty_history,
+)
+from jaxbiped.sweep._walk_events import arrival_time, contact_places, grazes, slip_distances
 
 _Number = TypeVar("_Number")
 

@@ -16,7 +16,7 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.gait._return_map import return_map
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._attractor import Attractor
-from jaxbiped.sweep._find_family import scene_with
+from jaxbiped.sweep._gait_family import scene_with
 from jaxbiped.sweep._labelling import Labelling
 
 _MOST_FOOTSTEPS = 6

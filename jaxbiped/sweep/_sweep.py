@@ -1,5 +1,6 @@
 """Sweeps: starts labelled chunk by chunk, here or by workers, in memory or into a store."""
 
+import dataclasses
 import json
 import time
 from concurrent.futures import Executor
@@ -13,17 +14,22 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._files import user_path
 from jaxbiped._identity import provenance
 from jaxbiped.basins._arguments import check_whole
-from jaxbiped.basins._label_errors import ERRORS
-from jaxbiped.basins._labels import Label
-from jaxbiped.sweep._array_layout import Layout, fields_of
+from jaxbiped.basins._doubt import Doubt, Witness
+from jaxbiped.basins._label import Label
+from jaxbiped.basins._label_errors import ERRORS, LabelErrors, Seen, estimate_label_errors
 from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._memory_store import MemoryStore
-from jaxbiped.sweep._prepare import Guesses, guesses_among, with_gaits_met, with_guesses
-from jaxbiped.sweep._same_store import GAITS
-from jaxbiped.sweep._store import ALL_GAITS, AbstractStore
-from jaxbiped.sweep._tighter_labels import tightened
+from jaxbiped.sweep._labelling_preparation import (
+    Guesses,
+    guesses_among,
+    with_gaits_met,
+    with_guesses,
+)
+from jaxbiped.sweep._labelling_settings import FINEST_FIRST
+from jaxbiped.sweep._store import ALL_GAITS, AbstractStore, MemoryStore
+from jaxbiped.sweep._store_files import GAITS, check_store
+from jaxbiped.sweep._stored_fields import DOUBT_FIELDS, Layout, fields_of
 from jaxbiped.sweep._workers import compute_chunks
-from jaxbiped.sweep._zarr_store import ZarrStore, check_store
+from jaxbiped.sweep._zarr_store import ZarrStore
 from jaxbiped.sweep.starts._coordinates import coordinate_quantities
 from jaxbiped.sweep.starts._starts import AbstractStarts
 
@@ -35,6 +41,10 @@ _MOST_OPEN = 4096
 """Unresolved starts from which gaits are sought after a sweep."""
 _GUESSES = "gait_guesses"
 """Attribute that holds, as JSON, where gaits were sought after a sweep."""
+_TOLERANCES = "label_tolerances"
+"""Attribute that holds, as JSON, the tolerances of all rounds so far, this one included."""
+_FINER = 10.0
+_ROUNDS = 3
 
 
 def sweep(
@@ -191,3 +201,66 @@ def _open(results: AbstractStore, chunk: int) -> np.ndarray:
     fields = results.read(chunk, ("label", "cycle_footsteps"))
     unresolved = fields["label"] == int(Label.UNRESOLVED)
     return np.asarray(np.flatnonzero(unresolved & (fields["cycle_footsteps"] > 0)))
+
+
+def tightened(
+    labelling: Labelling,
+    layout: Layout,
+    results: AbstractStore,
+    executor: Executor | None,
+    workers: int,
+) -> LabelErrors:
+    """Labels all starts at finer tolerances until their errors are certainly what is wanted.
+
+    Where the starts are too few to tell, it is enough that they are estimated to be.
+
+    Each round is noted before it begins: a run that is killed goes on with it. Estimates count all
+    starts, so that no label depends on the chunks.
+    """
+    wanted, compliant = labelling.effort.wanted, labelling.scene.compliant
+    assert wanted is not None
+    tolerances = json.loads(results.noted(_TOLERANCES) or json.dumps([labelling.effort.rtol]))
+    while True:
+        more = len(tolerances) - 1
+        if more:
+            finer = _at_tolerance(labelling, tolerances[-1])
+            left = results.behind(ALL_GAITS + more)
+            for chunk, fields in compute_chunks(finer, layout, left, executor, workers):
+                results.write(chunk, fields, mark=ALL_GAITS + more)
+        errors = estimate_label_errors(
+            tally_results(layout, results), wanted=wanted, rtol=tolerances[-1]
+        )
+        finest = tolerances[-1] <= 1.001 * FINEST_FIRST[compliant]
+        too_few = errors.wrong <= wanted and errors.starts < errors.fewest
+        if errors.met or too_few or finest or len(tolerances) >= _ROUNDS:
+            return errors
+        tolerances.append(max(tolerances[-1] / _FINER, FINEST_FIRST[compliant]))
+        results.note({_TOLERANCES: json.dumps(tolerances)})
+
+
+def tally_results(layout: Layout, results: AbstractStore) -> Seen:
+    """What the witnesses saw of all starts, a chunk at a time."""
+    total = Seen()
+    for chunk in range(layout.chunks):
+        fields = results.read(chunk, tuple(DOUBT_FIELDS))
+        total += tally_disagreements(fields["doubt"], fields["disagreed"], fields["changed"])
+    return total
+
+
+def tally_disagreements(doubt: np.ndarray, disagreed: np.ndarray, changed: np.ndarray) -> Seen:
+    """What the witnesses saw of some starts, from their `Labelled` fields."""
+    moved = (changed > 0) & (doubt == int(Doubt.SETTLED))
+    looser, other = (moved & (disagreed & int(who) > 0) for who in Witness)
+    parts = (
+        doubt != int(Doubt.NONE),
+        changed > 0,
+        doubt == int(Doubt.REMAINS),
+        looser,
+        other,
+        looser & other,
+    )
+    return Seen(doubt.size, *[int(part.sum()) for part in parts])
+
+
+def _at_tolerance(labelling: Labelling, rtol: float) -> Labelling:
+    return dataclasses.replace(labelling, effort=labelling.effort.at_tolerance(rtol))

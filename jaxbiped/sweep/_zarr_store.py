@@ -1,26 +1,28 @@
 """Zarr store: results written a chunk at a time, continued where a killed run left off."""
 
-import contextlib
-import glob
-import json
-import os
-import shutil
-import time
-import uuid
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jaxbiped._checks import ArgumentError, ResourceError
-from jaxbiped._files import failure_kind, strict_json
+from jaxbiped._strict_json import strict_json
 from jaxbiped._types import JsonObject
-from jaxbiped.caching._disk_cache import ABANDONED
-from jaxbiped.sweep._array_layout import Layout, empty_dataset
-from jaxbiped.sweep._same_store import ALSO, GAITS, SETTINGS, check_same, check_writers
 from jaxbiped.sweep._store import COMPLETE, AbstractStore
+from jaxbiped.sweep._store_files import (
+    GAITS,
+    SETTINGS,
+    check_same,
+    check_store,
+    check_writers,
+    consolidate,
+    create_store,
+    is_new,
+    open_store,
+    writing,
+)
+from jaxbiped.sweep._stored_fields import Layout, empty_dataset
 
 if TYPE_CHECKING:
     import xarray
@@ -73,17 +75,14 @@ class ZarrStore(AbstractStore):
         """
         check_store(path)
         path = path.absolute()
-        try:
-            if _is_new(path):
+        with writing(path):
+            if is_new(path):
                 create_store(path, lambda half: _write_empty(half, layout, settings, writer))
             check_same(path, settings)
             new = check_writers(path, writer, any_version)
             store = ZarrStore(path, layout)
-        except OSError as error:
-            raise unwritable(path, error) from None
         if new:
-            others = [*json.loads(store.noted(ALSO) or "[]"), dict(writer)]
-            store.note({ALSO: json.dumps(others)})
+            store.note(new)
         return store
 
     @staticmethod
@@ -96,12 +95,10 @@ class ZarrStore(AbstractStore):
             ArgumentError: see `open`.
         """
         path = path.absolute()
-        try:
-            if not _is_new(path):
+        with writing(path):
+            if not is_new(path):
                 check_same(path, settings, but=GAITS)
                 check_writers(path, writer, any_version)
-        except OSError as error:
-            raise unwritable(path, error) from None
 
     def _forget_lost(self) -> None:
         """Takes chunks whose files are not all there and whole for not labelled yet."""
@@ -143,9 +140,8 @@ class ZarrStore(AbstractStore):
     def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, mark: int = COMPLETE) -> None:
         import zarr
 
-        region = self.layout.region(chunk)
-        shape = self.layout.shape_of(chunk)
-        try:
+        region, shape = self.layout.region(chunk), self.layout.shape_of(chunk)
+        with writing(self.path):
             if self._done[chunk]:
                 # Were it killed amid writing, the chunk must not pass for complete.
                 self._mark(chunk, 0)
@@ -154,8 +150,6 @@ class ZarrStore(AbstractStore):
                 for name, values in fields.items():
                     self._group[name][region] = np.reshape(values, shape)
             self._mark(chunk, mark)
-        except OSError as error:
-            raise unwritable(self.path, error) from None
 
     def _mark(self, chunk: int, complete: int) -> None:
         self._done[chunk] = complete
@@ -167,11 +161,9 @@ class ZarrStore(AbstractStore):
         return {name: np.array(self._group[name][region]).ravel() for name in names}
 
     def note(self, attributes: Mapping[str, str | float]) -> None:
-        try:
+        with writing(self.path):
             self._group.attrs.update(dict(attributes))
             consolidate(self.path)
-        except OSError as error:
-            raise unwritable(self.path, error) from None
 
     def noted(self, name: str) -> str | None:
         text = self._group.attrs.get(name)
@@ -179,56 +171,6 @@ class ZarrStore(AbstractStore):
 
     def dataset(self) -> "xarray.Dataset":
         return open_store(self.path)
-
-
-def check_store(path: Path) -> None:
-    """Raises `ArgumentError` where no store can be made or continued at this path."""
-    _is_new(path)
-    home = next(each for each in [path, *path.absolute().parents] if each.is_dir())
-    if not os.access(home, os.W_OK | os.X_OK):
-        raise ArgumentError(
-            f"store = {str(path)!r} cannot be written: its folder must be writable."
-        )
-
-
-def open_store(path: Path) -> "xarray.Dataset":
-    """The dataset of a store, read as it is needed."""
-    import xarray
-
-    return xarray.open_zarr(path, chunks=None)
-
-
-def unwritable(path: Path, error: OSError) -> ArgumentError | ResourceError:
-    """The sentence for a store that cannot be written."""
-    why = (error.strerror or str(error)).lower()
-    return failure_kind(error)(
-        f"store = {str(path)!r} cannot be written ({why}): it must be a directory on a disk with "
-        "room; the chunks that are complete stay."
-    )
-
-
-def create_store(path: Path, write: Callable[[Path], object]) -> None:
-    """A store that is complete in itself or not there at all.
-
-    Where another client makes the same one meanwhile, that one stays.
-    """
-    half = path.with_name(f".{path.name}.{uuid.uuid4().hex}.unfinished")
-    for left in path.parent.glob(f".{glob.escape(path.name)}.*unfinished"):
-        if left.stat().st_mtime < time.time() - ABANDONED:
-            shutil.rmtree(left, ignore_errors=True)
-    try:
-        half.parent.mkdir(parents=True, exist_ok=True)
-        write(half)
-        consolidate(half)
-        with contextlib.suppress(OSError):
-            path.rmdir()  # where it is there and empty
-        try:
-            half.rename(path)
-        except OSError:
-            if _is_new(path):
-                raise
-    finally:
-        shutil.rmtree(half, ignore_errors=True)
 
 
 def _write_empty(
@@ -266,24 +208,3 @@ def _write_empty(
         dimension_names=["chunk"],
         attributes=done,
     )
-
-
-def consolidate(path: Path) -> None:
-    """Lets `xarray.open_zarr` read all arrays' metadata at once, without a warning."""
-    import zarr
-
-    with warnings.catch_warnings():
-        # Zarr's third format has no word on it yet.
-        warnings.simplefilter("ignore")
-        zarr.consolidate_metadata(str(path))
-
-
-def _is_new(path: Path) -> bool:
-    """Whether nothing is there yet, or an empty directory.
-
-    Raises:
-        ArgumentError: a file is there.
-    """
-    if path.exists() and not path.is_dir():
-        raise ArgumentError(f"store = {str(path)!r} is a file: it must be a directory.")
-    return not path.exists() or not any(path.iterdir())

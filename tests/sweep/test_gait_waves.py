@@ -8,8 +8,8 @@ import xarray
 
 import jaxbiped as jb
 from jaxbiped.sweep import _gait_waves
-from jaxbiped.sweep._gait_batch import find_each
-from jaxbiped.sweep._zarr_store import consolidate
+from jaxbiped.sweep._gait_waves import find_each
+from jaxbiped.sweep._store_files import consolidate
 
 pytestmark = pytest.mark.slow
 

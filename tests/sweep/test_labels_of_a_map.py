@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.basins._labels import Label
-from jaxbiped.sweep._convergence_test import UNDECIDED, after_arrival, empty_history
-from jaxbiped.sweep._goals import NO_GAIT, Goals
+from jaxbiped.basins._label import Label
+from jaxbiped.sweep._convergence_test import NO_GAIT, UNDECIDED, Goals, after_arrival, empty_history
 from jaxbiped.sweep._labelling_loop import CompliantLabelling, Progress, Start, _outcome
-from jaxbiped.sweep._sliding import contact_places, slip_distances
+from jaxbiped.sweep._walk_events import contact_places, slip_distances
 
 RADIUS, GAP, RTOL = 0.1, 1e-4, 1e-7
 ONWARD = jax.jit(after_arrival, static_argnums=3)

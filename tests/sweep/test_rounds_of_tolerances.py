@@ -7,11 +7,10 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.basins._label_errors import Seen
-from jaxbiped.basins._labels import Doubt, Witness
-from jaxbiped.sweep import _tighter_labels
-from jaxbiped.sweep._array_layout import Layout
-from jaxbiped.sweep._memory_store import MemoryStore
-from jaxbiped.sweep._tighter_labels import seen_of, tightened
+from jaxbiped.sweep import _sweep
+from jaxbiped.sweep._store import MemoryStore
+from jaxbiped.sweep._stored_fields import Layout
+from jaxbiped.sweep._sweep import tally_disagreements, tightened
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless
 
@@ -24,7 +23,7 @@ def test_witnesses_are_counted_where_a_settled_label_changed():
     disagreed = np.array([0, 1, 2, 3, 3, 0, 1])
     changed = np.array([0, 1, 1, 1, 1, 1, 0])
     assert [int(each) for each in Doubt] == [0, 1, 2]
-    assert seen_of(doubt, disagreed, changed) == Seen(
+    assert tally_disagreements(doubt, disagreed, changed) == Seen(
         starts=7, relabelled=6, changed=5, in_doubt=1, looser=2, other=2, both=1
     )
 
@@ -52,13 +51,13 @@ def test_tolerances_are_tightened_until_the_errors_are_what_was_asked_for(
                 doubt[:60], disagreed[:30], disagreed[30:60] = 1, 1, 2
             yield chunk, {"doubt": doubt, "disagreed": disagreed, "changed": doubt}
 
-    monkeypatch.setattr(_tighter_labels, "compute_chunks", labels)
+    monkeypatch.setattr(_sweep, "compute_chunks", labels)
     for chunk, fields in labels(labelling, layout, range(2), None, 1):
         results.write(chunk, fields)
     told = tightened(labelling, layout, results, None, 1)
     assert solved == pytest.approx([1e-4, 1e-5, 1e-6][:rounds])
     assert told.met is (len(wrong) < 3)
     assert told.rtol == pytest.approx(10.0 ** (-3 - rounds))
-    noted = results.noted(_tighter_labels._TOLERANCES)
+    noted = results.noted(_sweep._TOLERANCES)
     assert (noted is None) is (rounds == 1)
     assert noted is None or json.loads(noted) == pytest.approx([1e-4, 1e-5, 1e-6][:rounds])

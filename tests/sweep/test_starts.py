@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.sweep.starts._sequences import sequence_points
+from jaxbiped.sweep.starts._samples import sequence_points
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same
 

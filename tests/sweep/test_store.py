@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._identity import provenance
-from jaxbiped.sweep._array_layout import FIELDS, Layout
-from jaxbiped.sweep._memory_store import MemoryStore
-from jaxbiped.sweep._store import AbstractStore
+from jaxbiped._provenance import provenance
+from jaxbiped.sweep._store import AbstractStore, MemoryStore
+from jaxbiped.sweep._stored_fields import FIELDS, Layout
 from jaxbiped.sweep._zarr_store import ZarrStore
 from tests.rigid_walkers import simplest_walker
 from tests.sweep.walkers import simplest_grid

@@ -15,7 +15,7 @@ from tests.sweep.walkers import gaitless, same_results, simplest_grid
 
 pytestmark = pytest.mark.slow
 
-TIGHTER = importlib.import_module("jaxbiped.sweep._tighter_labels")
+TIGHTER = importlib.import_module("jaxbiped.sweep._sweep")
 SCENE = simplest_walker(0.009)
 LABELLING = gaitless(SCENE, simplest_state(*STABLE), accuracy=1e-2)
 STARTS = simplest_grid(SCENE)

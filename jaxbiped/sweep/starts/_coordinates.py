@@ -3,14 +3,17 @@
 from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
+import numpy.typing as npt
 from jaxtyping import PyTree
 
-from jaxbiped._checks import check_choice
+from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._state import BristleState, RigidState, State, state_type
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
-from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities
-from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
+from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._parameters import parameter_names, parameter_quantities, with_parameters
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
 
 COORDINATES = {
     "theta_stance": "theta_2",
@@ -68,6 +71,36 @@ def check_coordinates(scene: Scene | RigidScene, names: Iterable[str]) -> None:
     """Raises `ArgumentError` for a name that is no coordinate of the scene's starts."""
     for name in names:
         check_choice("coordinate", name, coordinate_names(scene))
+
+
+def axis_values(name: str, values: npt.ArrayLike) -> np.ndarray:
+    """Values along an axis of a grid, shape (k,).
+
+    Raises:
+        ArgumentError: none at all, one that is not finite, or values of another shape.
+    """
+    check_finite(name, values)
+    if np.ndim(values) != 1 or not np.size(values):
+        raise ArgumentError(
+            f"{name} has values of shape {np.shape(values)}: it must be (k,), k at least 1."
+        )
+    return np.asarray(values, dtype=np.float64)
+
+
+def parameter_axes(
+    scene: AbstractScene, given: Mapping[str, npt.ArrayLike], argument: str
+) -> dict[str, np.ndarray]:
+    """`axis_values` of parameters by name, of an `argument` of that name.
+
+    Raises:
+        ArgumentError: what is no parameter of the scene, or values that it must not have.
+    """
+    axes = {}
+    for name, values in given.items():
+        check_choice(argument, name, parameter_names(scene))
+        axes[name] = axis_values(name, values)
+        with_parameters(scene, {name: axes[name]})
+    return axes
 
 
 def parameters_among(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -1,28 +1,33 @@
-"""Starts on grids and in samples."""
+"""Starts of a sweep: on grids, or as they are given."""
 
 import abc
+import hashlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 import equinox as eqx
+import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite
+from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
-from jaxbiped.basins._arguments import check_whole
-from jaxbiped.scene._parameter_access import with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.dynamics._bristle_state import BristleState
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.dynamics._state import State
+from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._coordinates import (
+    axis_values,
     check_coordinates,
     parameters_among,
     place_states,
     state_at,
 )
-from jaxbiped.sweep.starts._sequences import MOST_SOBOL, SAMPLINGS, sequence_points
 
 Completion: TypeAlias = Callable[[Any, PyTree], PyTree]
 """Completes starts: of a scene and its states, leaves (n,)."""
@@ -118,52 +123,6 @@ class Grid(AbstractStarts):
         return {"grid": values, "place": self.place, "follow": identity(self.follow)}
 
 
-class Sample(AbstractStarts):
-    """Random or quasi-random starts within bounds. `sample` makes one.
-
-    Attributes:
-        lower, upper: bounds of each coordinate.
-        count: how many starts.
-        method: one of `SAMPLINGS`.
-        seed: of the sequence.
-        place, follow: as in `Grid`.
-    """
-
-    lower: dict[str, float]
-    upper: dict[str, float]
-    count: int
-    method: str
-    seed: int
-    place: bool
-    follow: Completion | None
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        return (self.count,)
-
-    @property
-    def axes(self) -> dict[str, np.ndarray | None]:
-        return {"start": None}
-
-    @property
-    def own_columns(self) -> tuple[str, ...]:
-        return tuple(self.lower)
-
-    def at(self, labelling: Labelling, numbers: np.ndarray) -> Batch:
-        drawn = sequence_points(self.method, len(self.lower), self.count, self.seed, numbers)
-        columns = {
-            name: self.lower[name] + drawn[:, i] * (self.upper[name] - self.lower[name])
-            for i, name in enumerate(self.lower)
-        }
-        return batch_at(labelling, columns, place=self.place, follow=self.follow)
-
-    def described(self) -> JsonObject:
-        bounds = {name: [self.lower[name], self.upper[name]] for name in self.lower}
-        rest = {"place": self.place, "follow": identity(self.follow)}
-        drawn = {"sample": self.method, "count": self.count, "seed": self.seed}
-        return drawn | {"bounds": bounds} | rest
-
-
 def grid(
     scene: Scene | RigidScene,
     values: Mapping[str, Sequence[float] | np.ndarray],
@@ -200,68 +159,9 @@ def grid(
     axes = {}
     for name, given in values.items():
         check_finite(name, given)
-        axis = np.atleast_1d(np.asarray(given, dtype=np.float64))
-        if axis.ndim != 1 or not axis.size:
-            raise ArgumentError(
-                f"{name} has values of shape {axis.shape}: it must be (k,), k at least 1."
-            )
-        axes[name] = axis
-    _check_parameters(scene, axes)
+        axes[name] = axis_values(name, np.atleast_1d(given))
+    check_parameters(scene, axes)
     return Grid(axes, place, follow)
-
-
-def sample(
-    scene: Scene | RigidScene,
-    bounds: Mapping[str, tuple[float, float]],
-    count: int,
-    *,
-    method: str = "sobol",
-    seed: int = 0,
-    place: bool = False,
-    follow: Completion | None = None,
-) -> Sample:
-    """Random or quasi-random starts within bounds of coordinates (see `grid`).
-
-    A start is the same whichever chunk it is made in. "latin-hypercube" draws all of them for each
-    chunk; the other methods only the chunk's.
-
-    Args:
-        scene: the walker.
-        bounds: lower and upper bound of each coordinate (see `coordinate_names`), in its SI unit.
-        count: how many starts.
-        method: one of `SAMPLINGS`.
-        seed: of the random numbers.
-        place, follow: as in `grid`.
-
-    Returns:
-        The starts, of shape (count,); none is computed before it is labelled.
-
-    Raises:
-        ArgumentError: an unknown coordinate or method, bounds that enclose nothing, no starts.
-    """
-    check_coordinates(scene, bounds)
-    check_whole("count", count, 1)
-    check_whole("seed", seed, 0)
-    check_choice("method", method, SAMPLINGS)
-    if method == "sobol" and count > MOST_SOBOL:
-        raise ArgumentError(
-            f"count = {count} is not allowed for sobol: its sequence has {MOST_SOBOL} points."
-        )
-    if not bounds:
-        raise ArgumentError("bounds = {} is empty: name at least one coordinate.")
-    for name, pair in bounds.items():
-        check_finite(name, pair)
-        if np.shape(pair) != (2,):
-            raise ArgumentError(f"{name} = {pair!r} is not allowed: give two numbers, its bounds.")
-        low, high = pair
-        if not low < high:
-            raise ArgumentError(
-                f"{name} = {low:g}:{high:g} is not allowed: the first must be less than the second."
-            )
-    lower = {name: float(low) for name, (low, _) in bounds.items()}
-    upper = {name: float(high) for name, (_, high) in bounds.items()}
-    _check_parameters(scene, {name: np.array([lower[name], upper[name]]) for name in lower})
-    return Sample(lower, upper, int(count), method, int(seed), place, follow)
 
 
 def batch_at(
@@ -285,7 +185,53 @@ def batch_at(
     return Batch(type(states)(*leaves), parameters, columns)
 
 
-def _check_parameters(scene: Scene | RigidScene, columns: dict[str, np.ndarray]) -> None:
+def check_parameters(scene: Scene | RigidScene, columns: dict[str, np.ndarray]) -> None:
     """Raises `ArgumentError` for values that the scene's parameters must not have."""
     for name, column in parameters_among(columns).items():
         with_parameters(scene, {name: column})
+
+
+class GivenStarts(AbstractStarts):
+    """Starts as they are given.
+
+    Attributes:
+        states: `State`, `BristleState` or `RigidState` with leaves of shape (n,).
+
+    Raises:
+        ArgumentError: a state of another kind, or leaves of different shapes.
+    """
+
+    states: PyTree
+
+    def __check_init__(self) -> None:
+        check_type("states", self.states, State, BristleState, RigidState)
+        shapes = {np.shape(leaf) for leaf in self.states}
+        if len(shapes) > 1 or len(shapes.pop()) != 1:
+            shown = sorted({np.shape(leaf) for leaf in self.states})
+            raise ArgumentError(f"states has leaves of shapes {shown}: all of them must be (n,).")
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return (len(self.states.hip_x),)
+
+    @property
+    def axes(self) -> dict[str, np.ndarray | None]:
+        return {"start": None}
+
+    @property
+    def own_columns(self) -> tuple[str, ...]:
+        return tuple(self.states._fields)
+
+    def at(self, labelling: Labelling, numbers: np.ndarray) -> Batch:
+        states = jtu.tree_map(lambda leaf: np.asarray(leaf, np.float64)[numbers], self.states)
+        return Batch(states, {}, states._asdict())
+
+    def described(self) -> JsonObject:
+        digest = hashlib.sha256()
+        for leaf in self.states:
+            digest.update(np.ascontiguousarray(leaf, dtype=np.float64).tobytes())
+        return {"given": self.size, "sha256": digest.hexdigest()}
+
+    def between(self, first: int, last: int) -> "GivenStarts":
+        """Those from number `first` up to `last` alone."""
+        return GivenStarts(jtu.tree_map(lambda leaf: np.asarray(leaf)[first:last], self.states))

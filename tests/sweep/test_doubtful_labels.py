@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.basins._labels import Witness
-from jaxbiped.sweep._effort import effort_of
-from jaxbiped.sweep._labelled import Labelled
-from jaxbiped.sweep._settled_labels import settled_labels
-from jaxbiped.sweep._tighter_labels import seen_of
+from jaxbiped.basins._doubt import Witness
+from jaxbiped.sweep._doubtful_labels import relabel_doubtful
+from jaxbiped.sweep._follow_starts import Labelled
+from jaxbiped.sweep._labelling_settings import effort_of
+from jaxbiped.sweep._sweep import tally_disagreements
 from tests.sweep.walkers import same
 
 SCENE = jb.seed_scene()
@@ -43,7 +43,7 @@ def _followed(distances, asked=None, *, jumps=()):
 def test_starts_are_settled_that_lie_beside_the_boundary_and_no_others():
     distances = np.array([-1.0, -3e-4, -1e-4, 1e-4, 1.0, 2e-4])
     asked = []
-    found = settled_labels(_followed(distances, asked), 6, EFFORT, SCENE)
+    found = relabel_doubtful(_followed(distances, asked), 6, EFFORT, SCENE)
     assert EFFORT.rtol == pytest.approx(1e-5)
     # Off by 4e-4, 1e-3 at the looser tolerance, and -2.8e-4 by the other method.
     np.testing.assert_array_equal(found.disagreed > 0, [False, True, True, True, False, True])
@@ -53,19 +53,19 @@ def test_starts_are_settled_that_lie_beside_the_boundary_and_no_others():
     assert [each[0] for each in asked] == [6, 6, 6, 4, 4, 4, 4]
     np.testing.assert_allclose([each[1] for each in asked[3::2]], [1e-6, 1e-7])
     np.testing.assert_array_equal(found.attempted, [300, 700, 700, 700, 300, 700])
-    counted = seen_of(found.doubt, found.disagreed, found.changed)
+    counted = tally_disagreements(found.doubt, found.disagreed, found.changed)
     assert (counted.starts, counted.relabelled, counted.changed, counted.in_doubt) == (6, 4, 2, 0)
 
 
 def test_what_never_agrees_is_flagged_and_not_silently_labelled():
-    found = settled_labels(_followed(np.ones(3), jumps=(1,)), 3, EFFORT, SCENE)
+    found = relabel_doubtful(_followed(np.ones(3), jumps=(1,)), 3, EFFORT, SCENE)
     assert found.doubt.tolist() == [
         jb.basins.Doubt.NONE,
         jb.basins.Doubt.REMAINS,
         jb.basins.Doubt.NONE,
     ]
     assert found.disagreed.tolist() == [0, Witness.OTHER, 0]
-    assert seen_of(found.doubt, found.disagreed, found.changed).in_doubt == 1
+    assert tally_disagreements(found.doubt, found.disagreed, found.changed).in_doubt == 1
 
 
 def test_what_grazes_is_in_doubt_whoever_agrees():
@@ -75,10 +75,10 @@ def test_what_grazes_is_in_doubt_whoever_agrees():
         own = grazes[places] if effort.rtol == EFFORT.rtol else 0 * places
         return plain(places, effort)._replace(grazes=own)
 
-    found = settled_labels(follow, 4, EFFORT, SCENE)
+    found = relabel_doubtful(follow, 4, EFFORT, SCENE)
     assert found.doubt.tolist() == [0, int(jb.basins.Doubt.SETTLED), 0, 0]
     assert not found.disagreed.any()
-    counted = seen_of(found.doubt, found.disagreed, found.changed)
+    counted = tally_disagreements(found.doubt, found.disagreed, found.changed)
     assert (counted.relabelled, counted.changed, counted.looser, counted.other) == (1, 0, 0, 0)
 
 
@@ -86,9 +86,9 @@ def test_what_grazes_is_in_doubt_whoever_agrees():
 @settings(max_examples=40, deadline=None)
 def test_no_starts_label_depends_on_another(distances, data):
     distances = np.array(distances)
-    whole = settled_labels(_followed(distances), len(distances), EFFORT, SCENE)
+    whole = relabel_doubtful(_followed(distances), len(distances), EFFORT, SCENE)
     one = data.draw(st.integers(0, len(distances) - 1))
-    alone = settled_labels(_followed(distances[[one]]), 1, EFFORT, SCENE)
+    alone = relabel_doubtful(_followed(distances[[one]]), 1, EFFORT, SCENE)
     same(alone, jax.tree.map(lambda leaf: leaf[[one]], whole))
     settled = whole.doubt == jb.basins.Doubt.SETTLED
     np.testing.assert_array_equal(whole.label[settled], distances[settled] > 0.0)

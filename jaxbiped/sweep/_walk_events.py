@@ -1,19 +1,77 @@
-"""Grazes of a walk that is labelled: a foot touches the ground, or misses it, by a hair.
+"""Events within a step of a walk that is labelled: arrival at the section, sliding and grazes.
 
-Whether there was a contact is then open at the tolerance; near a boundary the label may be, too.
+A foot that grazes touches the ground, or misses it, by a hair. Whether there was a contact is then
+open at the tolerance; near a boundary the label may be, too.
 """
 
+from collections.abc import Callable
+
+import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene._redundant_scene import CompliantScene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_cubic import StepCubic
 
+_SECANTS = 8
+"""By which an arrival is located, to rounding."""
 _REACH = 2.0
 """Way that a foot can rise in a step, in units of the one at the speed it begins with."""
+
+
+def arrival_time(value: Callable[[Scalar], Scalar], low: Scalar, high: Scalar) -> Scalar:
+    """Where a function rises through zero between two times [s], by the Illinois method."""
+
+    def secant(_: Scalar, now: tuple[Scalar, ...]) -> tuple[Scalar, ...]:
+        a, b, at_a, at_b, side, _ = now
+        rise = at_b - at_a
+        middle = b - at_b * (b - a) / jnp.where(rise == 0.0, 1.0, rise)
+        found = value(middle)
+        left = found < 0.0
+        # An end that stays twice counts half, so that it moves the next time.
+        return (
+            jnp.where(left, middle, a),
+            jnp.where(left, b, middle),
+            jnp.where(left, found, jnp.where(side > 0.0, 0.5 * at_a, at_a)),
+            jnp.where(left, jnp.where(side < 0.0, 0.5 * at_b, at_b), found),
+            jnp.where(left, -1.0, 1.0),
+            middle,
+        )
+
+    start = (low, high, value(low), value(high), jnp.zeros_like(low), high)
+    return jax.lax.fori_loop(0, _SECANTS, secant, start)[-1]
+
+
+def contact_places(scene: Scene, state: State) -> tuple[Scalar, Scalar]:
+    """For each foot, the place [m] that changes by what it slips: its rate is the slip speed."""
+    both = feet(scene, state)
+    return (
+        both.foot_1.x + scene.walker.r * state.theta_1,
+        both.foot_2.x + scene.walker.r * state.theta_2,
+    )
+
+
+def slip_distances(
+    scene: Scene, state: State, landed: tuple[Scalar, Scalar]
+) -> tuple[tuple[Scalar, Scalar], Scalar]:
+    """The places at which the feet last came down, and how far the worse one has slid since [m].
+
+    Args:
+        scene: with the ground.
+        state: now.
+        landed: the places a step ago; see `contact_places`.
+    """
+    both, places = feet(scene, state), contact_places(scene, state)
+    kept = [
+        jnp.where(touches(foot), old, new)
+        for foot, old, new in zip(both, landed, places, strict=True)
+    ]
+    slid = [jnp.abs(new - old) for old, new in zip(kept, places, strict=True)]
+    return (kept[0], kept[1]), jnp.maximum(slid[0], slid[1])
 
 
 def grazes(

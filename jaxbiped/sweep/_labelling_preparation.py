@@ -6,16 +6,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._labels import Label
 from jaxbiped.gait._default_guess import default_guess
-from jaxbiped.scene._parameter_access import parameter_names, with_parameters
-from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.scene._scene import Scene
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.sweep._effort import effort_of
-from jaxbiped.sweep._find_family import find_family, with_gaits
+from jaxbiped.sweep._gait_family import find_family, with_gaits
 from jaxbiped.sweep._labelling import Labelling
+from jaxbiped.sweep._labelling_settings import effort_of
+from jaxbiped.sweep.starts._coordinates import parameter_axes
 from jaxbiped.sweep.starts._starts import AbstractStarts
 
 _ALIKE = 0.05
@@ -70,15 +70,7 @@ def labelling(
         max_solver_steps=max_solver_steps,
         engine=engine,
     )
-    values = {} if parameters is None else dict(parameters)
-    for name, column in values.items():
-        check_choice("parameters", name, parameter_names(scene))
-        check_finite(name, column)
-        if np.ndim(column) != 1 or not np.size(column):
-            raise ArgumentError(
-                f"{name} has values of shape {np.shape(column)}: it must be (k,), k at least 1."
-            )
-        with_parameters(scene, {name: np.asarray(column, dtype=np.float64)})
+    values = parameter_axes(scene, parameters or {}, "parameters")
     start = default_guess(scene) if guess is None else guess
     family = find_family(scene, effort, parameters=values, guess=start)
     missing = sum(not row for row in family.rows)

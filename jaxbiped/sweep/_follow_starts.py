@@ -1,4 +1,6 @@
-"""Following of starts until each is certain, by any engine."""
+"""Following of starts until the label of each is certain, by any engine."""
+
+from typing import NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
@@ -6,7 +8,7 @@ import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._types import as_float
-from jaxbiped.caching._caches import PROGRAMS, bounded_cache
+from jaxbiped.basins._label import label_names
 from jaxbiped.compiler import Program, Request
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._adaptive_program import Solve
@@ -15,8 +17,7 @@ from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.sweep._effort import Effort
-from jaxbiped.sweep._goals import Goals
+from jaxbiped.sweep._convergence_test import Goals
 from jaxbiped.sweep._labelling_loop import (
     AbstractLabellingLoop,
     CompliantLabelling,
@@ -24,11 +25,57 @@ from jaxbiped.sweep._labelling_loop import (
     RigidLabelling,
     Start,
 )
+from jaxbiped.sweep._labelling_settings import Effort
 
 _LONGEST = 1e6
 """Simulated time [s] that no start takes: its footsteps or its patience end it before."""
 _PATIENCE = 50.0
 """Longest time between two footsteps, in units of √(l/g)."""
+
+
+class Labelled(NamedTuple):
+    """What became of n starts: NumPy's arrays of shape (n,).
+
+    Attributes:
+        label: code of a `Label`.
+        gait: the gait that it converges to, by its position in `Family.cycles`; −1 for none.
+        cycle_footsteps: footsteps in that gait's cycle. Where the label is "unresolved" it is that
+            of a cycle which the last footsteps repeated, of a gait that is not among the
+            attractors.
+        footsteps: heel strikes until the label was certain.
+        time: simulated until then [s].
+        distance: walked along the slope until then [m].
+        rate: share of the distance from the gait that is left after a footstep, over the last
+            cycle; NaN without a cycle, and where nothing but rounding is left of the distance.
+        closest: smallest distance from any of the gaits, in its metric; infinite without arrival.
+        attempted: how many steps the solver attempted; of all its solves, where there were more.
+        final: last states on the section without hip_x, shape (n, m); infinite without arrival.
+        doubt, disagreed, changed: where the accuracy was asked for by a number, codes of `Doubt`,
+            sums of codes of `Witness`, and whether finer tolerances gave another label than the
+            first; else None.
+        grazes: steps in which a foot touches the ground or misses it by less than the tolerance
+            resolves, where the accuracy was asked for by a number and the walker is compliant.
+    """
+
+    label: np.ndarray
+    gait: np.ndarray
+    cycle_footsteps: np.ndarray
+    footsteps: np.ndarray
+    time: np.ndarray
+    distance: np.ndarray
+    rate: np.ndarray
+    closest: np.ndarray
+    attempted: np.ndarray
+    final: np.ndarray
+    doubt: np.ndarray | None = None
+    disagreed: np.ndarray | None = None
+    changed: np.ndarray | None = None
+    grazes: np.ndarray | None = None
+
+    @property
+    def names(self) -> np.ndarray:
+        """The labels in words, "walking period-1" and so on, shape (n,)."""
+        return label_names(self.label, self.cycle_footsteps)
 
 
 def follow_starts(
@@ -111,3 +158,13 @@ def _empty_outcome(size: int, *, grazes: bool) -> Outcome[np.ndarray]:
         final=tuple([real] * size),
         grazes=whole if grazes else None,
     )
+
+
+def broadcast_leaves(tree: PyTree, count: int) -> PyTree:
+    """The tree with every leaf repeated along a new first axis, without copies of it."""
+
+    def repeat(leaf: npt.ArrayLike) -> np.ndarray:
+        array = np.asarray(leaf, dtype=np.float64)
+        return np.broadcast_to(array, (count, *array.shape))
+
+    return jtu.tree_map(repeat, tree)

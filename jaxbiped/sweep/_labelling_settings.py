@@ -1,4 +1,4 @@
-"""Effort of labelling: how far and how accurately starts are followed."""
+"""Settings of a labelling: how far and how accurately starts are followed."""
 
 from typing import NamedTuple
 

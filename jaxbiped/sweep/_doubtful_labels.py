@@ -1,4 +1,4 @@
-"""Settled labels: starts whose label is in doubt, labelled again more tightly.
+"""Doubtful labels: starts whose label is in doubt are labelled again more tightly.
 
 A label is a category, whose error is no small number: near a boundary any tolerance may lead to
 either side. So each start is solved three times, and again more tightly where these disagree.
@@ -16,8 +16,8 @@ from jaxbiped.solve._accuracy import resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
-from jaxbiped.sweep._effort import Effort
-from jaxbiped.sweep._labelled import Labelled
+from jaxbiped.sweep._follow_starts import Labelled
+from jaxbiped.sweep._labelling_settings import Effort
 
 _FINER = 10.0
 """From one tolerance to the next."""
@@ -32,7 +32,7 @@ Follow = Callable[[np.ndarray, Effort], Labelled]
 """Labels of the starts with these numbers, by one solve of each."""
 
 
-def settled_labels(
+def relabel_doubtful(
     follow: Follow, count: int, effort: Effort, scene: Scene | RigidScene
 ) -> Labelled:
     """Labels of n starts, solved again where they are in doubt; no start's depends on another's.
