@@ -55,7 +55,7 @@ from jaxbiped.simulate._simulate import simulate as simulate
 from jaxbiped.simulate._swing import swing as swing
 from jaxbiped.solve._accuracy import ACCURACIES as ACCURACIES
 from jaxbiped._ending import Ending as Ending
-from jaxbiped.solve._engine import ENGINES as ENGINES
+from jaxbiped.solve._engine_names import ENGINES as ENGINES
 from jaxbiped.solve._trajectory import Trajectory as Trajectory
 
 # Measures of a walk.

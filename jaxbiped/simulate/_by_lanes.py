@@ -15,17 +15,17 @@ from jaxbiped.compiler import LaneEngine, Request
 from jaxbiped.dynamics._state import State
 from jaxbiped.simulate._recorded_steps import recorded_steps
 from jaxbiped.solve._adaptive_program import Solve, Solved
-from jaxbiped.solve._final_step import just_before_end
-from jaxbiped.solve._saved_outputs import Saved
-from jaxbiped.solve._solve_by_lanes import (
+from jaxbiped.solve._lane_solve import (
     Setting,
     lane_engine,
     request_of,
     solve_scene,
     solve_step_by_step,
 )
+from jaxbiped.solve._saved_outputs import Saved
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
-from jaxbiped.solve.controllers._footstep_limit import PATIENCE
+from jaxbiped.solve.controllers._first_and_last_step import just_before_end
+from jaxbiped.solve.controllers._footstep_counter import PATIENCE
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 if TYPE_CHECKING:

@@ -10,20 +10,18 @@ import jax.tree_util as jtu
 from jaxtyping import Array, PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._state import field_of
-from jaxbiped.scene._scene import RedundantScene
-from jaxbiped.solve._ending import ending_code, ending_events
+from jaxbiped.dynamics._formulation import field_of
+from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.solve._failure_events import ending_code, ending_events
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.solve._solvers import with_root_tolerances
 from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve.controllers._extremes import Extremes
-from jaxbiped.solve.controllers._footstep_limit import PATIENCE, FootstepLimit
-from jaxbiped.solve.controllers._given_first_step import GivenFirstStep
+from jaxbiped.solve.controllers._contact_steps import MissedContacts
+from jaxbiped.solve.controllers._first_and_last_step import first_step
+from jaxbiped.solve.controllers._footstep_counter import PATIENCE, FootstepLimit
 from jaxbiped.solve.controllers._located_ending import LocatedEnding
-from jaxbiped.solve.controllers._missed_contacts import MissedContacts
-from jaxbiped.solve.controllers._step_control import first_step
-from jaxbiped.solve.controllers._walk_control import walk_control
+from jaxbiped.solve.controllers._walk_step_size import walk_control
+from jaxbiped.solve.controllers._wrapped_control import Extremes, GivenFirstStep
 
 if TYPE_CHECKING:
     from jaxbiped.simulate._simulation import Simulation

@@ -8,7 +8,7 @@ from jaxtyping import ArrayLike, PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.solve._engine import ENGINES, engine_for
+from jaxbiped.solve._engine_names import ENGINES, engine_for
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 

@@ -15,7 +15,7 @@ from jaxbiped.dynamics._state import RigidState
 from jaxbiped.simulate._derivatives import with_derivatives
 from jaxbiped.simulate._rigid_slopes import rigid_slopes_of
 from jaxbiped.simulate._slopes import Slopes
-from jaxbiped.solve._engine import engine_named
+from jaxbiped.solve._engine_names import engine_named
 from jaxbiped.solve._rigid_program import rigid_program
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._scene_key import scene_key

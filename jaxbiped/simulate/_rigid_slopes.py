@@ -16,7 +16,7 @@ from jaxbiped.dynamics._state import RigidState
 from jaxbiped.scene._scene import RigidScene
 from jaxbiped.simulate._slopes import LOOSER, Slopes
 from jaxbiped.solve._accuracy import Precision
-from jaxbiped.solve._ending import FALL_ANGLE
+from jaxbiped.solve._failure_events import FALL_ANGLE
 from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
 from jaxbiped.variational._event_motion import EventMotion, follow_event
 from jaxbiped.variational._tangents import Tangents, along_columns, as_columns

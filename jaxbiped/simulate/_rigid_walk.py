@@ -21,7 +21,7 @@ from jaxbiped.simulate._accurate_walk import check_accurate_walk
 from jaxbiped.simulate._rigid_simulation import RigidSimulation
 from jaxbiped.simulate._start import check_single_scene, in_one_precision, in_own_precision
 from jaxbiped.solve._accuracy import ACCURACIES
-from jaxbiped.solve._engine import engine_for
+from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._trajectory import Trajectory
 

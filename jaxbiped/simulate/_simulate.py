@@ -13,7 +13,7 @@ from jaxbiped.simulate._accurate_walk import accurate_walk, check_accurate_walk
 from jaxbiped.simulate._fixed_steps import warn_of_long_steps, warn_of_missed_contacts
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._accuracy import warn_of_unresolved_slip
-from jaxbiped.solve._ending import WATCHES
+from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._trajectory import Trajectory
 
 

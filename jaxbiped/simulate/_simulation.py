@@ -39,13 +39,13 @@ from jaxbiped.simulate._slopes import Slopes, slopes_of
 from jaxbiped.simulate._start import check_steps, start_for
 from jaxbiped.simulate._start_height import check_start_height
 from jaxbiped.solve._accuracy import check_precision, tolerances
-from jaxbiped.solve._ending import WATCHES
+from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._projected_solver import check_adjoint
 from jaxbiped.solve._scene_key import scene_key
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import Units, si_units, units_of
-from jaxbiped.solve.controllers._footstep_limit import PATIENCE
+from jaxbiped.solve.controllers._footstep_counter import PATIENCE
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 
 _OF_STEPS = (

@@ -16,7 +16,7 @@ from jaxbiped.dynamics._state import exchange_legs
 from jaxbiped.dynamics._switches import switches
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._accuracy import Precision
-from jaxbiped.solve._ending_surface import ending_surface
+from jaxbiped.solve._failure_events import ending_surface
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock

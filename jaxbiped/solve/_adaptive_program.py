@@ -18,18 +18,16 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Numbers, Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._consistent_state import project
-from jaxbiped.dynamics._state import field_of
-from jaxbiped.solve._ending import ending_code, ending_events
-from jaxbiped.solve._final_step import clip_step
+from jaxbiped.dynamics._formulation import field_of
+from jaxbiped.solve._failure_events import ending_code, ending_events
 from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve._projected_solver import projects
 from jaxbiped.solve._saved_outputs import LastStep, Saved
 from jaxbiped.solve._units import Units
-from jaxbiped.solve.controllers._crossed_switches import weigh_crossed
-from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
+from jaxbiped.solve.controllers._first_and_last_step import clip_step, first_step
+from jaxbiped.solve.controllers._footstep_counter import FootstepLimit
 from jaxbiped.solve.controllers._located_ending import LocatedEnding
-from jaxbiped.solve.controllers._step_control import first_step
-from jaxbiped.solve.controllers._walk_control import walk_control
+from jaxbiped.solve.controllers._walk_step_size import walk_control, weigh_crossed
 from jaxbiped.solve.controllers._wrapped_control import StepControl
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, step_of
 

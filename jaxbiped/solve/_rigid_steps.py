@@ -8,20 +8,24 @@ from jaxbiped._circular import sine_cosine
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._state import RigidState
-from jaxbiped.scene._scene import RigidScene
-from jaxbiped.solve._ending import rigid_ending
-from jaxbiped.solve._rigid_events import events_within, opening, uprightness
-from jaxbiped.solve._rolling_step import Rates, accelerations, advance, rolling_step
+from jaxbiped.dynamics._rigid_state import RigidState
+from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.solve._failure_events import rigid_ending
+from jaxbiped.solve._rolling_step import (
+    NEAR,
+    Rates,
+    StepOnto,
+    accelerations,
+    euler_step_onto,
+    events_within,
+    rolling_step,
+)
 
 _SAFETY, _MOST_SHRINK, _MOST_GROWTH = 0.8, 0.2, 5.0
 _FIRST_STEP = 0.03
 """First step, in units of √(l/g)."""
 _ROUNDING = 1e-14
 """Shortest step, as a share of the time."""
-_NEAR = 0.1
-"""Distance from a surface [rad] from which one Euler step leads onto it, in units of √rtol, where
-its rate changes little by then: the square of what is left is far below the tolerance."""
 _STRETCH = 1.15
 """By how much a step may be longer than chosen to end where a strike is due."""
 _MOST_LANDINGS = 12
@@ -140,7 +144,7 @@ def attempt_step(
     trial, error, roughly = rolling_step(
         walk.scene, now.state, now.rates, now.step, walk.rtol, embedded=embedded
     )
-    onto = _euler_step(walk, now, trial, roughly)
+    onto = euler_step_onto(now.falling, trial, roughly, walk.rtol)
     free, kept = _after_free_step(walk, now, trial, error, roughly, onto, lands_on_falls)
     landing = now.landing > 0
     after = select(landing, _landing(now, trial, onto), free)
@@ -169,32 +173,7 @@ def ending_of(walk: RigidWalk, now: RigidProgress, waits: Scalar) -> Scalar:
     return jnp.where(late, int(Ending.TIMED_OUT), now.code)
 
 
-class _Onto(NamedTuple):
-    """From a trial onto a heel strike, or a fall where one is landed on.
-
-    Attributes:
-        near: whether one Euler step leads there.
-        rest: its length [s], which may lie behind.
-        state: there.
-    """
-
-    near: Scalar
-    rest: Scalar
-    state: RigidState
-
-
-def _euler_step(walk: RigidWalk, now: RigidProgress, trial: RigidState, rates: Rates) -> _Onto:
-    """`rates` are those of the trial, roughly."""
-    fall = uprightness(trial, rates, jnp.sign(trial.theta_2))
-    surface = select(now.falling, fall, opening(trial, rates))
-    rest = -surface.value / jnp.where(surface.rate == 0.0, 1.0, surface.rate)
-    near = jnp.abs(surface.value) <= _NEAR * jnp.sqrt(walk.rtol)
-    near = near & (surface.rate < 0.0)
-    near = near & (jnp.abs(surface.curvature) * rest * rest <= 0.4 * _NEAR * walk.rtol)
-    return _Onto(near, rest, advance(trial, rest, [1.0], [rates]))
-
-
-def _strike(walk: RigidWalk, onto: _Onto) -> RigidState:
+def _strike(walk: RigidWalk, onto: StepOnto) -> RigidState:
     """The state after a heel strike: the hip stays where it is, over another leg."""
     at = onto.state
     rolled = _rolled_distance(walk, at.theta_1) - _rolled_distance(walk, at.theta_2)
@@ -202,14 +181,14 @@ def _strike(walk: RigidWalk, onto: _Onto) -> RigidState:
 
 
 def _after_strike(
-    walk: RigidWalk, trial: RigidProgress, onto: _Onto, state: RigidState
+    walk: RigidWalk, trial: RigidProgress, onto: StepOnto, state: RigidState
 ) -> RigidProgress:
     """After the strike beside a trial. Where footsteps last alike, the next one is known."""
     t = trial.t + onto.rest
     period = t - trial.strike
     rate = trial.state.omega_1 + trial.state.omega_2
     change_of_rest = jnp.abs(period - trial.period) * jnp.abs(rate)
-    steady = change_of_rest <= 2.0 * _NEAR * jnp.sqrt(walk.rtol)
+    steady = change_of_rest <= 2.0 * NEAR * jnp.sqrt(walk.rtol)
     due = jnp.where(steady, t + period, jnp.inf)
     return trial._replace(
         t=t,
@@ -236,7 +215,7 @@ def _after_free_step(
     trial: RigidState,
     error: Scalar,
     rates: Rates,
-    onto: _Onto,
+    onto: StepOnto,
     lands_on_falls: bool,
 ) -> tuple[RigidProgress, Scalar]:
     """After a step in single support: whether a heel strike or a fall lies in it or beside it.
@@ -281,7 +260,7 @@ def _after_free_step(
     return after, keep
 
 
-def _landing(now: RigidProgress, trial: RigidState, onto: _Onto) -> RigidProgress:
+def _landing(now: RigidProgress, trial: RigidState, onto: StepOnto) -> RigidProgress:
     """After a step back towards an event: Newton's method goes on, or it has come."""
     missed = ~onto.near & (now.landing >= _MOST_LANDINGS)
     falls = now.falling & onto.near

@@ -13,7 +13,7 @@ from jaxbiped.dynamics._feet import feet, standing_foot
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.scene._scene import Scene
-from jaxbiped.solve._step_cubic import StepCubic
+from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, RosenbrockInterpolation
 
 _BISECTIONS = 50

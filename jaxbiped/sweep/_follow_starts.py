@@ -12,10 +12,10 @@ from jaxbiped.basins._label import label_names
 from jaxbiped.compiler import Program, Request
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._adaptive_program import Solve
-from jaxbiped.solve._engine import engine_named
-from jaxbiped.solve._final_step import just_before_end
+from jaxbiped.solve._engine_names import engine_named
 from jaxbiped.solve._rigid_steps import RigidWalk
 from jaxbiped.solve._units import units_of
+from jaxbiped.solve.controllers._first_and_last_step import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import Goals
 from jaxbiped.sweep._labelling_loop import (

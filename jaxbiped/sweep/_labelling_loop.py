@@ -17,7 +17,7 @@ from jaxbiped.basins._labels import Label
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
-from jaxbiped.solve._ending import WATCHES
+from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._rigid_steps import (
     RigidProgress,
     RigidWalk,

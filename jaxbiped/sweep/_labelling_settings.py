@@ -11,7 +11,7 @@ from jaxbiped.compiler import DEVICES
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import ACCURACIES, check_accuracy_name, resolve_slip_speed
-from jaxbiped.solve._engine import engine_for
+from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._error_estimate import check_wanted
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock

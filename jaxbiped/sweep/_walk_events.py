@@ -15,7 +15,7 @@ from jaxbiped.dynamics._state import State
 from jaxbiped.scene._redundant_scene import CompliantScene
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.solve._step_cubic import StepCubic
+from jaxbiped.solve._step_polynomials import StepCubic
 
 _SECANTS = 8
 """By which an arrival is located, to rounding."""

@@ -16,7 +16,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.solve._step_cubic import StepCubic
+from jaxbiped.solve._step_polynomials import StepCubic
 
 
 class Turns(NamedTuple):

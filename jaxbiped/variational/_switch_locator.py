@@ -12,12 +12,13 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, Time
+from jaxbiped._types import Scalar
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.solve._step_cubic import StepCubic
+from jaxbiped.solve._step_polynomials import StepCubic
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractWrappedControl,
     Adapted,
+    Attempt,
     StepControl,
     try_again,
 )
@@ -85,18 +86,10 @@ class SwitchLocator(AbstractWrappedControl):
     controller: StepControl
     watch: Watch
 
-    def init(
-        self,
-        terms: Any,
-        t0: Time,
-        t1: Time,
-        y0: PyTree,
-        dt0: Scalar | None,
-        args: PyTree,
-        *rest: Any,
-    ) -> tuple[Scalar, SwitchLocatorState]:
+    def init(self, *request: Any) -> tuple[Scalar, SwitchLocatorState]:
         """The first step's end and the controller's state, as diffrax asks."""
-        first, inner = self.controller.init(terms, t0, t1, y0, dt0, args, *rest)
+        first, inner = self.controller.init(*request)
+        _, _, _, y0, _, args, *_ = request
         zero, no = jnp.asarray(0), jnp.asarray(False)
         peak = None
         if self.watch.peak is not None:
@@ -110,27 +103,15 @@ class SwitchLocator(AbstractWrappedControl):
             inner, sizes, *counts, no, no, zero, no, zero, peak, at_peak
         )
 
-    def adapt_step_size(
-        self,
-        t0: Time,
-        t1: Time,
-        y0: PyTree,
-        y1_candidate: PyTree,
-        args: PyTree,
-        y_error: PyTree,
-        error_order: RealScalarLike | None,
-        controller_state: SwitchLocatorState,
-    ) -> Adapted:
-        """Accepts or rejects a step, as diffrax asks."""
-        adapted = self.controller.adapt_step_size(
-            t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state.inner
-        )
-        *_, jump, _, result = adapted
-        parts = (plain_args(args), plain_state(y0), plain_state(y1_candidate))
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does, but at switches."""
+        known: SwitchLocatorState = attempt.memory
+        attempt = attempt._replace(memory=known.inner)
+        t0, t1 = attempt.t0, attempt.t1
+        adapted = attempt.by(self.controller)
+        parts = (plain_args(attempt.args), plain_state(attempt.y0), plain_state(attempt.y1))
         scene, before, after = jax.lax.stop_gradient(parts)
-        crossed, part = self._crossings(
-            cast(Scalar, t1 - t0), scene, before, after, controller_state
-        )
+        crossed, part = self._crossings(cast(Scalar, t1 - t0), scene, before, after, known)
         before_switch, span = (t1 - t0) * part, t1 - t0
         far = span - before_switch > jnp.maximum(_OVERSHOOT * before_switch, 4.0 * MARGIN)
         again = crossed.any & (far | (crossed.field & (span > 2.0 * NEAR)))
@@ -138,18 +119,20 @@ class SwitchLocator(AbstractWrappedControl):
         approaches = crossed.field & (before_switch > NEAR)
         target = jnp.where(approaches, t0 + before_switch * (1.0 - _BEFORE), target)
         target = jax.lax.stop_gradient(target)
-        before_it = controller_state.inner
-        keep, next_t0, next_t1, inner = try_again(again, target, t0, adapted, before_it)
-        landed = self._landed(inner, keep, crossed, scene, after, y1_candidate, controller_state)
+        adapted = try_again(attempt, adapted, again, target)
+        inner, keep = adapted.memory, adapted.keep
+        landed = self._landed(inner, keep, crossed, scene, after, attempt.y1, known)
         ends = landed.arrived | (landed.code != 0)
         ended = diffrax.RESULTS.where(
             ends, diffrax.RESULTS.event_occurred, diffrax.RESULTS.successful
         )
-        result = diffrax.RESULTS.where(result == diffrax.RESULTS.successful, ended, result)
+        succeeds = adapted.result == diffrax.RESULTS.successful
+        result = diffrax.RESULTS.where(succeeds, ended, adapted.result)
         # A state that is no longer a number leaves no step size to go on with.
-        lost = ~jnp.isfinite(next_t1)
+        lost = ~jnp.isfinite(adapted.t1)
         result = diffrax.RESULTS.where(lost, diffrax.RESULTS.dt_min_reached, result)
-        return keep, next_t0, next_t1, jump | landed.saltation_pending, landed, result
+        jump = adapted.jump | landed.saltation_pending
+        return adapted._replace(jump=jump, memory=landed, result=result)
 
     def _crossings(
         self, span: Scalar, scene: PyTree, before: PyTree, after: PyTree, landed: SwitchLocatorState

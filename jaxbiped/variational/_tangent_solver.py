@@ -18,7 +18,12 @@ from jaxbiped._types import BoolScalarLike, RealScalarLike, Scalar, Time
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._projected_solver import Projected
-from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
+from jaxbiped.solve.controllers._wrapped_control import (
+    AbstractWrappedControl,
+    Adapted,
+    Attempt,
+    StepControl,
+)
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._rosenbrock_tangents import rosenbrock_tangents
 from jaxbiped.variational._saltation import has_saltation, jump_surface_values, saltation_at
@@ -168,33 +173,22 @@ class TangentControl(AbstractWrappedControl):
         """The first step's end and the controller's state, as diffrax asks."""
         return self.controller.init(*request)
 
-    def adapt_step_size(
-        self,
-        t0: Time,
-        t1: Time,
-        y0: Tangents,
-        y1_candidate: Tangents,
-        args: Seeded,
-        y_error: PyTree,
-        error_order: RealScalarLike | None,
-        controller_state: Any,
-    ) -> Adapted:
-        """Accepts or rejects a step, as diffrax asks."""
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does."""
         inverse = self.inverse_units[:, None]
-        size = jnp.maximum(jnp.abs(y0.columns), jnp.abs(y1_candidate.columns)) * inverse
-        floor = SHARE * jnp.max(size, axis=0) + args.floors
+        size = jnp.maximum(jnp.abs(attempt.y0.columns), jnp.abs(attempt.y1.columns)) * inverse
+        floor = SHARE * jnp.max(size, axis=0) + attempt.args.floors
         # The wrapped controller divides by its absolute tolerance; nothing else is left to it.
-        scaled = y_error.columns * inverse * (self.atol / (self.tangent_rtol * (size + floor)))
+        scaled = (
+            attempt.error.columns * inverse * (self.atol / (self.tangent_rtol * (size + floor)))
+        )
         zero_error = jnp.zeros_like(scaled)
-        return self.controller.adapt_step_size(
-            t0,
-            t1,
-            Tangents(y0.state, zero_error),
-            Tangents(y1_candidate.state, zero_error),
-            None,
-            Tangents(y_error.state, scaled),
-            error_order,
-            controller_state,
+        return attempt.by(
+            self.controller,
+            y0=Tangents(attempt.y0.state, zero_error),
+            y1=Tangents(attempt.y1.state, zero_error),
+            args=None,
+            error=Tangents(attempt.error.state, scaled),
         )
 
 

@@ -7,8 +7,8 @@ from jaxbiped._types import RealScalarLike, Scalar, Time
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import LANES, XLA, AbstractEngine, Program, Recorded, Recording, Request
 from jaxbiped.solve._accuracy import Precision
-from jaxbiped.solve._final_step import just_before_end
 from jaxbiped.solve._units import units_of
+from jaxbiped.solve.controllers._first_and_last_step import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._tangents import Seeded, Tangents
 from jaxbiped.variational._variational_program import AdaptiveColumns

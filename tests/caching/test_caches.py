@@ -22,7 +22,7 @@ from jaxbiped.compiler.runtime._machine_code import _LOADED
 from jaxbiped.compiler.runtime._primitive import call_recording
 from jaxbiped.compiler.runtime._program import Program
 from jaxbiped.gait._default_guess import default_guess
-from jaxbiped.solve._ending import WATCHES, ending_events
+from jaxbiped.solve._failure_events import WATCHES, ending_events
 from jaxbiped.solve._rigid_program import rigid_program
 from jaxbiped.solve._rigid_steps import RigidWalk
 from tests.compiler.one_shot import compiled

@@ -26,12 +26,13 @@ WORDS = {
     "docstring": ("dynamics/_rolling.py", "rolls without slip", "rolls and does not slip"),
     "new docstring": (COULOMB, "switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:",
                       "switches(self, slip_speed: Scalar) -> tuple[Scalar, ...]:\n        'None.'"),
-    "attribute's docstring": ("solve/_ending.py", "Rate of a leg at rest", "A resting leg's rate"),
-    "layout": ("solve/_ending.py", "_LOST_RATE = 0.1", "_LOST_RATE = (\n    0.10\n)"),
+    "attribute's docstring": ("solve/_failure_events.py", "Rate of a leg at rest",
+                              "A resting leg's rate"),
+    "layout": ("solve/_failure_events.py", "_LOST_RATE = 0.1", "_LOST_RATE = (\n    0.10\n)"),
 }  # fmt: skip
 CODE = {
     "sign of a law": (COULOMB, "return -self.mu", "return self.mu"),
-    "constant": ("solve/_ending.py", "_LOST_RATE = 0.1", "_LOST_RATE = 0.2"),
+    "constant": ("solve/_failure_events.py", "_LOST_RATE = 0.1", "_LOST_RATE = 0.2"),
     "string": ("gait/_find_gait.py", '"newton"', '"newtons"'),
     "registered for a class": ("dynamics/_rolling.py", "return rolling_field", "return None"),
     "compiler": ("compiler/passes/_liveness.py", "value.op in", "value.op not in"),

@@ -252,7 +252,7 @@ def test_memory_is_asked_for_by_the_steps_taken(monkeypatch):
     scene, start = jb.seed_scene(), jb.seed_state()
     few = jb.simulate(scene, start, duration=0.1)
     capped = jb.simulate(scene, start, duration=0.1, max_solver_steps=1 << 50)
-    monkeypatch.setattr("jaxbiped.solve._solve_by_lanes._ROOM", 16)
+    monkeypatch.setattr("jaxbiped.solve._lane_solve._ROOM", 16)
     again = jb.simulate(scene, start, duration=0.1)
     assert int(few.accepted) > 16
     for walk in (capped, again):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.solve._dense_output import AT_ONCE, evaluate_dense, join_parts, split_evenly
+from jaxbiped.solve._trajectory import AT_ONCE, evaluate_dense, join_parts, split_evenly
 
 
 def _oscillation(solver):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.solve._ending import WATCHES, ending_code, ending_events
+from jaxbiped.solve._failure_events import WATCHES, ending_code, ending_events
 
 SEED = jb.seed_scene()
 ALWAYS = jb.Scene(SEED.walker, SEED.ground, SEED.normal, SEED.friction, jb.laws.AlwaysTouching())

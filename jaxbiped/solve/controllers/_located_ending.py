@@ -9,13 +9,13 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped._types import RealScalarLike, Scalar, Time
-from jaxbiped.solve._ending import ending_events
-from jaxbiped.solve._ending_surface import ending_surface
+from jaxbiped._types import Scalar
+from jaxbiped.solve._failure_events import ending_events, ending_surface
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractWrappedControl,
     Adapted,
+    Attempt,
     StepControl,
     try_again,
 )
@@ -47,41 +47,27 @@ class LocatedEnding(AbstractWrappedControl):
         """The first step's end and the controller's state, as diffrax asks."""
         return self.controller.init(*request)
 
-    def adapt_step_size(
-        self,
-        t0: Time,
-        t1: Time,
-        y0: PyTree,
-        y1_candidate: PyTree,
-        args: PyTree,
-        y_error: PyTree,
-        error_order: RealScalarLike | None,
-        controller_state: Any,
-    ) -> Adapted:
+    def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, but for the last one."""
-        adapted = self.controller.adapt_step_size(
-            t0, t1, y0, y1_candidate, args, y_error, error_order, controller_state
-        )
-        keep, _, _, jump, _, result = adapted
-        start, span = jnp.asarray(t0), jnp.asarray(t1 - t0)
-        walked = jnp.asarray(result != diffrax.RESULTS.successful)
-        probe = y1_candidate if self.probe is None else self.probe
+        adapted = attempt.by(self.controller)
+        scene, y1, t1 = attempt.args, attempt.y1, attempt.t1
+        start, span = jnp.asarray(attempt.t0), jnp.asarray(t1 - attempt.t0)
+        walked = jnp.asarray(adapted.result != diffrax.RESULTS.successful)
+        probe = y1 if self.probe is None else self.probe
         failures = {
             name: happens
             for name, happens in ending_events(self.watch).items()
             if name != Ending.SOLVER_FAILED
         }
-        ends = keep & walked
+        ends = adapted.keep & walked
         for happens in failures.values():
-            ends = ends | (keep & jnp.asarray(happens(t1, probe, args)))
+            ends = ends | (adapted.keep & jnp.asarray(happens(t1, probe, scene)))
 
         def part_before() -> Scalar:
             code = jnp.asarray(int(Ending.WALKING))
             for name, happens in failures.items():
-                code = jnp.where(happens(t1, y1_candidate, args), int(name), code)
-            before, after = (
-                ending_surface(code, args, y1_candidate, y) for y in (y0, y1_candidate)
-            )
+                code = jnp.where(happens(t1, y1, scene), int(name), code)
+            before, after = (ending_surface(code, scene, y1, y) for y in (attempt.y0, y1))
             crossed = (before < 0.0) & (after > 0.0)
             crossed = crossed & (walked | (code != int(Ending.WALKING)))
             return jnp.where(crossed, before / jnp.where(crossed, before - after, 1.0), 1.0)
@@ -91,6 +77,5 @@ class LocatedEnding(AbstractWrappedControl):
         target = start + way * (1.0 + 0.5 * _OVERSHOOT) + _MARGIN
         possible = (target > start) & (target < start + span)
         again, target = jax.lax.stop_gradient((again & possible, target))
-        result = diffrax.RESULTS.where(again, diffrax.RESULTS.successful, result)
-        keep, next_t0, next_t1, inner = try_again(again, target, t0, adapted, controller_state)
-        return keep, next_t0, next_t1, jump, inner, result
+        result = diffrax.RESULTS.where(again, diffrax.RESULTS.successful, adapted.result)
+        return try_again(attempt, adapted, again, target)._replace(result=result)

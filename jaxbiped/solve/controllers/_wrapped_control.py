@@ -1,11 +1,11 @@
-"""Step-size controllers that wrap another one: what all of them have in common.
+"""Step-size controllers that wrap another one: what all of them have in common, and two plain ones.
 
 diffrax looks for tolerances and norm on the controller it is given, whatever that wraps.
 """
 
 import abc
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Protocol, Self, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -20,13 +20,6 @@ if TYPE_CHECKING:  # which takes the adaptive one's abstract attributes for argu
 else:
     from diffrax import AbstractAdaptiveStepSizeController as _Control
 
-AbstractControl = _Control
-"""What every controller of this project is for diffrax."""
-
-Adapted: TypeAlias = tuple[Scalar, Scalar, Scalar, Scalar, Any, Any]
-"""Whether a step is kept, the next one's ends, whether a jump was passed, the controller's state,
-and diffrax's result."""
-
 
 class StepControl(Protocol):
     """What is asked of a controller of step sizes; see `diffrax.AbstractStepSizeController`."""
@@ -34,25 +27,87 @@ class StepControl(Protocol):
     def init(self, *request: Any) -> tuple[Scalar, Any]:
         """The first step's end and the controller's state."""
 
-    def adapt_step_size(self, *step: Any) -> Adapted:
+    def adapt_step_size(self, *step: Any) -> tuple[Any, ...]:
         """Accepts or rejects a step."""
 
 
-def try_again(
-    again: Scalar, target: Scalar, start: Time, adapted: Adapted, before: Any
-) -> tuple[Scalar, Scalar, Scalar, Any]:
-    """Whether a step is kept, the next one's ends and the controller's state.
+class Adapted(NamedTuple):
+    """What a controller makes of an attempt.
 
-    Where it is tried `again`, the next one ends at the `target` at the latest, and the controller
-    knows what it did `before`.
+    Attributes:
+        keep: whether the step is accepted.
+        t0, t1: the next one's ends [s].
+        jump: whether a jump was passed.
+        memory: the controller's state.
+        result: diffrax's.
     """
-    keep, next_t0, next_t1, _, state, _ = adapted
-    sooner = jnp.where(keep, target, jnp.minimum(next_t1, target))
-    state = jtu.tree_map(lambda a, b: jnp.where(again, a, b), before, state)
-    return keep & ~again, jnp.where(again, start, next_t0), jnp.where(again, sooner, next_t1), state
+
+    keep: Scalar
+    t0: Scalar
+    t1: Scalar
+    jump: Scalar
+    memory: Any
+    result: Any
 
 
-class AbstractWrappedControl(AbstractControl):  # type: ignore[type-arg]
+class Attempt(NamedTuple):
+    """An attempted step, as diffrax tells a controller of it.
+
+    Attributes:
+        t0, t1: its ends [s].
+        y0, y1: states there.
+        args: those of the solve: of a walk the scene.
+        error: its estimate, shaped as a state.
+        order: of the error.
+        memory: the controller's state.
+    """
+
+    t0: Time
+    t1: Time
+    y0: PyTree
+    y1: PyTree
+    args: PyTree
+    error: PyTree
+    order: RealScalarLike | None
+    memory: Any
+
+    def by(self, controller: StepControl, **changes: Any) -> Adapted:
+        """What a controller makes of it, or of the same with these changes."""
+        return Adapted(*controller.adapt_step_size(*self._replace(**changes)))
+
+
+class AbstractControl(_Control):  # type: ignore[type-arg]
+    """What every controller of this project is for diffrax."""
+
+    @abc.abstractmethod
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        """The first step's end and the controller's state, as diffrax asks."""
+
+    @abc.abstractmethod
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step."""
+
+    def adapt_step_size(self, *step: Any) -> Adapted:
+        """Accepts or rejects a step, as diffrax asks."""
+        return self.adapt(Attempt(*step))
+
+
+def try_again(attempt: Attempt, adapted: Adapted, again: Scalar, target: Scalar) -> Adapted:
+    """The same where a step is not tried `again`.
+
+    Where it is, the next one ends at the `target` at the latest, and the controller knows what it
+    did before.
+    """
+    sooner = jnp.where(adapted.keep, target, jnp.minimum(adapted.t1, target))
+    return adapted._replace(
+        memory=jtu.tree_map(lambda a, b: jnp.where(again, a, b), attempt.memory, adapted.memory),
+        keep=adapted.keep & ~again,
+        t0=jnp.where(again, attempt.t0, adapted.t0),
+        t1=jnp.where(again, sooner, adapted.t1),
+    )
+
+
+class AbstractWrappedControl(AbstractControl):
     """Leaves every step's size to another controller, and adds something of its own.
 
     Attributes:
@@ -81,10 +136,60 @@ class AbstractWrappedControl(AbstractControl):  # type: ignore[type-arg]
         """As diffrax asks; direction makes no difference to what is wrapped here."""
         return self
 
-    @abc.abstractmethod
+
+class Extremes(AbstractWrappedControl):
+    """Wraps a controller; keeps the least and largest values at the ends of the accepted steps.
+
+    Exact for every solver, and without room for the steps themselves. The start counts as an end.
+
+    Attributes:
+        controller: decides every step's size.
+        function: of (args, state).
+    """
+
+    controller: StepControl
+    function: Callable[[PyTree, PyTree], PyTree] = eqx.field(static=True)
+
     def init(self, *request: Any) -> tuple[Scalar, Any]:
         """The first step's end and the controller's state, as diffrax asks."""
+        first, inner = self.controller.init(*request)
+        _, _, _, y0, _, args, *_ = request
+        value = self.function(args, y0)
+        return first, (inner, value, value)
 
-    @abc.abstractmethod
-    def adapt_step_size(self, *step: Any) -> Adapted:
-        """Accepts or rejects a step, as diffrax asks."""
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does, and looks."""
+        inner, lowest, highest = attempt.memory
+        adapted = attempt.by(self.controller, memory=inner)
+        value = self.function(attempt.args, attempt.y1)
+
+        def kept(choose: Callable[[Scalar, Scalar], Scalar], old: PyTree) -> PyTree:
+            return jtu.tree_map(lambda a, b: jnp.where(adapted.keep, choose(a, b), a), old, value)
+
+        extremes = kept(jnp.minimum, lowest), kept(jnp.maximum, highest)
+        return adapted._replace(memory=(adapted.memory, *extremes))
+
+
+class GivenFirstStep(AbstractWrappedControl):
+    """Wraps a controller; brings the first step's size itself, and the solve's `dt0` is None.
+
+    diffrax checks a size that it is given by a call back to Python, and a program with such a call
+    cannot be kept on disk. Sizes are checked before a solve begins.
+
+    Attributes:
+        controller: decides every step's size but the first's.
+        size: of the first step, or of all where the controller keeps it [s].
+    """
+
+    controller: StepControl
+    size: RealScalarLike
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        """The first step's end and the controller's state, as diffrax asks."""
+        terms, t0, t1, y0, _, *rest = request
+        size = jnp.asarray(self.size, dtype=jnp.result_type(t0))
+        return self.controller.init(terms, t0, t1, y0, size, *rest)
+
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does."""
+        return attempt.by(self.controller)

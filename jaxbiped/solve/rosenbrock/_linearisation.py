@@ -1,9 +1,12 @@
-"""Linearisation of a vector field: value, exact Jacobian, and (I − g J)⁻¹ on vectors."""
+"""Linearisation of a vector field: value, exact Jacobian, and (I − g J)⁻¹ on vectors.
+
+Entries that are zero by structure, read off the field's own program, are left out.
+"""
 
 import abc
 import math
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import equinox as eqx
 import jax
@@ -11,17 +14,68 @@ import jax.extend
 import jax.flatten_util
 import jax.numpy as jnp
 import jax.tree_util as jtu
+from jax.extend.core import Jaxpr, Literal, Var
 from jaxtyping import PyTree
 
+from jaxbiped._jax_versions import ClosedJaxpr, called_program
 from jaxbiped._types import Scalar
 from jaxbiped.linalg._elimination import Entry, Matrix, inverse, matmul
-from jaxbiped.solve.rosenbrock._sparsity import Structure, structure_of
-
-Components: TypeAlias = list[Scalar]
-"""A point of the state space: its scalars one by one, or one vector that holds them all."""
 
 _MOST_SCALARS = 24
 """Up to this size a Jacobian is eliminated scalar by scalar; beyond, as one dense matrix."""
+
+
+class Structure(NamedTuple):
+    """Structure of a function of scalars.
+
+    Attributes:
+        depends: for each output, the positions of the inputs that it can depend on.
+        copies: for each output, the position of the input that it is a plain copy of, or None.
+    """
+
+    depends: tuple[frozenset[int], ...]
+    copies: tuple[int | None, ...]
+
+
+def structure_of(program: ClosedJaxpr) -> Structure:
+    """Structure of a traced program. Conservative: a dependence may be reported in vain."""
+    jaxpr = program.jaxpr
+    inputs: list[frozenset[int]] = [frozenset([i]) for i in range(len(jaxpr.invars))]
+    copies: list[int | None] = list(range(len(jaxpr.invars)))
+    depends, copied = _propagate(jaxpr, inputs, copies)
+    return Structure(tuple(depends), tuple(copied))
+
+
+def _propagate(
+    jaxpr: Jaxpr, inputs: list[frozenset[int]], copies: list[int | None]
+) -> tuple[list[frozenset[int]], list[int | None]]:
+    depends: dict[Var, frozenset[int]] = dict(zip(jaxpr.invars, inputs, strict=True))
+    copied: dict[Var, int | None] = dict(zip(jaxpr.invars, copies, strict=True))
+
+    def read(atom: Var | Literal) -> tuple[frozenset[int], int | None]:
+        if isinstance(atom, Literal):
+            return frozenset(), None
+        return depends.get(atom, frozenset()), copied.get(atom)
+
+    for equation in jaxpr.eqns:
+        arguments = [read(atom) for atom in equation.invars]
+        called = called_program(equation)
+        if called is None:
+            union: frozenset[int] = frozenset().union(*(used for used, _ in arguments))
+            results = [union] * len(equation.outvars)
+            results_copied: list[int | None] = [None] * len(equation.outvars)
+        else:
+            results, results_copied = _propagate(
+                called[0], [used for used, _ in arguments], [source for _, source in arguments]
+            )
+        for variable, used, source in zip(equation.outvars, results, results_copied, strict=True):
+            depends[variable], copied[variable] = used, source
+    outputs = [read(atom) for atom in jaxpr.outvars]
+    return [used for used, _ in outputs], [source for _, source in outputs]
+
+
+Components: TypeAlias = list[Scalar]
+"""A point of the state space: its scalars one by one, or one vector that holds them all."""
 
 
 class AbstractLinearisation(eqx.Module):

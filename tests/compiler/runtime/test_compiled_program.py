@@ -25,9 +25,9 @@ from jaxbiped.compiler.runtime._host_cpu import host
 from jaxbiped.compiler.runtime._program import Program
 from jaxbiped.compiler.runtime._threads import default_threads
 from jaxbiped.solve._adaptive_program import Solve
-from jaxbiped.solve._final_step import just_before_end
-from jaxbiped.solve._solve_by_lanes import Setting, request_of
+from jaxbiped.solve._lane_solve import Setting, request_of
 from jaxbiped.solve._units import units_of
+from jaxbiped.solve.controllers._first_and_last_step import just_before_end
 
 SCENE = jb.seed_scene()
 SEED = np.array([float(leaf) for leaf in jb.seed_state()])

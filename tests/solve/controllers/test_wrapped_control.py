@@ -7,14 +7,12 @@ import jax.numpy as jnp
 import pytest
 
 from jaxbiped.solve._accuracy import rms_norm
-from jaxbiped.solve.controllers._crossed_switches import CrossedSwitches
-from jaxbiped.solve.controllers._extremes import Extremes
-from jaxbiped.solve.controllers._footstep_limit import FootstepLimit
+from jaxbiped.solve.controllers._contact_steps import ShallowContact, TouchdownAhead
+from jaxbiped.solve.controllers._footstep_counter import FootstepLimit
 from jaxbiped.solve.controllers._located_ending import LocatedEnding
-from jaxbiped.solve.controllers._shallow_contact import ShallowContact
-from jaxbiped.solve.controllers._step_control import InUnits
-from jaxbiped.solve.controllers._touchdown_ahead import TouchdownAhead
-from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl
+from jaxbiped.solve.controllers._tangent_step_size import InUnits
+from jaxbiped.solve.controllers._walk_step_size import CrossedSwitches
+from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Extremes
 from jaxbiped.variational._switch_locator import SwitchLocator
 from jaxbiped.variational._tangent_solver import TangentControl
 

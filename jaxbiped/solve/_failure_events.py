@@ -1,4 +1,4 @@
-"""Events that end a simulation, and what an ending is told by."""
+"""Failure events, which end a simulation, and the surfaces of the state on which endings lie."""
 
 from collections.abc import Callable, Mapping
 
@@ -38,6 +38,11 @@ def fall_height(scene: Scene) -> Scalar:
 def has_fallen(scene: Scene, state: State) -> Scalar:
     """Whether the hip is lower than a leg at 1 rad could carry it (boolean)."""
     return state.hip_z < fall_height(scene)
+
+
+def _energy_unit(scene: Scene) -> Scalar:
+    """The walker's weight times its leg's length [J]."""
+    return scene.walker.total_mass * scene.ground.g * scene.walker.l
 
 
 @cached_jit  # for its trace cache
@@ -85,7 +90,7 @@ def has_stopped(scene: Scene, state: State) -> Scalar:
     foot_1, foot_2 = feet(scene, state)
     touch_1, touch_2 = touches(foot_1), touches(foot_2)
     if not isinstance(scene.clearance, StanceRotation):
-        unit = scene.walker.total_mass * scene.ground.g * scene.walker.l
+        unit = _energy_unit(scene)
         at_rest = energies(scene, state).kinetic < REST_ENERGY * unit
         return (touch_1 | touch_2) & at_rest
     unit = jnp.sqrt(scene.ground.g / scene.walker.l)
@@ -190,3 +195,93 @@ def ending_code(
     for name, happened in events.items():
         code = jnp.where(happened, int(name), code)
     return code
+
+
+def ending_surface(code: Scalar, scene: PyTree, end: PyTree, y: PyTree) -> Scalar:
+    """Rises through zero where a compliant walk comes to the ending of a `code`.
+
+    Of "walking" it is the last heel strike. Where several conditions make an ending, it is the one
+    that is met last. NaN for endings that no state decides.
+
+    Args:
+        code: of an `Ending`.
+        scene: what walks, in minimal or redundant coordinates.
+        end: a state just past the ending, which decides between causes of the same code.
+        y: the state of which the value is wanted.
+    """
+    minimal: PyTree = minimal_state(scene, y)
+    past: PyTree = minimal_state(scene, end)
+    both = feet(scene, y)
+    held = [_contact(scene, foot, rate) for foot, rate in zip(both, _rates(minimal), strict=True)]
+    feet_then = feet(scene, end)
+    fallen = fall_height(scene) - minimal.hip_z
+    barred = _turning(scene, both, minimal)
+    stumbled = _stumble(scene, both, held)
+    values = {
+        Ending.WALKING: jnp.where(feet_then.foot_1.x > feet_then.foot_2.x, held[0], held[1]),
+        Ending.FELL_FORWARD: jnp.where(has_fallen(scene, past), fallen, barred),
+        Ending.FELL_BACK: fallen,
+        Ending.STOPPED: _rest(scene, both, minimal, held),
+        Ending.STUMBLED: jnp.where(has_stumbled(scene, past), stumbled, barred),
+    }
+    found = jnp.full_like(fallen, jnp.nan)
+    for name, value in values.items():
+        found = jnp.where(code == int(name), value, found)
+    return found
+
+
+def _rates(state: PyTree) -> tuple[Scalar, Scalar]:
+    return state.omega_1, state.omega_2
+
+
+def _least(*values: Scalar) -> Scalar:
+    least = values[0]
+    for value in values[1:]:
+        least = jnp.minimum(least, value)
+    return least
+
+
+def _contact(scene: Scene, foot: Foot, rate: Scalar) -> Scalar:
+    """Above zero where a foot touches."""
+    if not isinstance(scene.clearance, StanceRotation):
+        return foot.penetration
+    return jnp.minimum(foot.penetration, -rate)
+
+
+def _turning(scene: Scene, both: tuple[Foot, Foot], state: PyTree) -> Scalar:
+    """Above zero where a leg whose foot is under the ground turns back; see `is_barred`."""
+    if not isinstance(scene.clearance, StanceRotation):
+        return jnp.full_like(state.hip_z, -jnp.inf)
+    slow = REST_RATE * jnp.sqrt(scene.ground.g / scene.walker.l)
+    legs = zip(both, _rates(state), strict=True)
+    first, second = (
+        jnp.where(rate < 0.0, -jnp.inf, _least(foot.penetration, slow - rate))
+        for foot, rate in legs
+    )
+    return jnp.maximum(first, second)
+
+
+def _rest(scene: Scene, both: tuple[Foot, Foot], state: PyTree, held: list[Scalar]) -> Scalar:
+    """Above zero where the leg that stands alone is at rest, or all the walker is."""
+    if not isinstance(scene.clearance, StanceRotation):
+        unit = _energy_unit(scene)
+        still = REST_ENERGY * unit - energies(scene, state).kinetic
+        return jnp.minimum(jnp.maximum(*held), still)
+    slow = REST_RATE * jnp.sqrt(scene.ground.g / scene.walker.l)
+    first, second = (
+        _least(foot.penetration, rate + slow, -held[1 - i])
+        for i, (foot, rate) in enumerate(zip(both, _rates(state), strict=True))
+    )
+    return jnp.maximum(first, second)
+
+
+def _stumble(scene: Scene, both: tuple[Foot, Foot], held: list[Scalar]) -> Scalar:
+    """Above zero where the rear foot comes down, moving forward, while the other carries."""
+    least = STUMBLE_SPEED * jnp.sqrt(scene.ground.g * scene.walker.l)
+
+    def trips(rear: Foot, front: Foot) -> Scalar:
+        entering = rear.penetration_rate - jnp.maximum(front.penetration_rate, 0.0)
+        fast = _least(rear.penetration_rate - least, rear.slip_speed - least)
+        return _least(*held, front.x - rear.x, entering, fast)
+
+    return jnp.maximum(trips(*both), trips(both[1], both[0]))

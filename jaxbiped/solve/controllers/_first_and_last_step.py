@@ -1,14 +1,21 @@
-"""Final steps of a solve: how they meet its end, as diffrax has it."""
+"""First and last steps of a solve: their sizes, and how they meet its end as diffrax has it."""
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped._types import Numbers, Scalar
-from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped._cached_jit import cached_jit
+from jaxbiped._types import Numbers, RealScalarLike, Scalar
 
+_FIRST_STEP = 1e-5
+"""First step tried, in units of time; a start that is not a number must not choose it."""
 _CLIPPED_ULPS = 100
 """A step that would end this near the end, in units in the last place, ends there."""
+
+
+def first_step(duration: Numbers, time_unit: RealScalarLike = 1.0) -> Scalar:
+    """The first step to try [s] in a solve of at most `duration` [s]."""
+    return jnp.minimum(jnp.full_like(duration, _FIRST_STEP) * time_unit, duration)
 
 
 @cached_jit  # many small operations

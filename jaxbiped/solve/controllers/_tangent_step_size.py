@@ -1,19 +1,21 @@
-"""Step control: how diffrax chooses the steps of solves that carry derivatives with the state."""
+"""Step size of solves that carry derivatives with the state: how diffrax chooses it."""
 
 from collections.abc import Callable
 from typing import Any, cast
 
 import diffrax
-import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import Numbers, RealScalarLike, Scalar, Time
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.solve._units import Units
-from jaxbiped.solve.controllers._wrapped_control import AbstractWrappedControl, Adapted, StepControl
+from jaxbiped.solve.controllers._wrapped_control import (
+    AbstractWrappedControl,
+    Adapted,
+    Attempt,
+    StepControl,
+)
 
-_FIRST_STEP = 1e-5
-"""First step tried, in units of time; a start that is not a number must not choose it."""
 SMALLEST_STEP = 1e-12
 """Step size, in units of time, that is taken whatever its error: how a jump of the force is
 crossed."""
@@ -48,11 +50,6 @@ def step_control(
     return found if units is None else InUnits(found, units.inverse)
 
 
-def first_step(duration: Numbers, time_unit: RealScalarLike = 1.0) -> Scalar:
-    """The first step to try [s] in a solve of at most `duration` [s]."""
-    return jnp.minimum(jnp.full_like(duration, _FIRST_STEP) * time_unit, duration)
-
-
 class InUnits(AbstractWrappedControl):
     """Wraps a controller; shows it states and errors in units of their own.
 
@@ -68,19 +65,10 @@ class InUnits(AbstractWrappedControl):
         """The first step's end and the controller's state, as diffrax asks."""
         return self.controller.init(*request)
 
-    def adapt_step_size(
-        self,
-        t0: Time,
-        t1: Time,
-        y0: PyTree,
-        y1_candidate: PyTree,
-        args: PyTree,
-        y_error: PyTree,
-        *rest: Any,
-    ) -> Adapted:
-        """Accepts or rejects a step, as diffrax asks."""
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does."""
         before, after, error = (
             jtu.tree_map(lambda leaf, inverse: leaf * inverse, y, self.inverse)
-            for y in (y0, y1_candidate, y_error)
+            for y in (attempt.y0, attempt.y1, attempt.error)
         )
-        return self.controller.adapt_step_size(t0, t1, before, after, args, error, *rest)
+        return attempt.by(self.controller, y0=before, y1=after, error=error)

@@ -1,0 +1,211 @@
+"""Contacts within a step: what three step-size controllers do about them.
+
+A foot that is off the ground at both ends of a step may touch it in between, and one that is barely
+in it at an end may have been deeper. No error estimate sees that where no stage of the step feels
+its force: `ShallowContact` ends the step just past the contact's beginning instead.
+
+The corner of the force where a foot comes down rejects steps of any size that go far past it. Size
+by size this would cost some ten attempts at every touchdown of the seed's walker: `TouchdownAhead`
+lets a step that was rejected end just past that the next time.
+
+Steps of one size are not cut short: `MissedContacts` counts those that step over a contact.
+"""
+
+import functools
+from typing import Any, cast
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar
+from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.scene._redundant_scene import CompliantScene
+from jaxbiped.solve._fusion_barrier import fusion_barrier
+from jaxbiped.solve._step_polynomials import StepCubic
+from jaxbiped.solve.controllers._wrapped_control import (
+    AbstractWrappedControl,
+    Adapted,
+    Attempt,
+    StepControl,
+    try_again,
+)
+
+_OVERSHOOT = 5e-5
+"""Part of the way to the ground that a step ends past it."""
+_MARGIN = 1e-12
+"""Time that it does besides [s]."""
+_BARELY = 1e-2
+"""Depth and speed in the ground at a step's end, in units of height and speed at its beginning,
+below which a contact is shallow."""
+_BARELY_WHERE_KEPT = 0.1
+"""That depth where the step would be kept."""
+_ALL = 0.999
+"""Part of a step that is as good as all of it."""
+_REACH = 2.0
+"""Way that a foot can sink or rise in a step, in units of the one at the speed it begins with."""
+_LESS_PAST = 0.03
+"""How far the next attempt goes past a touchdown, as a share of the rejected one's way."""
+_LARGEST = 0.95
+"""The next attempt, at most, as a share of the rejected one."""
+
+
+class ShallowContact(AbstractWrappedControl):
+    """Wraps a controller; a step within which a foot dips into the ground is tried again, to there.
+
+    The solve's `args` must be the scene.
+
+    Attributes:
+        controller: decides every step's size.
+    """
+
+    controller: StepControl
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        """The first step's end and the controller's state, as diffrax asks."""
+        return self.controller.init(*request)
+
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does, but for shallow contacts."""
+        adapted = attempt.by(self.controller)
+        start, span = cast(Scalar, attempt.t0), cast(Scalar, attempt.t1 - attempt.t0)
+        found = _touchdown(attempt.args, start, span, adapted.keep, attempt.y0, attempt.y1)
+        again, target = jax.lax.stop_gradient(found)
+        return try_again(attempt, adapted, again, target)
+
+
+def _touchdown(
+    scene: PyTree, t0: Scalar, span: Scalar, keep: Scalar, y0: PyTree, y1: PyTree
+) -> tuple[Scalar, Scalar]:
+    """Whether a step, which is to be kept or not, is to end at a contact instead, and when [s]."""
+    part = jnp.ones_like(span)
+    for k, before in enumerate(feet(scene, y0)):
+        if before.admitted is False:
+            continue
+        near = jnp.abs(before.penetration) < _REACH * span * before.penetration_rate
+        near = near if before.admitted is None else near & before.admitted
+        above = functools.partial(_part_above, scene, span, keep, k, before, y1)
+        part = jnp.minimum(part, jnp.where(near, fusion_barrier(near, above), 1.0))
+    target = t0 + span * part * (1.0 + _OVERSHOOT) + _MARGIN
+    return (part < _ALL) & (target < t0 + span), target
+
+
+def _part_above(
+    scene: PyTree, span: Scalar, keep: Scalar, k: int, before: Foot, y1: PyTree
+) -> Scalar:
+    """The part of a step after which a foot comes into the ground, barely; 1 if it does not.
+
+    Or that after which it is lowest, where it may come into the ground. A step that is tried again
+    to there ends in the air, or in the ground at no speed: then the contact has begun before. So it
+    has where the foot is on its way out of the ground, and a damper's force is over by then. Or the
+    part after which a foot is deepest that begins barely in the ground and ends out of it: a smooth
+    force is not felt yet where the step begins. Of a step that is not kept the end tells nothing.
+    """
+    after = feet(scene, y1)[k]
+    rates = span * before.penetration_rate, span * after.penetration_rate
+    depth = StepCubic(before.penetration, after.penetration, *rates)
+    off, rises = depth.start <= 0.0, keep & (depth.end_slope < 0.0)
+    brief = ~off & (depth.start_slope > 0.0) & (depth.end <= 0.0) & rises
+    if before.admitted is not None and after.admitted is not None:
+        admitted = before.admitted & after.admitted
+        off, brief = off & admitted, brief & admitted
+    leaves = off & (depth.end <= 0.0) & depth.may_touch()
+    slow = jnp.abs(depth.end_slope) < _BARELY * depth.start_slope
+    barely = slow & (depth.end < -jnp.where(keep, _BARELY_WHERE_KEPT, _BARELY) * depth.start)
+    stays = off & (depth.end > 0.0) & (barely | rises)
+    lowest = jnp.where(leaves | brief, depth.turning_point(), 1.0)
+    deepest = depth.at(lowest)
+    contact = (leaves | stays) & (deepest > 0.0)
+
+    def touchdown() -> Scalar:
+        # The same cubic up to there, where it has a sign change to be found.
+        slope_there = jnp.where(leaves, 0.0, depth.end_slope)
+        down = StepCubic(depth.start, deepest, lowest * depth.start_slope, lowest * slope_there)
+        return lowest * down.sign_change()
+
+    return jnp.where(contact, fusion_barrier(contact, touchdown), lowest)
+
+
+class TouchdownAhead(AbstractWrappedControl):
+    """Wraps a controller; what is tried after a rejected step may be longer than that says.
+
+    The solve's `args` must be the scene.
+
+    Attributes:
+        controller: decides every step's size.
+    """
+
+    controller: StepControl
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        """The first step's end and the controller's state, as diffrax asks."""
+        return self.controller.init(*request)
+
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does; the next one's size differs."""
+        adapted = attempt.by(self.controller)
+        span = jnp.asarray(attempt.t1 - attempt.t0)
+        target = jnp.asarray(attempt.t0) + _to_touchdown(attempt.args, span, attempt.y0)
+        target = jax.lax.stop_gradient(jnp.maximum(adapted.t1, target))
+        return adapted._replace(t1=jnp.where(adapted.keep, adapted.t1, target))
+
+
+def _to_touchdown(scene: CompliantScene, span: Scalar, state: PyTree) -> Scalar:
+    """Time to just past where the last foot comes down that does in `span` [s]; 0 if none does.
+
+    At the speed that it has: where that falls short, once more the next time.
+    """
+    found = jnp.zeros_like(span)
+    for foot in feet(scene, state):
+        if foot.admitted is False:
+            continue
+        falls = (foot.penetration < 0.0) & (foot.penetration_rate > 0.0)
+        if foot.admitted is not None:
+            falls = falls & foot.admitted
+        time = -foot.penetration / jnp.where(falls, foot.penetration_rate, 1.0)
+        past = jnp.minimum(time + _LESS_PAST * (span - time), _LARGEST * span)
+        found = jnp.maximum(found, jnp.where(falls & (time < span), past, 0.0))
+    return found
+
+
+class MissedContacts(AbstractWrappedControl):
+    """Wraps a controller; its state carries how many contacts lie between two steps.
+
+    The solve's `args` must be the scene.
+
+    Attributes:
+        controller: decides every step's size.
+    """
+
+    controller: StepControl
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        """The first step's end and the controller's state, as diffrax asks."""
+        first, inner = self.controller.init(*request)
+        return first, (inner, jnp.zeros((), dtype=jnp.int32))
+
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does, and counts."""
+        inner, count = attempt.memory
+        adapted = attempt.by(self.controller, memory=inner)
+        span = jnp.asarray(attempt.t1 - attempt.t0)
+        before, after = feet(attempt.args, attempt.y0), feet(attempt.args, attempt.y1)
+        for k in range(2):
+            missed = adapted.keep & _misses(span, before[k], after[k])
+            count = count + jnp.where(missed, 1, 0).astype(count.dtype)
+        return adapted._replace(memory=(adapted.memory, count))
+
+
+def _misses(span: Scalar, before: Foot, after: Foot) -> Scalar | bool:
+    """Whether a foot that is off the ground at both ends is in it in between (boolean).
+
+    By the cubic through depths and rates at both ends.
+    """
+    if before.admitted is False:
+        return False
+    rates = span * before.penetration_rate, span * after.penetration_rate
+    depth = StepCubic(before.penetration, after.penetration, *rates)
+    off = (depth.start <= 0.0) & (depth.end <= 0.0) & (depth.start_slope > 0.0)
+    if before.admitted is not None and after.admitted is not None:
+        off = off & before.admitted & after.admitted
+    return off & depth.turns() & (depth.at(depth.turning_point()) > 0.0)

@@ -1,0 +1,57 @@
+"""Footstep limit: a step-size controller that ends the solve after enough footsteps."""
+
+from typing import Any
+
+import diffrax
+import jax.numpy as jnp
+
+from jaxbiped._types import RealScalarLike, Scalar
+from jaxbiped.dynamics._feet import feet, landings, standing_foot
+from jaxbiped.solve.controllers._wrapped_control import (
+    AbstractWrappedControl,
+    Adapted,
+    Attempt,
+    StepControl,
+)
+
+PATIENCE = 100.0
+"""Time allowed for each footstep asked for [s]."""
+
+
+class FootstepLimit(AbstractWrappedControl):
+    """Wraps a controller; ends the solve at the end of the step with the last heel strike.
+
+    Its state carries what no function of the walker's state can tell: which foot struck last, and
+    how many strikes there were. The solve's `args` must be the scene.
+
+    Attributes:
+        controller: decides every step's size.
+        limit: number of heel strikes after which the solve ends.
+    """
+
+    controller: StepControl
+    limit: RealScalarLike
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        """The first step's end and the controller's state, as diffrax asks."""
+        first, inner = self.controller.init(*request)
+        _, _, _, y0, _, args, *_ = request
+        last = standing_foot(feet(args, y0))
+        return first, (inner, last, jnp.zeros_like(last))
+
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does, and counts."""
+        inner, last, count = attempt.memory
+        adapted = attempt.by(self.controller, memory=inner)
+        before, after = feet(attempt.args, attempt.y0), feet(attempt.args, attempt.y1)
+        lands_1, lands_2 = landings(before, after)
+        strike_1 = adapted.keep & lands_1 & (last != 1)
+        strike_2 = adapted.keep & lands_2 & (last != 2)
+        last = jnp.where(strike_1, 1, jnp.where(strike_2, 2, last))
+        count = count + jnp.where(strike_1 | strike_2, 1, 0)
+        successful = diffrax.RESULTS.successful
+        done = diffrax.RESULTS.where(
+            count >= self.limit, diffrax.RESULTS.event_occurred, successful
+        )
+        result = diffrax.RESULTS.where(adapted.result == successful, done, adapted.result)
+        return adapted._replace(memory=(adapted.memory, last, count), result=result)

@@ -1,0 +1,229 @@
+"""Step size of a walk: from the error estimate of the last attempt, the same by every engine.
+
+By the plain law of integral control. Unlike diffrax's own it lets an accepted step be followed by a
+smaller one, and a rejected one by none that is larger: where the force has corners, both save
+attempts (Hairer, Nørsett and Wanner, Solving Ordinary Differential Equations I, section II.4).
+A step within which the contact changes its kind must be the more exact: the embedded estimate of
+some methods sees little of a corner of the force that a step crosses.
+"""
+
+import functools
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import diffrax
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+from jaxtyping import PyTree
+
+from jaxbiped._types import Numbers, RealScalarLike, Scalar
+from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.dynamics._forces import foot_force
+from jaxbiped.scene._redundant_scene import CompliantScene
+from jaxbiped.scene.laws.friction._frictionless import Frictionless
+from jaxbiped.solve._accuracy import rms_norm
+from jaxbiped.solve._units import Units
+from jaxbiped.solve.controllers._contact_steps import ShallowContact, TouchdownAhead
+from jaxbiped.solve.controllers._tangent_step_size import SAFETY, SMALLEST_STEP
+from jaxbiped.solve.controllers._wrapped_control import (
+    AbstractControl,
+    AbstractWrappedControl,
+    Adapted,
+    Attempt,
+    StepControl,
+)
+
+_LEAST, _MOST = 0.2, 10.0
+"""Sizes of the next step, in units of the last attempt."""
+_TINY = 1e-30
+"""Mean square of errors below which it makes no difference."""
+_RESOLUTION = 8.9e-16
+"""Smallest step, in units of the time that has passed: four roundings of 64 bits. In 32 bits such
+a step stands still and runs out of attempts, as it should."""
+_ROUNDING = 1.01
+"""Times the smallest step that counts as it."""
+_SAME_SLIP = 3.0
+"""Factor by which the slip speed may change in a step: a Stribeck curve is bent on that scale."""
+
+
+def walk_control(
+    rtol: RealScalarLike, atol: RealScalarLike, units: Units, *, switch_weight: float = 1.0
+) -> StepControl:
+    """The controller of a walk's steps; the solve's `args` must be the scene.
+
+    Args:
+        rtol, atol: tolerances; the absolute one in units of each leaf.
+        units: of the state's leaves and of time.
+        switch_weight: of the errors of steps that cross a switch (see `weigh_crossed`).
+    """
+    control: StepControl = ErrorControl(rtol, atol, units)
+    if switch_weight != 1.0:
+        control = CrossedSwitches(control, switch_weight)
+    return ShallowContact(TouchdownAhead(control))
+
+
+class ErrorControl(AbstractControl):
+    """Keeps steps whose error is below the tolerance; its state is whether the last was rejected.
+
+    The solve's first step must be given.
+
+    Attributes:
+        rtol, atol: tolerances; the absolute one in units of each leaf.
+        units: of the state's leaves and of time.
+    """
+
+    rtol: RealScalarLike
+    atol: RealScalarLike
+    units: Units
+
+    @property
+    def norm(self) -> Callable[[PyTree], RealScalarLike]:
+        """Of errors in units of the tolerance."""
+        return rms_norm
+
+    def wrap(self, direction: RealScalarLike) -> "ErrorControl":
+        """As diffrax asks; walks are never solved backwards."""
+        return self
+
+    def init(self, *request: Any) -> tuple[Scalar, Scalar]:
+        """The first step's end and the controller's state, as diffrax asks."""
+        _, t0, _, _, dt0, *_ = request
+        return jnp.asarray(t0 + dt0), jnp.asarray(False)
+
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step."""
+        t0, t1, rejected = attempt.t0, attempt.t1, attempt.memory
+        span = jnp.asarray(t1 - t0)
+        # A state that is no longer a number ends the solve in another way than by small steps.
+        smallest = jnp.maximum(
+            SMALLEST_STEP * jnp.asarray(self.units.time, span.dtype),
+            _RESOLUTION * jnp.abs(t1),
+        )
+        square = self._mean_square(attempt.y0, attempt.y1, attempt.error)
+        keep = (square < 1.0) | (span <= _ROUNDING * smallest)
+        most = jnp.where(keep & ~rejected, _MOST, 1.0)
+        wanted = SAFETY / _root(jnp.maximum(square, _TINY), attempt.order)
+        factor = jnp.clip(wanted, _LEAST, most).astype(span.dtype)
+        size = jax.lax.stop_gradient(jnp.maximum(span * factor, smallest))
+        start = jnp.where(keep, t1, t0)
+        jump = jnp.asarray(False)
+        return Adapted(keep, start, start + size, jump, ~keep, diffrax.RESULTS.successful)
+
+    def _mean_square(self, y0: PyTree, y1: PyTree, error: PyTree) -> Scalar:
+        """Of the errors in units of the tolerance."""
+
+        def scale(before: Scalar, after: Scalar, off: Scalar, inverse: Numbers) -> Scalar:
+            largest = jnp.maximum(jnp.abs(before), jnp.abs(after))
+            return jnp.asarray(self.atol / inverse + self.rtol * largest, off.dtype)
+
+        scales = jtu.tree_map(scale, y0, y1, error, self.units.inverse)
+        errors = jtu.tree_leaves(error)
+        quotients = _quotients(errors, jtu.tree_leaves(scales))
+        total = sum(jnp.sum(quotient * quotient) for quotient in quotients)
+        found = jnp.asarray(total / sum(jnp.size(leaf) for leaf in errors))
+        return jnp.where(found < jnp.inf, found, jnp.inf)  # where it is not a number, too
+
+
+def _quotients(numerators: Sequence[Scalar], denominators: Sequence[Scalar]) -> list[Scalar]:
+    """Of pairs of numbers; one division, which takes long, serves several of them."""
+    if len({jnp.shape(each) for each in denominators}) > 1:
+        together = 1
+    else:
+        # Products of so many tolerances are still far from the smallest numbers of the type.
+        together = 4 if denominators[0].dtype == jnp.float64 else 2
+    inverses: list[Scalar] = []
+    for first in range(0, len(denominators), together):
+        inverses += _inverses(denominators[first : first + together])
+    return [a * inverse for a, inverse in zip(numerators, inverses, strict=True)]
+
+
+def _inverses(numbers: Sequence[Scalar], over_all: Scalar | None = None) -> list[Scalar]:
+    """One over each of some numbers, from one over the product of all, by which it divides once."""
+    if over_all is None:
+        over_all = 1.0 / _product(numbers)
+    if len(numbers) == 1:
+        return [over_all]
+    middle = len(numbers) // 2
+    left, right = numbers[:middle], numbers[middle:]
+    return [
+        *_inverses(left, over_all * _product(right)),
+        *_inverses(right, over_all * _product(left)),
+    ]
+
+
+def _product(numbers: Sequence[Scalar]) -> Scalar:
+    return functools.reduce(operator.mul, numbers)
+
+
+def _root(square: Scalar, order: RealScalarLike | None) -> Scalar:
+    """The root that a method's order makes of its error; square roots cost less than powers."""
+    if order == 4:
+        return jnp.sqrt(jnp.sqrt(jnp.sqrt(square)))
+    assert order is not None
+    return square ** (0.5 / order)
+
+
+class CrossedSwitches(AbstractWrappedControl):
+    """Wraps a controller; errors of steps that cross a switch of the contact count `weight` times.
+
+    The solve's `args` must be the scene.
+
+    Attributes:
+        controller: decides every step's size.
+        weight: of those errors [–].
+    """
+
+    controller: StepControl
+    weight: float
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        """The first step's end and the controller's state, as diffrax asks."""
+        return self.controller.init(*request)
+
+    def adapt(self, attempt: Attempt) -> Adapted:
+        """Accepts or rejects a step as the wrapped controller does."""
+        weighed = weigh_crossed(attempt.args, self.weight, attempt.y0, attempt.y1, attempt.error)
+        return attempt.by(self.controller, error=weighed)
+
+
+def weigh_crossed(
+    scene: CompliantScene, weight: float, y0: PyTree, y1: PyTree, error: PyTree
+) -> PyTree:
+    """A step's error, `weight` times where it crosses a switch of the contact.
+
+    Args:
+        scene: what is simulated.
+        weight: of the error of such a step [–].
+        y0, y1: states at the step's start, and at its end or as near to it as its error.
+        error: of the step, shaped as the states.
+    """
+    factor = jnp.where(crosses(scene, y0, y1), weight, 1.0)
+    return jtu.tree_map(lambda leaf: leaf * factor.astype(leaf.dtype), error)
+
+
+def crosses(scene: CompliantScene, y0: PyTree, y1: PyTree) -> Scalar:
+    """Whether a foot's contact is of another kind at a step's end than at its start (boolean).
+
+    A foot carries or does not, it slips this way or that, on this side of friction's peak or the
+    other, or much faster.
+    """
+    found = jnp.zeros(jnp.shape(y0[0]), dtype=bool)
+    for before, after in zip(feet(scene, y0), feet(scene, y1), strict=True):
+        if before.admitted is not False:
+            found = found | _changes(scene, before, after)
+    return found
+
+
+def _changes(scene: CompliantScene, before: Foot, after: Foot) -> Scalar:
+    carried, carries = (foot_force(scene, foot).normal > 0.0 for foot in (before, after))
+    if isinstance(scene.friction, Frictionless):
+        return carried != carries
+    old, new = before.slip_speed, after.slip_speed
+    slow, fast = jnp.abs(old), jnp.abs(new)
+    changes = (fast > _SAME_SLIP * slow) | (slow > _SAME_SLIP * fast) | ((old > 0.0) != (new > 0.0))
+    friction = scene.friction.switches
+    for one, other in zip(friction(old), friction(new), strict=True):
+        changes = changes | ((one > 0.0) != (other > 0.0))
+    return (carried != carries) | (carries & changes)
