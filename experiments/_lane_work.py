@@ -77,7 +77,7 @@ def _compiled(scene: jb.Scene) -> Any:
 
 def flops_per_step() -> int:
     """Floating-point operations of an attempted step of the seed's scene."""
-    graph = _compiled(jb.seed_scene()).graph
+    graph = _compiled(jb.seed_scene()).kernel.graph
     return sum(_FLOPS.get(value.op, 0) for value in graph.body.values)
 
 
@@ -114,6 +114,6 @@ def scenes(count: int, duration: float, *, quick: bool) -> list[dict[str, Any]]:
         began = time.perf_counter()
         steps = int(np.sum(jax.vmap(one)(*starts)))
         rate = steps / (time.perf_counter() - began)
-        rows.append(dict(scene=name, instructions=_compiled(scene).instructions(),
+        rows.append(dict(scene=name, instructions=_compiled(scene).kernel.instructions(),
                          steps_per_s=rate))  # fmt: skip
     return rows

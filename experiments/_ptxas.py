@@ -43,7 +43,7 @@ def rows(architectures: tuple[str, ...], bounds: tuple[tuple[int, int], ...]) ->
     chosen = [each for each in ARCHITECTURES.values() if each.name in architectures]
     for name, program in _programs().items():
         for threads, blocks in bounds:
-            text = program.device_text(threads, blocks)
+            text = program.kernel.device_text(threads, blocks)
             for architecture in chosen:
                 numbers = _assembled(tool, ptx_text(text, architecture), architecture.name)
                 yield {

@@ -8,19 +8,19 @@ engines that run a `Program`, `LANES`, `CUDA` and their twin `XLA`, each by `can
 from jaxbiped.compiler.codegen._ptx_kernel import ARCHITECTURES as ARCHITECTURES
 from jaxbiped.compiler.codegen._ptx_kernel import ptx_text as ptx_text
 from jaxbiped.compiler.host_code._host_jit import host_jit as host_jit
-from jaxbiped.compiler.passes._operation_counts import count_operations as count_operations
 from jaxbiped.compiler.runtime._device_processor import DeviceProcessor as DeviceProcessor
-from jaxbiped.compiler.runtime._engine import AbstractEngine as AbstractEngine
-from jaxbiped.compiler.runtime._engine import Request as Request
-from jaxbiped.compiler.runtime._engine import Result as Result
+from jaxbiped.compiler.runtime._engine_interface import AbstractEngine as AbstractEngine
+from jaxbiped.compiler.runtime._engine_interface import Request as Request
+from jaxbiped.compiler.runtime._engine_interface import Result as Result
+from jaxbiped.compiler.runtime._host_cpu import default_threads as default_threads
 from jaxbiped.compiler.runtime._host_cpu import host as host
 from jaxbiped.compiler.runtime._lane_engine import LaneEngine as LaneEngine
 from jaxbiped.compiler.runtime._loop_engine import LoopEngine as LoopEngine
 from jaxbiped.compiler.runtime._primitive import Recording as Recording
 from jaxbiped.compiler.runtime._primitive import deferred_checks as deferred_checks
 from jaxbiped.compiler.runtime._program import Program as Program
-from jaxbiped.compiler.runtime._recorded import Recorded as Recorded
-from jaxbiped.compiler.runtime._threads import default_threads as default_threads
+from jaxbiped.compiler.runtime._program import Recorded as Recorded
+from jaxbiped.compiler.runtime._program import count_operations as count_operations
 from jaxbiped.compiler.runtime._web_assembly import web_module as web_module
 
 LANES = LaneEngine()

@@ -16,6 +16,7 @@ from jaxbiped.basins._label import Label
 from jaxbiped.basins._spherical_points import spread_directions
 from jaxbiped.dynamics._feet import feet
 from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._rigid_scene import RigidScene
@@ -146,11 +147,10 @@ def component_scales(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
     walker, gravity = scene.walker, float(scene.ground.g)
     length = float(walker.l)
     speed, rate = np.sqrt(gravity * length), np.sqrt(gravity / length)
-    sizes = {"hip_vx": speed, "hip_vz": speed, "omega_1": rate, "omega_2": rate}
-    sizes |= {"theta_1": 1.0, "theta_2": 1.0, "bristle_1": 1.0, "bristle_2": 1.0}
+    sizes = {"m/s": speed, "rad/s": rate, "rad": 1.0, "": 1.0}
     if scene.compliant:
-        sizes["hip_z"] = abs(float(feet(cast("Scene", scene), state).foot_2.penetration))
-    return np.array([sizes[name] for name in state._fields[1:]])
+        sizes["m"] = abs(float(feet(cast(Scene, scene), state).foot_2.penetration))
+    return np.array([sizes[STATE_QUANTITIES[name].unit] for name in state._fields[1:]])
 
 
 def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort) -> Attractor:
@@ -191,16 +191,15 @@ def _draws_in(
     offsets = (shells[:, None, None] * directions).reshape(-1, size - 1) @ back.T
     count = len(offsets)
     strikes = cycles * attractor.cycle_footsteps + (1 if scene.compliant else 0)
-    outcome = follow_starts(
+    found = follow_starts(
         broadcast_leaves(scene, count),
         _displace(attractor.state, offsets),
         _no_goals(scene, attractor, count),
         (attractor.cycle_footsteps,),
         effort._replace(footsteps=strikes, gap=0.0),
     )
-    final = np.stack(outcome.final, axis=1)
-    returned = (outcome.label == int(Label.UNRESOLVED)) & np.isfinite(final).all(axis=1)
-    after = attractor.distance(np.where(returned[:, None], final, attractor.point))
+    returned = (found.label == int(Label.UNRESOLVED)) & np.isfinite(found.final).all(axis=1)
+    after = attractor.distance(np.where(returned[:, None], found.final, attractor.point))
     left = attractor.contraction**cycles
     noise = _NOISE * effort.rtol * (1.0 - left) / (1.0 - attractor.contraction)
     allowed = np.maximum(0.5 * (1.0 + left) * np.repeat(shells, _DIRECTIONS), noise)

@@ -1,6 +1,6 @@
 """Following of starts until the label of each is certain, by any engine."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
@@ -31,6 +31,15 @@ _LONGEST = 1e6
 """Simulated time [s] that no start takes: its footsteps or its patience end it before."""
 _PATIENCE = 50.0
 """Longest time between two footsteps, in units of √(l/g)."""
+_WHOLE: dict[str, type] = dict(
+    label=np.int8,
+    gait=np.int16,
+    cycle_footsteps=np.int16,
+    footsteps=np.int32,
+    attempted=np.int32,
+    grazes=np.int32,
+)
+"""Types of the fields of `Labelled` that hold whole numbers."""
 
 
 class Labelled(NamedTuple):
@@ -84,9 +93,16 @@ def follow_starts(
     goals: Goals,
     cycles: tuple[int, ...],
     effort: Effort,
-) -> Outcome[np.ndarray]:
+) -> Labelled:
     """Follows n starts; leaves of scene, states and goals are NumPy's arrays (n, …)."""
     count = len(states.hip_x)
+    # Labels by a number may doubt what grazes.
+    counted = effort.wanted is not None
+    if not count:
+        none = np.zeros(0)
+        empty: dict[str, Any] = dict.fromkeys(Outcome._fields, none)
+        empty |= {"final": (none,) * (len(states) - 1), "grazes": none if counted else None}
+        return _labelled(Outcome(**empty))
 
     def same(value: npt.ArrayLike) -> np.ndarray:
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
@@ -109,23 +125,12 @@ def follow_starts(
         solve = Solve(**common, almost=last, atol=atol, units=units, patience=same(np.inf))
     waits = _PATIENCE * np.sqrt(np.asarray(scene.walker.l) / np.asarray(scene.ground.g))
     starts = Start(solve, goals, same(effort.gap), waits)
-    # Labels by a number may doubt what grazes.
-    counted = effort.wanted is not None
-    if not count:
-        return _empty_outcome(len(states) - 1, grazes=counted)
     embedded = effort.embedded and not scene.compliant
-    program = _program(
-        scene.compliant,
-        effort.solver,
-        cycles,
-        effort.engine == "xla",
-        embedded,
-        counted,
-    )
+    fenced = effort.engine == "xla"
+    program = _program(scene.compliant, effort.solver, cycles, fenced, embedded, counted)
     engine = engine_named(effort.engine_of(count))
     given = jtu.tree_map(np.asarray, starts)
-    outcome: Outcome[np.ndarray] = engine.run(Request(program, given, batch=True)).outputs
-    return outcome
+    return _labelled(engine.run(Request(program, given, batch=True)).outputs)
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
@@ -143,21 +148,13 @@ def _program(
     return Program(loop.begin, loop.attempt, loop.finish)
 
 
-def _empty_outcome(size: int, *, grazes: bool) -> Outcome[np.ndarray]:
-    whole, real = np.zeros(0, dtype=np.int64), np.zeros(0)
-    return Outcome(
-        label=whole,
-        goal=whole,
-        cycle_footsteps=whole,
-        footsteps=whole,
-        time=real,
-        distance=real,
-        rate=real,
-        closest=real,
-        attempted=whole,
-        final=tuple([real] * size),
-        grazes=whole if grazes else None,
-    )
+def _labelled(outcome: Outcome[np.ndarray]) -> Labelled:
+    columns = outcome._asdict() | {"final": np.stack(outcome.final, axis=1)}
+    found: dict[str, Any] = {}
+    for name, column in columns.items():
+        kind = _WHOLE.get(name, np.float64)
+        found[name] = None if column is None else column.astype(kind, copy=False)
+    return Labelled(**found)
 
 
 def broadcast_leaves(tree: PyTree, count: int) -> PyTree:

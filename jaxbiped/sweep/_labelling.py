@@ -84,25 +84,12 @@ class Labelling(eqx.Module):
         scene = check_scene(scene, Scene, RigidScene)
         scene = jtu.tree_map(lambda leaf: _spread(leaf, count), scene)
         goals, cycles = self.family.goals(given, count)
-        outcome = follow_starts(scene, states, goals, cycles, effort)
-        label = outcome.label.astype(np.int8)
-        if given and not self.family.names:
-            # No gait is known to compare with: a cycle that repeats itself has to do.
-            repeats = (label == int(Label.UNRESOLVED)) & (outcome.cycle_footsteps > 0)
-            label = np.where(repeats, np.int8(Label.WALKING), label)
-        return Labelled(
-            label=label,
-            gait=outcome.goal.astype(np.int16),
-            cycle_footsteps=outcome.cycle_footsteps.astype(np.int16),
-            footsteps=outcome.footsteps.astype(np.int32),
-            time=outcome.time,
-            distance=outcome.distance,
-            rate=outcome.rate,
-            closest=outcome.closest,
-            attempted=outcome.attempted.astype(np.int32),
-            final=np.stack(outcome.final, axis=1),
-            grazes=None if outcome.grazes is None else outcome.grazes.astype(np.int32),
-        )
+        found = follow_starts(scene, states, goals, cycles, effort)
+        if not given or self.family.names:
+            return found
+        # No gait is known to compare with: a cycle that repeats itself has to do.
+        repeats = (found.label == int(Label.UNRESOLVED)) & (found.cycle_footsteps > 0)
+        return found._replace(label=np.where(repeats, np.int8(Label.WALKING), found.label))
 
     def base(self, parameters: Mapping[str, np.ndarray], count: int) -> PyTree:
         """For n starts with these parameters, the gait's state: what they do not name themselves.

@@ -62,7 +62,7 @@ class Outcome(NamedTuple, Generic[_Number]):
     """
 
     label: _Number
-    goal: _Number
+    gait: _Number
     cycle_footsteps: _Number
     footsteps: _Number
     time: _Number
@@ -263,7 +263,7 @@ def _outcome(
     converges = walks | (label == int(Label.UNRESOLVED))
     return Outcome(
         label=label,
-        goal=jnp.where(walks, trace.goal, -1),
+        gait=jnp.where(walks, trace.goal, -1),
         cycle_footsteps=jnp.where(converges, trace.cycle_footsteps, 0),
         footsteps=footsteps,
         time=time,

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.caching import _caches
-from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.caching._caches import Once, bounded_cache
-from jaxbiped.compiler.runtime import _compiled_program, _recorder
-from jaxbiped.compiler.runtime._engine import Request
+from jaxbiped import _caches
+from jaxbiped._cached_jit import cached_jit
+from jaxbiped._caches import Once, bounded_cache
+from jaxbiped.compiler.runtime import _compiled_program, _record_cache
+from jaxbiped.compiler.runtime._engine_interface import Request
 from jaxbiped.compiler.runtime._lane_engine import LaneEngine
 from jaxbiped.compiler.runtime._machine_code import _LOADED
 from jaxbiped.compiler.runtime._primitive import call_recording
@@ -166,7 +166,7 @@ def test_code_lives_as_long_as_a_thread_that_runs_it(monkeypatch):
 
     monkeypatch.setattr(_compiled_program, "run_in_threads", interrupted)
     program = compiled(lambda x: jnp.cos(x) - 0.123, ())
-    code = weakref.ref(program.code(1))
+    code = weakref.ref(program.kernel.code(1))
     with contextlib.suppress(KeyboardInterrupt):
         program.run([POINTS[:1]])
     del program
@@ -193,7 +193,7 @@ def test_the_environment_bounds_records_and_buffers(monkeypatch, limit):
     _, recording = call_recording(program, jnp.asarray(1.0), room=6, quick=True)
     half = {"0": 0, "100": 50}.get(limit, 1 << 29)
     # One input and five records of one number each are 48 bytes.
-    assert _recorder._RECORDS.kept == (48 if half else 0)
+    assert _record_cache._RECORDS.kept == (48 if half else 0)
     (values,) = recording.columns(np.zeros(1))
     np.testing.assert_array_equal(values[:6], range(6))
     gc.collect()

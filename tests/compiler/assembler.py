@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import pytest
 
-from jaxbiped.compiler.codegen._lane_kernel import ENTRY
+from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY
 
 
 class Assembled(NamedTuple):

@@ -16,7 +16,7 @@ import threading
 import llvmlite.binding as llvm
 import numpy as np
 
-from jaxbiped.compiler.codegen._lane_kernel import ENTRY
+from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY
 from jaxbiped.compiler.runtime import _cuda_device, _device_processor, _kernel
 from jaxbiped.compiler.runtime._host_cpu import host
 from jaxbiped.compiler.runtime._machine_code import machine_code

@@ -154,7 +154,7 @@ def test_a_failure_is_certain_and_what_only_ran_out_is_open(code, verdict, label
     )
     rest = dict.fromkeys(("footsteps", "time", "distance", "attempted"), np.float64(3.0))
     found = _outcome(trace, code=np.int64(code), **rest)
-    told = (int(found.label), int(found.goal), int(found.cycle_footsteps))
+    told = (int(found.label), int(found.gait), int(found.cycle_footsteps))
     assert told == (int(label), goal, cycle)
 
 

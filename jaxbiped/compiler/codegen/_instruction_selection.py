@@ -2,8 +2,7 @@
 
 from collections.abc import Sequence
 
-from jaxbiped.compiler.codegen._flushed_subnormals import flush
-from jaxbiped.compiler.codegen._kernel_target import KernelTarget
+from jaxbiped.compiler.codegen._kernel_target import KernelTarget, flush
 from jaxbiped.compiler.codegen._llvm_function import BYTES, FunctionBuilder, vector
 from jaxbiped.compiler.ir._graph import Kind
 

@@ -1,9 +1,12 @@
 """Host arrays: operations of JAX on arrays that NumPy lacks, or has under other rules."""
 
+import operator
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+
+from jaxbiped.compiler.ir._powers import whole_power
 
 __all__ = [
     "divide_whole",
@@ -47,14 +50,8 @@ def remainder(a: Any, b: Any) -> Any:
 
 
 def power_of(a: Any, exponent: int) -> Any:
-    """A whole power by repeated multiplication, as XLA takes it."""
-    result, base, left = None, a, abs(exponent)
-    while left:
-        if left & 1:
-            result = base if result is None else result * base
-        left >>= 1
-        if left:
-            base = base * base
+    """A whole power; see `whole_power`."""
+    result = whole_power(a, abs(exponent), operator.mul)
     if result is None:
         return np.ones_like(a)[()]
     return 1.0 / result if exponent < 0 else result

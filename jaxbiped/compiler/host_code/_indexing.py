@@ -12,7 +12,7 @@ from jaxbiped.compiler.host_code._host_writer import (
     UnwrittenError,
     Value,
 )
-from jaxbiped.compiler.host_code._views import part_of
+from jaxbiped.compiler.host_code._moves import part_of
 
 
 def _dynamic_slice(w: HostWriter, op: Operation) -> list[Value]:

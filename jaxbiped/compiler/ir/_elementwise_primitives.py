@@ -1,6 +1,7 @@
 """Elementwise primitives of JAX, as operations of a graph."""
 
 import enum
+import functools
 import math
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
@@ -133,15 +134,8 @@ def _is_finite(block: Block, a: Value, **_: object) -> Value:
 
 
 def _whole_power(block: Block, a: Value, *, y: int, **_: object) -> Value:
-    multiply = "fmul" if a.kind.is_float else "mul"
-    result, base, left = None, a, abs(y)
-    while left:
-        if left & 1:
-            result = base if result is None else block.add(multiply, result, base)
-        left >>= 1
-        if left:
-            base = block.add(multiply, base, base)
-    one = block.const(1, a.kind)
+    multiply = functools.partial(block.add, "fmul" if a.kind.is_float else "mul")
+    result, one = powers.whole_power(a, abs(y), multiply), block.const(1, a.kind)
     result = one if result is None else result
     return result if y >= 0 else block.add("fdiv", one, result)
 

@@ -12,14 +12,15 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped.compiler.runtime._buffer_pool import BufferPool
-from jaxbiped.compiler.runtime._host_processor import HostProcessor
-from jaxbiped.compiler.runtime._input_streams import input_streams_of
+from jaxbiped.compiler.runtime._host_cpu import default_threads, run_in_threads
 from jaxbiped.compiler.runtime._kernel import Kernel
-from jaxbiped.compiler.runtime._machine_code import MachineCode
-from jaxbiped.compiler.runtime._processor import AbstractProcessor, Launch
-from jaxbiped.compiler.runtime._program import Graph, Outline, Program, leaves_of
-from jaxbiped.compiler.runtime._recorded import Recorded
-from jaxbiped.compiler.runtime._threads import default_threads, run_in_threads
+from jaxbiped.compiler.runtime._processor import (
+    AbstractProcessor,
+    HostProcessor,
+    Launch,
+    input_streams_of,
+)
+from jaxbiped.compiler.runtime._program import Program, Recorded, leaves_of
 
 HOST = HostProcessor()
 _KNOWING = threading.Lock()
@@ -39,7 +40,11 @@ class Ran(NamedTuple):
 
 
 class CompiledProgram:
-    """A program compiled for inputs of one structure."""
+    """A program compiled for inputs of one structure.
+
+    Attributes:
+        kernel: what runs it.
+    """
 
     def __init__(
         self, program: Program, inputs: PyTree, processor: AbstractProcessor = HOST
@@ -48,7 +53,7 @@ class CompiledProgram:
         self._hold(Kernel.of_program(program, inputs), processor)
 
     def _hold(self, kernel: Kernel, processor: AbstractProcessor) -> None:
-        self._kernel, self._processor = kernel, processor
+        self.kernel, self._processor = kernel, processor
         self._begun: set[int] = set()
         self._lock = threading.Lock()
 
@@ -58,16 +63,16 @@ class CompiledProgram:
     ) -> "CompiledProgram":
         """The one of a program, which may be in use already without having been traced."""
         made = CompiledProgram(program, inputs, processor)
-        digest = made._kernel.digest
+        digest = made.kernel.digest
         if digest is None:
             return made
-        fresh = made._kernel
+        fresh = made.kernel
         with _KNOWING:
             known = _KNOWN.setdefault((digest, processor.name), made)
-            kernel = _KERNELS.setdefault(digest, known._kernel)
+            kernel = _KERNELS.setdefault(digest, known.kernel)
             if known is made:
-                made._kernel = kernel
-            known._kernel.trace_from(fresh)
+                made.kernel = kernel
+            known.kernel.trace_from(fresh)
         return known
 
     @staticmethod
@@ -88,29 +93,19 @@ class CompiledProgram:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Another process has it by its fingerprint."""
-        if self._kernel.digest is None:
+        if self.kernel.digest is None:
             raise pickle.PicklingError("a program that has no fingerprint")
-        return CompiledProgram.kept, (self._kernel.digest, self._processor)
+        return CompiledProgram.kept, (self.kernel.digest, self._processor)
 
     def __fingerprint__(self) -> object:
-        """See `jaxbiped.caching._fingerprint`."""
-        digest = self._kernel.digest
+        """See `jaxbiped._fingerprint`."""
+        digest = self.kernel.digest
         return object() if digest is None else (digest, self._processor.name)
 
     @property
     def size(self) -> int:
         """How many numbers the inputs of one simulation are."""
-        return sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(self._kernel.inputs))
-
-    @property
-    def outline(self) -> Outline:
-        """What leaves it."""
-        return self._kernel.outline
-
-    @property
-    def graph(self) -> Graph:
-        """Its operations; traces it where that was not done."""
-        return self._kernel.graph
+        return sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(self.kernel.inputs))
 
     def check(self) -> None:
         """Waits until it is traced, or known to have been.
@@ -118,35 +113,19 @@ class CompiledProgram:
         Raises:
             UnknownPrimitiveError: it holds an operation that lanes do not have.
         """
-        _ = self._kernel.signature
-
-    def text(self, width: int) -> str:
-        """The program as LLVM's text."""
-        return self._kernel.text(width)
-
-    def device_text(self, threads: int, blocks: int) -> str:
-        """The program as LLVM's text for devices; see `device_target`."""
-        return self._kernel.device_text(threads, blocks)
-
-    def instructions(self) -> int:
-        """How many machine instructions the program has, for vectors of the host's width."""
-        return self._kernel.instructions()
-
-    def code(self, width: int) -> MachineCode:
-        """The machine code, for vectors of this width."""
-        return self._kernel.code(width)
+        _ = self.kernel.signature
 
     def runs_at_once(self, count: int) -> bool:
         """Whether it can run `count` simulations without being traced or compiled."""
-        return self._processor.ready(self._kernel, self.width(count, default_threads()))
+        return self._processor.ready(self.kernel, self.width(count, default_threads()))
 
     def width(self, count: int, threads: int) -> int:
         """Simulations in one vector; see `AbstractProcessor.width`."""
-        return self._processor.width(self._kernel, count, threads)
+        return self._processor.width(self.kernel, count, threads)
 
     def prepare(self, width: int) -> None:
         """Traces and compiles what vectors of this width need."""
-        self._processor.prepare(self._kernel, width)
+        self._processor.prepare(self.kernel, width)
 
     def make_ready(self, count: int) -> None:
         """Begins to trace and compile, in the background, what running `count` of them needs."""
@@ -162,48 +141,19 @@ class CompiledProgram:
         with contextlib.suppress(Exception):
             self.prepare(width)
 
-    def run(
-        self,
-        inputs: PyTree,
-        *,
-        schedule: np.ndarray | None = None,
-        stream: Sequence[np.ndarray] | None = None,
-        room: int = 0,
-        threads: int | None = None,
-        width: int | None = None,
-        quick: bool = False,
-    ) -> Ran:
+    def run(self, inputs: PyTree, **options: Any) -> Ran:
         """Runs n simulations; leaves of `inputs` have a leading axis of n.
 
-        Args:
-            inputs: of all simulations; 64-bit floating-point numbers, whatever they stand for.
-            schedule: increasing times of the records, shape (m,), where the program has such.
-            stream: rows for each simulation, n arrays (rows, numbers), if the program reads any;
-                from the last one on where it reads `backwards`.
-            room: records that each simulation has room for.
-            threads: how many to use; the environment's or the machine's choice unless given.
-            width: simulations in one vector; the results do not depend on it.
-            quick: whether one thread's work is so short that nobody could interrupt it.
-
-        Raises:
-            KeyboardInterrupt: the user interrupts; the simulations end within a tenth of a second.
+        They are 64-bit floating-point numbers, whatever they stand for. See `run_table` for the
+        options.
         """
         leaves = [np.asarray(leaf) for leaf in jtu.tree_leaves(inputs)]
         count = leaves[0].shape[0]
         rows = [
             np.moveaxis(leaf, 0, -1).reshape(int(np.prod(shape.shape)), count)
-            for leaf, shape in zip(leaves, jtu.tree_leaves(self._kernel.inputs), strict=True)
+            for leaf, shape in zip(leaves, jtu.tree_leaves(self.kernel.inputs), strict=True)
         ]
-        table = np.concatenate(rows).astype(np.float64)
-        found, recorded = self.run_table(
-            table,
-            schedule=schedule,
-            stream=stream,
-            room=room,
-            threads=threads,
-            width=width,
-            quick=quick,
-        )
+        found, recorded = self.run_table(np.concatenate(rows).astype(np.float64), **options)
         return Ran(self._outputs(found), recorded)
 
     def run_table(
@@ -218,13 +168,25 @@ class CompiledProgram:
         width: int | None = None,
         quick: bool = False,
     ) -> tuple[np.ndarray, Recorded | None]:
-        """`run` of inputs and outputs as tables (numbers, n), their leaves' entries in order.
+        """Runs n simulations; inputs and outputs are tables (numbers, n), leaf by leaf.
 
-        Beyond records in given `memory` there is anything.
+        Args:
+            table: inputs.
+            schedule: increasing times of the records, shape (m,), where the program has such.
+            stream: rows for each simulation, n arrays (rows, numbers), if the program reads any;
+                from the last one on where it reads `backwards`.
+            room: records that each simulation has room for.
+            memory: where the records lie; beyond them there is anything.
+            threads: how many to use; the environment's or the machine's choice unless given.
+            width: simulations in one vector; the results do not depend on it.
+            quick: whether one thread's work is so short that nobody could interrupt it.
+
+        Raises:
+            KeyboardInterrupt: the user interrupts; the simulations end within a tenth of a second.
         """
         table = np.ascontiguousarray(table, dtype=np.float64)
         count = table.shape[1]
-        signature = self._kernel.signature
+        signature = self.kernel.signature
         outputs = np.full((signature.outputs, count), np.nan)
         times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
         streams = input_streams_of(stream, count, signature.row, backwards=signature.backwards)
@@ -252,7 +214,7 @@ class CompiledProgram:
         )
         if count:
             launch = Launch(arrays, numbers, streams)
-            job = self._processor.job(self._kernel, launch, chosen, many)
+            job = self._processor.job(self.kernel, launch, chosen, many)
             run_in_threads(job.run, job.workers, stop, quick=quick)
             job.finish()
         recorded = Recorded(records, record_counts) if signature.records else None
@@ -260,7 +222,7 @@ class CompiledProgram:
 
     def _whole(self, varying: np.ndarray) -> np.ndarray:
         """The outputs with those among them that are always the same."""
-        constants = self._kernel.signature.constants
+        constants = self.kernel.signature.constants
         if not constants:
             return varying
         whole = np.empty((len(varying) + len(constants), varying.shape[1]))
@@ -269,8 +231,8 @@ class CompiledProgram:
         return whole
 
     def _outputs(self, table: np.ndarray) -> PyTree:
-        shapes, structure = jtu.tree_flatten(self.outline.outputs)
-        parts = leaves_of(self.outline.outputs, table)
+        shapes, structure = jtu.tree_flatten(self.kernel.outline.outputs)
+        parts = leaves_of(self.kernel.outline.outputs, table)
         with np.errstate(invalid="ignore"):
             leaves = [
                 np.moveaxis(part, -1, 0).astype(shape.dtype)

@@ -11,7 +11,7 @@ from jaxbiped.caching._caches import Once
 from jaxbiped.caching._collector_pause import long_trace
 from jaxbiped.caching._fingerprint import as_leaves, fingerprint
 from jaxbiped.compiler.codegen._kernel_target import host_target
-from jaxbiped.compiler.codegen._lane_kernel import ENTRY, kernel_text
+from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY, kernel_text
 from jaxbiped.compiler.codegen._ptx_kernel import (
     BLOCKS,
     THREADS,
@@ -20,12 +20,7 @@ from jaxbiped.compiler.codegen._ptx_kernel import (
     ptx_text,
 )
 from jaxbiped.compiler.runtime._host_cpu import host
-from jaxbiped.compiler.runtime._machine_code import (
-    MachineCode,
-    assembly,
-    code_name,
-    machine_code,
-)
+from jaxbiped.compiler.runtime._machine_code import MachineCode, assembly, code_name, machine_code
 from jaxbiped.compiler.runtime._program import Graph, Outline, Program, graph_of, outline_of
 from jaxbiped.compiler.runtime._program_store import (
     Signature,

@@ -2,15 +2,14 @@
 
 import enum
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from jaxbiped._types import Numbers
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._record_cache import BLOCK
-from jaxbiped.compiler.runtime._recorder import Recorder
-from jaxbiped.compiler.runtime._threads import default_threads
+from jaxbiped.compiler.runtime._host_cpu import default_threads
+from jaxbiped.compiler.runtime._record_cache import BLOCK, Recorder
 
 
 class Part(enum.Enum):
@@ -28,63 +27,65 @@ class Schedule:
         self.times = np.ascontiguousarray(times, dtype=np.float64)
 
 
-def run_lanes(
-    numbers: Numbers,
-    stream: Numbers | None = None,
-    *,
-    compiled: CompiledProgram,
-    schedule: Schedule | None,
-    room: int,
-    quick: bool,
-    wants: Part,
-    recorder: Recorder | None,
-) -> list[np.ndarray]:
-    """Of inputs (n, k) and their streams: outputs (n, o), and what was recorded."""
-    given = np.asarray(numbers)
-    if recorder is not None and wants is Part.OUTPUTS:
-        return [recorder.outputs(given).T]
-    if recorder is not None and wants is Part.COLUMNS:
-        return recorder.columns(given, np.asarray(stream))
-    times = None if schedule is None else schedule.times
-    alone = quick and len(given) == 1
-    width = compiled.width(len(given), default_threads())
+class LaneRun(NamedTuple):
+    """How simulations are run, and what of it is wanted. Hashable.
 
-    def run(part: slice, rows: Sequence[np.ndarray] | None) -> list[np.ndarray]:
-        outputs, recorded = compiled.run_table(
-            given[part].T,
-            schedule=times,
-            stream=rows,
-            room=room if times is None else len(times),
-            quick=alone,
-            width=width,
-        )
-        return [outputs.T, *(recorded or ())]
+    Attributes:
+        compiled: the program.
+        schedule: of its records, where it has such; else there is `room` for so many.
+        quick: whether a single simulation is over before a user could interrupt.
+        wants: which part of what they give.
+        recorder: what recorded their streams, or keeps their records.
+    """
 
-    if recorder is None:
-        return run(slice(None), None if stream is None else list(np.asarray(stream)))
-    parts = [slice(k, k + BLOCK) for k in range(0, max(1, len(given)), BLOCK)]
-    found = [run(part, recorder.rows(np.asarray(stream)[part])) for part in parts]
-    return [np.concatenate(each) for each in zip(*found, strict=True)]
+    compiled: CompiledProgram
+    schedule: Schedule | None = None
+    room: int = 0
+    quick: bool = False
+    wants: Part = Part.ALL
+    recorder: Recorder | None = None
+
+    def run(self, numbers: Numbers, stream: Numbers | None = None) -> list[np.ndarray]:
+        """Of inputs (n, k) and their streams: outputs (n, o), and what was recorded."""
+        given, recorder = np.asarray(numbers), self.recorder
+        if recorder is not None and self.wants is Part.OUTPUTS:
+            return [recorder.outputs(given).T]
+        if recorder is not None and self.wants is Part.COLUMNS:
+            return recorder.columns(given, np.asarray(stream))
+        times = None if self.schedule is None else self.schedule.times
+        width = self.compiled.width(len(given), default_threads())
+
+        def run(part: slice, rows: Sequence[np.ndarray] | None) -> list[np.ndarray]:
+            outputs, recorded = self.compiled.run_table(
+                given[part].T,
+                schedule=times,
+                stream=rows,
+                room=self.room if times is None else len(times),
+                quick=self.quick and len(given) == 1,
+                width=width,
+            )
+            return [outputs.T, *(recorded or ())]
+
+        if recorder is None:
+            return run(slice(None), None if stream is None else list(np.asarray(stream)))
+        parts = [slice(k, k + BLOCK) for k in range(0, max(1, len(given)), BLOCK)]
+        found = [run(part, recorder.rows(np.asarray(stream)[part])) for part in parts]
+        return [np.concatenate(each) for each in zip(*found, strict=True)]
 
 
 class LaneCall(NamedTuple):
-    """What a compiled program calls: simulations of a program, run in this way.
-
-    Attributes:
-        simulations: how many at once; `params` of the operation.
-    """
+    """What a compiled program calls: so many simulations at once, run in this way."""
 
     simulations: int
-    params: dict[str, Any]
+    how: LaneRun
 
     def __call__(self, *given: np.ndarray) -> list[np.ndarray]:
-        return run_lanes(*given, **self.params)
+        return self.how.run(*given)
 
     def __fingerprint__(self) -> object:
         return tuple(self)
 
     def ready(self) -> bool:
         """Whether it runs without tracing or compiling."""
-        compiled: CompiledProgram = self.params["compiled"]
-        wants_code = self.params["wants"] is not Part.COLUMNS
-        return not wants_code or compiled.runs_at_once(self.simulations)
+        wants_code = self.how.wants is not Part.COLUMNS
+        return not wants_code or self.how.compiled.runs_at_once(self.simulations)

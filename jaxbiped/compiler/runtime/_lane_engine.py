@@ -1,6 +1,7 @@
 """Lane engine: programs as machine code, one simulation a lane of a vector or a device's thread."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -11,7 +12,7 @@ from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.compiler.passes._vertex_elimination import jacobian
 from jaxbiped.compiler.runtime._compiled_program import HOST, CompiledProgram
-from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result, Shapes
+from jaxbiped.compiler.runtime._engine_interface import AbstractEngine, Request, Result, Shapes
 from jaxbiped.compiler.runtime._lane_call import Schedule
 from jaxbiped.compiler.runtime._primitive import call, call_recording
 from jaxbiped.compiler.runtime._processor import AbstractProcessor
@@ -42,36 +43,16 @@ class LaneEngine(AbstractEngine):
         Raises:
             UnknownPrimitiveError: the program holds an operation that lanes do not have.
         """
-        compiled, quick = self.compile(request), request.quick
+        compiled, inputs = self.compile(request), request.inputs
+        how: Any = dict(stream=request.stream, room=request.room, quick=request.quick)
         if request.batch:
-            found = compiled.run(
-                request.inputs,
-                schedule=request.times,
-                stream=request.stream,
-                room=request.room,
-                quick=quick,
-            )
-            return Result(found.outputs, found.recorded)
+            return Result(*compiled.run(inputs, schedule=request.times, **how))
         if request.keeps_records:
-            recorded = call_recording(
-                compiled,
-                request.inputs,
-                room=request.room,
-                quick=quick,
-                stream=request.stream,
-                once=request.reads_once,
-            )
-            return Result(recorded[0], recording=recorded[1])
+            once = request.reads_once
+            outputs, recording = call_recording(compiled, inputs, once=once, **how)
+            return Result(outputs, recording=recording)
         schedule = None if request.times is None else Schedule(request.times)
-        outputs, records = call(
-            compiled,
-            request.inputs,
-            schedule,
-            stream=request.stream,
-            room=request.room,
-            quick=quick,
-        )
-        return Result(outputs, records)
+        return Result(*call(compiled, inputs, schedule, **how))
 
     def jacobian(
         self, function: Callable[[list[Scalar]], list[Scalar]], inputs: Sequence[Scalar]

@@ -11,10 +11,8 @@ import numpy as np
 from jaxtyping import Array, PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.compiler.runtime._engine import AbstractEngine, Request, Result
-from jaxbiped.compiler.runtime._program import Program
-from jaxbiped.compiler.runtime._recorded import Recorded
+from jaxbiped.compiler.runtime._engine_interface import AbstractEngine, Request, Result
+from jaxbiped.compiler.runtime._program import Program, Recorded
 
 _ROUND = 128
 """Attempted steps after which slots that are over take the next simulations."""

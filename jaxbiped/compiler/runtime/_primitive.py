@@ -17,13 +17,12 @@ from jaxtyping import Array, PyTree
 
 from jaxbiped._host_call import host_call, lower_host_call
 from jaxbiped._types import Numbers, as_array
-from jaxbiped.compiler.host_code._host_program import register_rule
+from jaxbiped.compiler.host_code._host_jit import register_rule
 from jaxbiped.compiler.host_code._host_writer import HostWriter, Operation, Value
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._lane_call import LaneCall, Part, Schedule, run_lanes
-from jaxbiped.compiler.runtime._program import leaves_of
-from jaxbiped.compiler.runtime._recorded import Recorded
-from jaxbiped.compiler.runtime._recorder import Recorder
+from jaxbiped.compiler.runtime._lane_call import LaneCall, LaneRun, Part, Schedule
+from jaxbiped.compiler.runtime._program import Recorded, leaves_of
+from jaxbiped.compiler.runtime._record_cache import Recorder
 
 _UNTRACED: contextvars.ContextVar[list[CompiledProgram] | None] = contextvars.ContextVar(
     "programs that may not be expressible", default=None
@@ -65,8 +64,8 @@ class Recording(eqx.Module):
 
         `first` has shape (k,), the arrays (1 + room,).
         """
-        params = _params(self.recorder.compiled, recorder=self.recorder, wants=Part.COLUMNS)
-        return _bind([self.numbers, first], params)
+        how = LaneRun(self.recorder.compiled, recorder=self.recorder, wants=Part.COLUMNS)
+        return _bind([self.numbers, first], how)
 
 
 def call(
@@ -90,8 +89,8 @@ def call(
     recorder, rows = None, [] if stream is None else [stream]
     if isinstance(stream, Recording):
         recorder, rows = stream.recorder, [stream.numbers]
-    params = _params(compiled, schedule=schedule, room=room, quick=quick, recorder=recorder)
-    table, *rest = _bind([_numbers(inputs), *rows], params)
+    how = LaneRun(compiled, schedule, room, quick, recorder=recorder)
+    table, *rest = _bind([_numbers(inputs), *rows], how)
     return _outputs(compiled, table), Recorded(*rest) if rest else None
 
 
@@ -108,22 +107,8 @@ def call_recording(
     reads = None if stream is None else stream.recorder
     recorder = Recorder(compiled, room, quick, once, reads)
     numbers = _numbers(inputs if stream is None else (inputs, stream.numbers))
-    (table,) = _bind([numbers], _params(compiled, recorder=recorder, wants=Part.OUTPUTS))
+    (table,) = _bind([numbers], LaneRun(compiled, recorder=recorder, wants=Part.OUTPUTS))
     return _outputs(compiled, table), Recording(numbers, recorder)
-
-
-def _params(
-    compiled: CompiledProgram,
-    *,
-    room: int = 0,
-    quick: bool = False,
-    schedule: Schedule | None = None,
-    wants: Part = Part.ALL,
-    recorder: Recorder | None = None,
-) -> dict[str, Any]:
-    """Of the operation: what is run and how, and which part of what that gives is wanted."""
-    how = dict(compiled=compiled, schedule=schedule, room=room, quick=quick)
-    return how | dict(wants=wants, recorder=recorder)
 
 
 def _numbers(inputs: PyTree) -> Numbers:
@@ -143,76 +128,58 @@ def _is_traced(leaf: object) -> bool:
     return isinstance(leaf, jax.core.Tracer)
 
 
-def _bind(given: list[Numbers], params: dict[str, Any]) -> list[Any]:
+def _bind(given: list[Numbers], how: LaneRun) -> list[Any]:
     """The operation's results for one simulation."""
     if any(map(_is_traced, given)):
         rows = [jax.lax.expand_dims(x, (0,)) for x in given]
-        return [jax.lax.squeeze(leaf, (0,)) for leaf in _RUN.bind(*rows, **params)]
-    found = run_lanes(*[np.asarray(x)[None] for x in given], **params)
+        return [jax.lax.squeeze(leaf, (0,)) for leaf in _RUN.bind(*rows, how=how)]
+    found = how.run(*[np.asarray(x)[None] for x in given])
     return [as_array(leaf[0]) for leaf in found]
 
 
 def _outputs(compiled: CompiledProgram, table: Array) -> PyTree:
-    shapes, structure = jtu.tree_flatten(compiled.outline.outputs)
+    shapes, structure = jtu.tree_flatten(compiled.kernel.outline.outputs)
     if not _is_traced(table):
         # By NumPy: JAX would compile a program for each of these.
-        parts = leaves_of(compiled.outline.outputs, np.asarray(table))
+        parts = leaves_of(compiled.kernel.outline.outputs, np.asarray(table))
         leaves = [as_array(p.astype(s.dtype)) for p, s in zip(parts, shapes, strict=True)]
         return jtu.tree_unflatten(structure, leaves)
     if all(s.ndim == 0 for s in shapes):
         # The same as what follows, by one operation.
         parts = list(jnp.unstack(table))
     else:
-        parts = leaves_of(compiled.outline.outputs, table)
+        parts = leaves_of(compiled.kernel.outline.outputs, table)
     leaves = [jax.lax.convert_element_type(p, s.dtype) for p, s in zip(parts, shapes, strict=True)]
     return jtu.tree_unflatten(structure, leaves)
 
 
-def _shapes(
-    leaves: Sequence[jax.core.ShapedArray],
-    *,
-    compiled: CompiledProgram,
-    schedule: Schedule | None,
-    room: int,
-    wants: Part,
-    recorder: Recorder | None,
-    **_: object,
-) -> list[jax.ShapeDtypeStruct]:
-    count = leaves[0].shape[0]
-    if wants is Part.COLUMNS:
-        assert recorder is not None
-        column = jax.ShapeDtypeStruct((count, 1 + recorder.room), jnp.float64)
+def _implementation(*leaves: Array, how: LaneRun) -> list[Array]:
+    return [jnp.asarray(leaf) for leaf in how.run(*leaves)]
+
+
+def _abstract_evaluation(*leaves: jax.core.ShapedArray, how: LaneRun) -> list[jax.core.ShapedArray]:
+    count, outline = leaves[0].shape[0], how.compiled.kernel.outline
+    if how.wants is Part.COLUMNS:
+        assert how.recorder is not None
+        column = jax.core.ShapedArray((count, 1 + how.recorder.room), jnp.float64)
         return [column] * leaves[1].shape[1]
-    numbers = compiled.outline.recorded
-    outputs = jtu.tree_leaves(compiled.outline.outputs)
-    size = sum(int(np.prod(leaf.shape)) for leaf in outputs)
-    found = [jax.ShapeDtypeStruct((count, size), jnp.float64)]
-    if numbers is not None and wants is Part.ALL:
-        room = room if schedule is None else len(schedule.times)
-        found.append(jax.ShapeDtypeStruct((count, room, numbers), jnp.float64))
-        found.append(jax.ShapeDtypeStruct((count,), jnp.int64))
+    size = sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(outline.outputs))
+    found = [jax.core.ShapedArray((count, size), jnp.float64)]
+    if outline.recorded is not None and how.wants is Part.ALL:
+        room = how.room if how.schedule is None else len(how.schedule.times)
+        found.append(jax.core.ShapedArray((count, room, outline.recorded), jnp.float64))
+        found.append(jax.core.ShapedArray((count,), jnp.int64))
     return found
 
 
-def _implementation(*leaves: Array, **params: Any) -> list[Array]:
-    return [jnp.asarray(leaf) for leaf in run_lanes(*leaves, **params)]
-
-
-def _abstract_evaluation(
-    *leaves: jax.core.ShapedArray, **params: Any
-) -> list[jax.core.ShapedArray]:
-    shapes = _shapes(leaves, **params)
-    return [jax.core.ShapedArray(shape.shape, shape.dtype) for shape in shapes]
-
-
-def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
+def _lowering(context: Any, *operands: Any, how: LaneRun) -> Any:
     """A call of the host from the compiled program, with arrays of NumPy.
 
     `jax.pure_callback` would make arrays of JAX of them, which copies, and where they are large
     waits for a thread of the same pool that this call holds: for ever, on few cores.
     """
     count = context.avals_in[0].shape[0]
-    run = _begun_call(count, params)
+    run = _begun_call(count, how)
     if tuple(context.module_context.platforms) == ("cpu",):
         return lower_host_call(context, host_call(run), operands)
     results, _, _ = mlir.emit_python_callback(
@@ -228,22 +195,22 @@ def _lowering(context: Any, *operands: Any, **params: Any) -> Any:
     return results
 
 
-def _begun_call(count: int, params: dict[str, Any]) -> LaneCall:
+def _begun_call(count: int, how: LaneRun) -> LaneCall:
     """The call of a program, which is compiled while the rest is."""
-    if params["wants"] is not Part.COLUMNS:
-        compiled, waiting = params["compiled"], _UNTRACED.get()
+    if how.wants is not Part.COLUMNS:
+        compiled, waiting = how.compiled, _UNTRACED.get()
         compiled.make_ready(count)
         if waiting is None:
             compiled.check()
         else:
             waiting.append(compiled)
-    return LaneCall(count, params)
+    return LaneCall(count, how)
 
 
 def _write_on_host(writer: HostWriter, op: Operation) -> Sequence[Value]:
     """The call in a host program."""
     given = [writer.full(each) for each in op.inputs]
-    name = writer.thing(_begun_call(given[0].shape[0], dict(op.params)), object())
+    name = writer.thing(_begun_call(given[0].shape[0], op.params["how"]), object())
     names = ", ".join(f"{{{i}}}" for i in range(len(given)))
     only = "[0]" if len(op.results()) == 1 else ""
     return writer.emit_all(f"{name}({names}){only}", given, op.results(), computed=False)
@@ -256,7 +223,7 @@ def _refuse_derivative(primals: object, tangents: object, **params: object) -> N
     )
 
 
-def _batching(leaves: Any, axes: Any, **params: Any) -> tuple[list[Array], list[int]]:
+def _batching(leaves: Any, axes: Any, *, how: LaneRun) -> tuple[list[Array], list[int]]:
     size = next(
         leaf.shape[axis] for leaf, axis in zip(leaves, axes, strict=True) if axis is not None
     )
@@ -266,7 +233,7 @@ def _batching(leaves: Any, axes: Any, **params: Any) -> tuple[list[Array], list[
     ]
     count = aligned[0].shape[1]
     merged = [leaf.reshape(size * count, *leaf.shape[2:]) for leaf in aligned]
-    found = _RUN.bind(*merged, **params)
+    found = _RUN.bind(*merged, how=how)
     return [leaf.reshape(size, count, *leaf.shape[1:]) for leaf in found], [0] * len(found)
 
 

@@ -1,13 +1,63 @@
-"""Processors: what a compiled program's simulations run on, this machine's CPU or its devices."""
+"""Processors: what a compiled program's simulations run on, and this machine's CPU as one."""
 
 import abc
-from collections.abc import Callable, Mapping
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from jaxbiped.compiler.runtime._input_streams import InputStreams
+from jaxbiped.compiler.codegen._lane_scheduler import FIELDS
+from jaxbiped.compiler.runtime._host_cpu import host
 from jaxbiped.compiler.runtime._kernel import Kernel
+
+_MANY = 8
+"""Vectors for each thread from which on two are computed side by side."""
+
+
+class InputStreams(NamedTuple):
+    """Of n simulations.
+
+    Attributes:
+        starts: address of the row that each reads first, shape (n,).
+        lengths: how many rows each has, shape (n,).
+        stride: numbers from one row to the next.
+        rows: what must stay in memory.
+    """
+
+    starts: np.ndarray
+    lengths: np.ndarray
+    stride: int
+    rows: list[np.ndarray]
+
+
+def input_streams_of(
+    stream: Sequence[np.ndarray] | None, count: int, numbers: int, *, backwards: bool
+) -> InputStreams:
+    """Of `count` simulations that read rows of so many numbers, of none where these are 0.
+
+    Raises:
+        ValueError: another number of arrays, or one without rows or with rows of another length.
+    """
+    rows = [
+        np.ascontiguousarray(each, dtype=np.float64) for each in ([] if stream is None else stream)
+    ]
+    wanted = count if numbers else 0
+    if len(rows) != wanted:
+        raise ValueError(f"stream has {len(rows)} arrays of rows: it must have {wanted}.")
+    for each in rows:
+        # Machine code reads the rows unchecked.
+        if each.ndim != 2 or len(each) == 0 or each.shape[1] != numbers:
+            raise ValueError(
+                f"stream holds an array of shape {each.shape}: it must be (rows, {numbers}), "
+                "with at least one row."
+            )
+    lengths = np.array([len(each) for each in rows], dtype=np.int64)
+    starts = np.array([each.ctypes.data for each in rows], dtype=np.int64)
+    if not backwards:
+        return InputStreams(starts, lengths, numbers, rows)
+    size = numbers * np.dtype(np.float64).itemsize
+    return InputStreams(starts + (lengths - 1) * size, lengths, -numbers, rows)
 
 
 class Launch(NamedTuple):
@@ -71,3 +121,46 @@ class AbstractProcessor(abc.ABC):
     @abc.abstractmethod
     def job(self, kernel: Kernel, launch: Launch, width: int, threads: int) -> Job:
         """A launch of at least one simulation, compiled."""
+
+
+class HostProcessor(AbstractProcessor):
+    """This machine's CPU."""
+
+    name = "lanes"
+
+    def hindrance(self) -> str | None:
+        return None
+
+    def width(self, kernel: Kernel, count: int, threads: int) -> int:
+        """A thread that has only one simulation is faster with it alone.
+
+        Where there are many, two of the host's vectors side by side: while one waits, the other one
+        is computed. What a map loops over fills the caches instead.
+        """
+        if count <= threads:
+            return 1
+        if count < _MANY * threads * host().width:
+            return host().width
+        return host().width * (1 if kernel.signature.maps else 2)
+
+    def prepare(self, kernel: Kernel, width: int) -> None:
+        kernel.code(width)
+
+    def ready(self, kernel: Kernel, width: int) -> bool:
+        return kernel.has_code(width)
+
+    def job(self, kernel: Kernel, launch: Launch, width: int, threads: int) -> Job:
+        arrays, numbers = launch.arrays, launch.numbers
+        fields = np.array(
+            [arrays[n].ctypes.data if n in arrays else numbers[n] for n in FIELDS], dtype=np.int64
+        )
+        code = kernel.code(width)
+        entry = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(code.address)
+        # What a thread runs and where it writes lives as long as the thread, even where a
+        # second interrupt leaves it behind.
+        used = code, fields, launch
+
+        def work(_: object = used) -> None:
+            entry(fields.ctypes.data)
+
+        return Job(work, min(threads, -(-launch.simulations // width)), lambda: None)

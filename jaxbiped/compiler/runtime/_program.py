@@ -1,6 +1,10 @@
-"""Program of a simulation: four functions of JAX, and their graph."""
+"""Program of a simulation: four functions of JAX, their graph, and what they record.
+
+Also how many operations one call of a function takes in a lane.
+"""
 
 import dataclasses
+from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -15,7 +19,9 @@ from jaxbiped._types import Numbers, Scalar
 from jaxbiped.compiler.ir._elementwise_primitives import KINDS, Array, array_of, convert
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 from jaxbiped.compiler.ir._lower_jaxpr import lower_jaxpr
-from jaxbiped.compiler.passes._code_sinking import sink_code
+from jaxbiped.compiler.passes._liveness import Liveness, sink_code
+
+_NO_WORK = ("input", "const", "part", "held", "taken")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -201,3 +207,60 @@ def _match_kinds(block: Block, arrays: list[Array], like: list[Array]) -> list[A
         )
         for a, b in zip(arrays, like, strict=True)
     ]
+
+
+class Recorded(NamedTuple):
+    """What was recorded of n simulations.
+
+    Attributes:
+        values: shape (n, room, numbers in a record). Beyond the records there are NaN where a
+            schedule says when they are due, else zeros: memory that nobody ever touched.
+        counts: how many records there were, shape (n,); more than `room` are lost.
+    """
+
+    values: np.ndarray
+    counts: np.ndarray
+
+    @property
+    def room(self) -> int:
+        """For how many records there was room."""
+        return int(self.values.shape[-2])
+
+    def columns(self, first: Numbers) -> list[jax.Array]:
+        """Of one simulation, as `Recording.columns`."""
+        known = jnp.arange(self.room) < self.counts
+        rows = jnp.where(known[:, None], self.values, jnp.nan)
+        return list(jnp.concatenate([jnp.asarray(first)[None], rows]).T)
+
+
+def count_operations(
+    function: Callable[[PyTree, PyTree], PyTree], varying: PyTree, invariant: PyTree
+) -> dict[str, int]:
+    """Operations of `function(varying, invariant)` by name, most frequent first.
+
+    What depends on `invariant` alone is left out. Leaves are replaced by numbers.
+    """
+    number = jax.ShapeDtypeStruct((), jnp.float64)
+    shapes = jtu.tree_map(lambda _: number, (varying, invariant))
+    once = Block(invariant=True)
+    every = Block(once)
+    arrays = [inputs_of(every, number) for _ in jtu.tree_leaves(varying)]
+    parameters = [inputs_of(once, number) for _ in jtu.tree_leaves(invariant)]
+    results = lower_function(every, function, shapes, [*arrays, *parameters])
+    needed = Liveness([value for array in results for value in array.ravel()])
+    counts: Counter[str] = Counter()
+    _count(counts, every, needed)
+    return dict(counts.most_common())
+
+
+def _count(counts: Counter[str], block: Block, needed: Liveness) -> None:
+    for value in block.values:
+        if value in needed and value.op not in _NO_WORK:
+            counts[value.op] += 1
+        for inner in (arg for arg in value.args if isinstance(arg, Block)):
+            _count(counts, inner, Liveness(_values_in(value)))
+
+
+def _values_in(value: Value) -> list[Value]:
+    lists = [arg for arg in value.args if isinstance(arg, list | tuple)]
+    return [v for each in lists for v in each if isinstance(v, Value)]

@@ -8,8 +8,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from jaxbiped.compiler.codegen._device_library import library_text
 from jaxbiped.compiler.codegen._kernel_target import OWN_LIBRARY
+from jaxbiped.compiler.codegen._ptx_kernel import library_text
 from jaxbiped.compiler.runtime._host_cpu import host
 from jaxbiped.compiler.runtime._machine_code import machine_code
 

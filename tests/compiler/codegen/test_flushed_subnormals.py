@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxbiped.compiler.codegen._kernel_target import KernelTarget
-from jaxbiped.compiler.codegen._lane_kernel import kernel_text
+from jaxbiped.compiler.codegen._llvm_lane_loop import kernel_text
 from jaxbiped.compiler.runtime._machine_code import foreign_machine, optimised_module
 from tests.compiler.one_shot import compiled, evaluate
 
@@ -37,7 +37,7 @@ def test_the_thread_that_runs_it_keeps_its_subnormals():
 
 
 def test_code_for_arm_flushes_too():
-    graph = compiled(lambda x: x * 0.5, ()).graph
+    graph = compiled(lambda x: x * 0.5, ()).kernel.graph
     for architecture, flushes in (("aarch64", True), ("riscv64", False)):
         text = kernel_text(graph, KernelTarget(2, 2, scales=False, architecture=architecture))
         machine = foreign_machine("aarch64-unknown-linux-gnu", cpu="generic", features="")

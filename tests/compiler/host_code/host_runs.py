@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 
-from jaxbiped.compiler.host_code._host_program import write_host_program
+from jaxbiped.compiler.host_code._host_jit import write_host_program
 
 
 def check_against_xla(function, *arrays, rtol=1e-14):

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.compiler.host_code._host_program import write_host_program
+from jaxbiped.compiler.host_code._host_jit import write_host_program
 from jaxbiped.compiler.host_code._host_writer import UnwrittenError
 from tests.compiler.host_code.host_runs import check_against_xla
 

@@ -135,7 +135,7 @@ def test_a_loop_computes_once_what_is_the_same_in_each_run():
         attempt=lambda x, carried: (_partly_the_same(carried), jnp.asarray(True)),
         finish=lambda x, carried: carried,
     )
-    block = CompiledProgram(program, shape).graph.body
+    block = CompiledProgram(program, shape).kernel.graph.body
     (loop,) = (value for value in block.values if value.op == "map")
     inside = {value.op for value in loop.args[1].values}
     assert inside <= {"taken", "part", "fmul", "fadd"}
@@ -144,7 +144,7 @@ def test_a_loop_computes_once_what_is_the_same_in_each_run():
 
 def test_short_loops_of_long_bodies_stay_loops():
     loops = [
-        sum(value.op == "map" for value in compiled(function, ()).graph.end.values)
+        sum(value.op == "map" for value in compiled(function, ()).kernel.graph.end.values)
         for function in (_long_body, _unrolled)
     ]
     assert loops == [1, 0]
@@ -191,8 +191,8 @@ def test_equal_parts_are_computed_once_and_unused_ones_never():
         del unused
         return jnp.exp(x) + jnp.exp(x) * jnp.exp(x)
 
-    once = compiled(jnp.exp, ()).instructions()
-    assert compiled(wasteful, ()).instructions() < once + 15
+    once = compiled(jnp.exp, ()).kernel.instructions()
+    assert compiled(wasteful, ()).kernel.instructions() < once + 15
 
 
 def test_equal_calls_are_lowered_once():
@@ -200,7 +200,7 @@ def test_equal_calls_are_lowered_once():
     called = jax.jit(lambda x: jax.lax.cond(x > 0.5, jnp.exp, lambda x: 2.0 * x, x))
 
     def conditionals(function):
-        return sum(value.op == "if" for value in compiled(function, ()).graph.end.values)
+        return sum(value.op == "if" for value in compiled(function, ()).kernel.graph.end.values)
 
     once = conditionals(called)
     assert once > 0

@@ -43,7 +43,7 @@ def test_what_a_branch_alone_needs_moves_into_it():
         return jax.lax.cond(x > 0.0, lambda: root + y, lambda: y)
 
     compiled = _compiled(function)
-    assert _where(compiled.graph.body, "sqrt") == [0, 1]
+    assert _where(compiled.kernel.graph.body, "sqrt") == [0, 1]
     _check(compiled, function)
 
 
@@ -56,7 +56,7 @@ def test_what_is_needed_elsewhere_stays(otherwise):
         return root * jax.lax.cond(x > 0.0, lambda: root + y, lambda: y)
 
     compiled = _compiled(function)
-    assert _where(compiled.graph.body, "sqrt") == [1, 0]
+    assert _where(compiled.kernel.graph.body, "sqrt") == [1, 0]
     _check(compiled, function)
 
 
@@ -70,7 +70,7 @@ def test_it_moves_as_far_in_as_it_can():
         return jax.lax.cond(x > 0.0, positive, lambda: y)
 
     compiled = _compiled(function)
-    (head,) = (value for value in compiled.graph.body.values if value.op == "if")
+    (head,) = (value for value in compiled.kernel.graph.body.values if value.op == "if")
     assert _where(head.args[1], "sqrt") == [0, 1]
     _check(compiled, function)
 

@@ -19,11 +19,10 @@ from hypothesis import strategies as st
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
 from jaxbiped.compiler import LANES
-from jaxbiped.compiler.runtime import _compiled_program, _threads
+from jaxbiped.compiler.runtime import _compiled_program, _host_cpu
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._host_cpu import host
+from jaxbiped.compiler.runtime._host_cpu import default_threads, host
 from jaxbiped.compiler.runtime._program import Program
-from jaxbiped.compiler.runtime._threads import default_threads
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._lane_solve import Setting, request_of
 from jaxbiped.solve._units import units_of
@@ -172,10 +171,10 @@ def test_an_interrupt_ends_a_run(monkeypatch):
             work()
             at_work.remove(threading.get_ident())
 
-        _threads.run_in_threads(one, workers, stop, quick=quick)
+        _host_cpu.run_in_threads(one, workers, stop, quick=quick)
 
     monkeypatch.setattr(_compiled_program, "run_in_threads", counted)
-    program.code(host().width)
+    program.kernel.code(host().width)
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
@@ -199,7 +198,7 @@ def test_an_interrupt_is_heard_at_the_first_look(monkeypatch):
     """Counted, for how long it takes depends on the machine."""
     monkeypatch.setattr(_Interrupted, "waits", 0)
     names = types.SimpleNamespace(Thread=threading.Thread, Event=_Interrupted)
-    monkeypatch.setattr(_threads, "threading", names)
+    monkeypatch.setattr(_host_cpu, "threading", names)
     with pytest.raises(KeyboardInterrupt):
         _endless().run(np.zeros(100), threads=3)
     # One look, and then the end of each of the three is awaited.
@@ -222,7 +221,7 @@ def test_a_run_that_is_stopped_attempts_nothing_more(attempts, monkeypatch):
 
     def stopped(work, workers, stop, *, quick):
         stop[0] = 1
-        _threads.run_in_threads(work, workers, stop, quick=quick)
+        _host_cpu.run_in_threads(work, workers, stop, quick=quick)
 
     monkeypatch.setattr(_compiled_program, "run_in_threads", stopped)
     assert np.isnan(program.run(inputs).outputs).all()

@@ -94,7 +94,7 @@ def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
 
 
 def test_what_is_no_longer_held_is_run_again(powers, runs, monkeypatch):
-    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._RECORDS", RecordCache(lambda: 0))
+    monkeypatch.setattr("jaxbiped.compiler.runtime._record_cache._RECORDS", RecordCache(lambda: 0))
     _, recording = _recording(powers, 1.5, 2.0)
     _, values = recording.columns(np.array([0.0, 1.0]))
     np.testing.assert_array_equal(values[:3], [1.0, 1.5, 2.25])
@@ -140,7 +140,9 @@ def test_a_recording_can_be_read_backwards(powers):
 
 @pytest.mark.parametrize("most", [0, 1 << 20])
 def test_what_reads_a_recording_may_record_as_well(powers, monkeypatch, most):
-    monkeypatch.setattr("jaxbiped.compiler.runtime._recorder._RECORDS", RecordCache(lambda: most))
+    monkeypatch.setattr(
+        "jaxbiped.compiler.runtime._record_cache._RECORDS", RecordCache(lambda: most)
+    )
     doubled, reader = _doubled(), _last_sum()
 
     def total(factor, steps):

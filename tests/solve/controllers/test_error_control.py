@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.compiler.passes._operation_counts import count_operations
+from jaxbiped.compiler.runtime._program import count_operations
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._tangent_step_size import SAFETY, SMALLEST_STEP
 from jaxbiped.solve.controllers._walk_step_size import ErrorControl

@@ -10,8 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler.runtime._primitive import Recording
-from jaxbiped.compiler.runtime._program import Program
-from jaxbiped.compiler.runtime._recorded import Recorded
+from jaxbiped.compiler.runtime._program import Program, Recorded
 
 Shapes: TypeAlias = tuple[tuple[int, ...], ...]
 

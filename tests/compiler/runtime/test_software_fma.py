@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from jaxbiped.compiler import host
-from jaxbiped.compiler.codegen._software_fma import with_software_fma
 from jaxbiped.compiler.runtime._machine_code import machine_code
+from jaxbiped.compiler.runtime._web_assembly import with_software_fma
 
 _MODULE = """\
 declare double @llvm.fma.f64(double, double, double)

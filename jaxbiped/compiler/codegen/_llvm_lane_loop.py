@@ -8,10 +8,14 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from jaxbiped.compiler.codegen._flushed_subnormals import begin_flushing, end_flushing
-from jaxbiped.compiler.codegen._graph_codegen import GraphWriter, Place
-from jaxbiped.compiler.codegen._kernel_target import WARP_ANY, KernelTarget
+from jaxbiped.compiler.codegen._kernel_target import (
+    WARP_ANY,
+    KernelTarget,
+    begin_flushing,
+    end_flushing,
+)
 from jaxbiped.compiler.codegen._lane_scheduler import LaneScheduler, Sizes
+from jaxbiped.compiler.codegen._llvm_from_graph import GraphWriter, Place
 from jaxbiped.compiler.codegen._llvm_function import BYTES, WEIGHTS, vector
 from jaxbiped.compiler.ir._elementwise_primitives import Array
 from jaxbiped.compiler.ir._graph import Block, Kind, Value

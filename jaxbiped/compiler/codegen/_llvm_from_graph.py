@@ -31,12 +31,8 @@ class GraphWriter:
     """
 
     def __init__(self, target: KernelTarget, needed: Liveness) -> None:
-        self.width, self.inner, self.target, self.needed = (
-            target.width,
-            target.inner,
-            target,
-            needed,
-        )
+        self.width, self.inner = target.width, target.inner
+        self.target, self.needed = target, needed
         self.text = FunctionBuilder()
         self.homes: dict[int, Place] = {}
         self.padded_rooms: set[str] = set()
