@@ -3,8 +3,9 @@
     python -m tests.scene_trip
 
 Nothing is compiled yet, so that all that traces a program of the scene is on its way. A file is
-entered when a function of it is called from another file with a scene among its arguments. A climb is an entry into a file that lies above the caller's: one
-that imports it, directly or not. An entry into a file that was entered before is a return.
+entered when a function of it is called from another file with a scene among its arguments. A climb
+is an entry into a file that lies above the caller's: one that imports it, directly or not. An entry
+into a file that was entered before is a return.
 """
 
 import ast
@@ -15,7 +16,7 @@ import threading
 from pathlib import Path
 
 import jaxbiped as jb
-from jaxbiped.scene._abstract_scene import AbstractScene
+from jaxbiped.scene._scene import AbstractScene
 
 ROOT = Path(jb.__file__).parent
 DOORS = {
@@ -97,7 +98,8 @@ def main():
     for name, door in DOORS.items():
         trip = Trip()
         trip.run(door)
-        print(f"{name:12s} {'%5d %6d %7d' % trip.counts(below)}")
+        files, climbs, returns = trip.counts(below)
+        print(f"{name:12s} {files:5d} {climbs:6d} {returns:7d}")
         if "-v" in sys.argv:
             for here, there in dict.fromkeys(trip.entries):
                 print("   ", *(str(Path(each).relative_to(ROOT)) for each in (here, there)))

@@ -10,8 +10,9 @@ import jax.tree_util as jtu
 from jaxtyping import Array, PyTree
 
 from jaxbiped._ending import Ending
-from jaxbiped.dynamics._formulation import field_of
-from jaxbiped.scene._redundant_scene import RedundantScene
+from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.dynamics._state import field_of
+from jaxbiped.scene._scene import RedundantScene
 from jaxbiped.solve._failure_events import ending_code, ending_events
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.solve._solvers import with_root_tolerances

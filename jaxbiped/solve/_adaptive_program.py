@@ -18,7 +18,7 @@ from jaxbiped._ending import Ending
 from jaxbiped._types import Numbers, Scalar, select
 from jaxbiped.compiler import Program
 from jaxbiped.dynamics._consistent_state import project
-from jaxbiped.dynamics._formulation import field_of
+from jaxbiped.dynamics._state import field_of
 from jaxbiped.solve._failure_events import ending_code, ending_events
 from jaxbiped.solve._fusion_barrier import without_barriers
 from jaxbiped.solve._projected_solver import projects

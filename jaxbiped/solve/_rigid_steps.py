@@ -8,8 +8,8 @@ from jaxbiped._circular import sine_cosine
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._impact import impact
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.dynamics._state import RigidState
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._failure_events import rigid_ending
 from jaxbiped.solve._rolling_step import (
     NEAR,

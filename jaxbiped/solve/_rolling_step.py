@@ -15,9 +15,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped._types import Scalar, select
-from jaxbiped.dynamics._rigid_state import RigidState
 from jaxbiped.dynamics._rolling import rolling_rates
-from jaxbiped.scene._rigid_scene import RigidScene
+from jaxbiped.dynamics._state import RigidState
+from jaxbiped.scene._scene import RigidScene
 from jaxbiped.solve._failure_events import FALL_ANGLE
 from jaxbiped.solve._step_polynomials import Quintic
 

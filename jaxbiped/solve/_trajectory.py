@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 from jaxtyping import Array, Float, Int, PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._checks import ArgumentError
 from jaxbiped._ending import Ending
 from jaxbiped._summary import summary
 from jaxbiped._types import Numbers, Scalar, by_numpy
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import State
 from jaxbiped.solve._error_estimate import ErrorEstimate
 

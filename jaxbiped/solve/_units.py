@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.dynamics._formulation import state_type
+from jaxbiped.dynamics._state import state_type
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
-from jaxbiped.scene._abstract_scene import AbstractScene, is_compliant
+from jaxbiped.scene._scene import AbstractScene, is_compliant
 
 _LENGTH = 0.40
 """Leg length of the seed paper's walker [m]."""

@@ -12,15 +12,15 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import as_float
-from jaxbiped.basins._label import Label
-from jaxbiped.basins._spherical_points import spread_directions
+from jaxbiped.basins._label_oracle import spread_directions
+from jaxbiped.basins._labels import Label
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._feet import feet
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._convergence_test import Goals
 from jaxbiped.sweep._follow_starts import broadcast_leaves, follow_starts
 from jaxbiped.sweep._labelling_settings import Effort

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Label
 
 NO_GAIT = -math.inf
 """Radius of a place for a gait that holds none."""

@@ -8,7 +8,8 @@ import numpy.typing as npt
 from jaxtyping import PyTree
 
 from jaxbiped._types import as_float
-from jaxbiped.basins._label import label_names
+from jaxbiped.basins._labels import label_names
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import Program, Request
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._adaptive_program import Solve

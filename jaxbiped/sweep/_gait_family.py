@@ -11,9 +11,8 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject, as_float
 from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.scene._parameters import SomeScene, with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import SomeScene, with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._attractor import (
     Attractor,
     attractor_without_radius,

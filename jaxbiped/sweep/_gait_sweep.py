@@ -11,18 +11,20 @@ from jaxtyping import PyTree
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._paths import user_path
-from jaxbiped._provenance import provenance
+from jaxbiped._files import user_path
+from jaxbiped._identity import provenance
 from jaxbiped._types import as_float
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._parameters import parameter_quantities, parameter_values, with_parameters
-from jaxbiped.scene._redundant_scene import RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._scene_identity import scene_identity
+from jaxbiped.scene._parameter_access import (
+    parameter_quantities,
+    parameter_values,
+    scene_identity,
+    with_parameters,
+)
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._gait_grid import open_gait_grid
 from jaxbiped.sweep._gait_waves import GaitWaves
 from jaxbiped.sweep._grid_waves import LARGE, Place, neighbours, rings

@@ -14,13 +14,13 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import as_float
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._parameters import with_parameters
+from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.sweep._gait_grid import GaitGrid
 from jaxbiped.sweep._grid_waves import Place, Wave, extrapolated, interpolated, neighbours, waves
 

@@ -13,15 +13,11 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject, as_float
-from jaxbiped.basins._label import Label
-from jaxbiped.dynamics._bristle_state import BristleState
-from jaxbiped.dynamics._formulation import state_type
-from jaxbiped.dynamics._state import State, within_a_turn
-from jaxbiped.scene._check_scene import check_scene
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene._scene_identity import scene_identity
+from jaxbiped.basins._labels import Label
+from jaxbiped.dynamics._state import BristleState, State, state_type, within_a_turn
+from jaxbiped.scene._parameter_access import scene_identity, with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._doubtful_labels import relabel_doubtful
 from jaxbiped.sweep._follow_starts import Labelled, broadcast_leaves, follow_starts
 from jaxbiped.sweep._gait_family import Family

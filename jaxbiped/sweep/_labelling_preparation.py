@@ -9,8 +9,7 @@ from jaxtyping import PyTree
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._labels import Label
 from jaxbiped.gait._default_guess import default_guess
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._gait_family import find_family, with_gaits
 from jaxbiped.sweep._labelling import Labelling

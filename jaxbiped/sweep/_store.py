@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from jaxbiped._strict_json import strict_json
+from jaxbiped._files import strict_json
 from jaxbiped._types import JsonObject
 from jaxbiped.sweep._store_files import SETTINGS
 from jaxbiped.sweep._stored_fields import Layout, empty_dataset

@@ -13,12 +13,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._disk_cache import ABANDONED
-from jaxbiped._identity import difference_of
-from jaxbiped._paths import failure_kind
-from jaxbiped._provenance import DECISIVE
-from jaxbiped._strict_json import strict_json
+from jaxbiped._files import failure_kind, strict_json
+from jaxbiped._identity import DECISIVE, difference_of
 from jaxbiped._types import JsonObject
+from jaxbiped.caching._disk_cache import ABANDONED
 
 if TYPE_CHECKING:
     import xarray

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from jaxbiped._types import JsonObject
-from jaxbiped.basins._doubt import Doubt, Witness
-from jaxbiped.basins._label import Label
+from jaxbiped.basins._labels import Doubt, Label, Witness
 from jaxbiped.sweep._follow_starts import Labelled
 from jaxbiped.sweep.starts._starts import AbstractStarts, Batch
 

@@ -14,9 +14,8 @@ from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped._files import user_path
 from jaxbiped._identity import provenance
 from jaxbiped.basins._arguments import check_whole
-from jaxbiped.basins._doubt import Doubt, Witness
-from jaxbiped.basins._label import Label
 from jaxbiped.basins._label_errors import ERRORS, LabelErrors, Seen, estimate_label_errors
+from jaxbiped.basins._labels import Doubt, Label, Witness
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import (
     Guesses,

@@ -12,8 +12,7 @@ import jax.numpy as jnp
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._state import State
-from jaxbiped.scene._redundant_scene import CompliantScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import CompliantScene, Scene
 from jaxbiped.solve._fusion_barrier import fusion_barrier
 from jaxbiped.solve._step_polynomials import StepCubic
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from jaxbiped._strict_json import strict_json
+from jaxbiped._files import strict_json
 from jaxbiped._types import JsonObject
 from jaxbiped.sweep._store import COMPLETE, AbstractStore
 from jaxbiped.sweep._store_files import (

@@ -22,10 +22,14 @@ from jaxbiped.dynamics._rolling import rolling, rolling_field
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.dynamics._state import RigidState, State, exchange_legs
 from jaxbiped.dynamics._switches import Switch, switches
-from jaxbiped.scene._abstract_scene import AbstractScene, is_rigid
-from jaxbiped.scene._redundant_scene import CompliantScene, RedundantScene
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._scene import (
+    AbstractScene,
+    CompliantScene,
+    RedundantScene,
+    RigidScene,
+    Scene,
+    is_rigid,
+)
 from jaxbiped.solve._failure_events import WATCHES, ending_events, rigid_ending
 
 

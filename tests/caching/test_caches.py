@@ -13,8 +13,8 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped import _caches
-from jaxbiped._cached_jit import cached_jit
-from jaxbiped._caches import Once, bounded_cache
+from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.caching._caches import Once, bounded_cache
 from jaxbiped.compiler.runtime import _compiled_program, _record_cache
 from jaxbiped.compiler.runtime._engine_interface import Request
 from jaxbiped.compiler.runtime._lane_engine import LaneEngine

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import jaxbiped as jb
-from jaxbiped.basins._doubt import Witness
+from jaxbiped.basins._labels import Witness
 from jaxbiped.sweep._doubtful_labels import relabel_doubtful
 from jaxbiped.sweep._follow_starts import Labelled
 from jaxbiped.sweep._labelling_settings import effort_of

@@ -8,7 +8,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.extremes._case import check_numbers
 from jaxbiped.extremes._grazing import _START, _lowest
-from jaxbiped.scene._clearance import AlwaysTouching
+from jaxbiped.scene._ground import AlwaysTouching
 from jaxbiped.sweep._labelling_settings import effort_of
 
 pytestmark = pytest.mark.slow

@@ -7,6 +7,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.basins._label_errors import Seen
+from jaxbiped.basins._labels import Doubt, Witness
 from jaxbiped.sweep import _sweep
 from jaxbiped.sweep._store import MemoryStore
 from jaxbiped.sweep._stored_fields import Layout

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._provenance import provenance
+from jaxbiped._identity import provenance
 from jaxbiped.sweep._store import AbstractStore, MemoryStore
 from jaxbiped.sweep._stored_fields import FIELDS, Layout
 from jaxbiped.sweep._zarr_store import ZarrStore

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
-from jaxbiped._caches import bounded_cache
+from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler.codegen._kernel_target import OWN_LIBRARY, WARP_ANY, KernelTarget
 from jaxbiped.compiler.codegen._llvm_from_graph import GraphWriter
 from jaxbiped.compiler.codegen._llvm_function import literal

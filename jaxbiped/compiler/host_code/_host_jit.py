@@ -14,14 +14,14 @@ from typing import Any, Generic, ParamSpec, Protocol, TypeVar, runtime_checkable
 import jax
 import numpy as np
 
-from jaxbiped import _caches
-from jaxbiped._cached_jit import Arguments, arguments_of, cached_jit
-from jaxbiped._caches import Once, register_programs
-from jaxbiped._compiled_store import Skeleton
 from jaxbiped._debug_switches import without_switches
-from jaxbiped._disk_cache import read_entry, write_entry
-from jaxbiped._fingerprint import fingerprint
-from jaxbiped._long_trace import long_trace
+from jaxbiped.caching import _caches
+from jaxbiped.caching._cached_jit import Arguments, arguments_of, cached_jit
+from jaxbiped.caching._caches import Once, register_programs
+from jaxbiped.caching._collector_pause import long_trace
+from jaxbiped.caching._compiled_store import Skeleton
+from jaxbiped.caching._disk_cache import read_entry, write_entry
+from jaxbiped.caching._fingerprint import fingerprint
 from jaxbiped.compiler.host_code._control_flow import CONTROL_FLOW
 from jaxbiped.compiler.host_code._host_writer import NAMES, HostWriter, Rule, UnwrittenError, Value
 from jaxbiped.compiler.host_code._indexing import INDEXING

@@ -98,7 +98,7 @@ class CompiledProgram:
         return CompiledProgram.kept, (self.kernel.digest, self._processor)
 
     def __fingerprint__(self) -> object:
-        """See `jaxbiped._fingerprint`."""
+        """See `jaxbiped.caching._fingerprint`."""
         digest = self.kernel.digest
         return object() if digest is None else (digest, self._processor.name)
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped._checks import ResourceError
+from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler.codegen._lane_scheduler import FIELDS
 from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY
 from jaxbiped.compiler.codegen._ptx_kernel import THREADS, Architecture, architecture_of

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import llvmlite.binding as llvm
 import numpy as np
 
-from jaxbiped._caches import bounded_cache
 from jaxbiped._environment import THREADS_VARIABLE, VECTOR_VARIABLE, environment_number
+from jaxbiped.caching._caches import bounded_cache
 
 _WITHOUT = {128: "avx", 256: "avx512f"}
 """The instruction set that gives more bits than these."""

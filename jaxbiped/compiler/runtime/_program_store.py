@@ -11,7 +11,7 @@ import jax
 import jax.tree_util as jtu
 import numpy as np
 
-from jaxbiped._disk_cache import read_entry, write_entry
+from jaxbiped.caching._disk_cache import read_entry, write_entry
 from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY
 from jaxbiped.compiler.codegen._ptx_kernel import Architecture
 from jaxbiped.compiler.runtime._host_cpu import Host

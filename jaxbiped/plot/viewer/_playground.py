@@ -54,7 +54,7 @@ def played_request(scene: Scene, state: State, footsteps: int) -> Request:
 
 def played_module(request: Request) -> bytes:
     """Its program as a module of WebAssembly."""
-    return web_module(LANES.compile(request).graph)
+    return web_module(LANES.compile(request).kernel.graph)
 
 
 def _played(program: Program) -> Program:

@@ -4,8 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Numbers, RealScalarLike, Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 
 _FIRST_STEP = 1e-5
 """First step tried, in units of time; a start that is not a number must not choose it."""

@@ -19,10 +19,10 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, RealScalarLike, Scalar
+from jaxbiped.dynamics._contact_forces import foot_force
 from jaxbiped.dynamics._feet import Foot, feet
-from jaxbiped.dynamics._forces import foot_force
-from jaxbiped.scene._redundant_scene import CompliantScene
-from jaxbiped.scene.laws.friction._frictionless import Frictionless
+from jaxbiped.scene._scene import CompliantScene
+from jaxbiped.scene.laws.friction._coulomb import Frictionless
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._units import Units
 from jaxbiped.solve.controllers._contact_steps import ShallowContact, TouchdownAhead

@@ -10,10 +10,8 @@ from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._state import BristleState, RigidState, State, state_type
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
-from jaxbiped.scene._abstract_scene import AbstractScene
-from jaxbiped.scene._parameters import parameter_names, parameter_quantities, with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, with_parameters
+from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
 
 COORDINATES = {
     "theta_stance": "theta_2",

@@ -5,13 +5,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from jaxbiped._caches import bounded_cache
 from jaxbiped._checks import ArgumentError, check_choice, check_finite
 from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._arguments import check_whole
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.caching._caches import bounded_cache
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._coordinates import check_coordinates
 from jaxbiped.sweep.starts._starts import (

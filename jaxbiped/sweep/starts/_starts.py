@@ -14,12 +14,9 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._identity import identity
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._bristle_state import BristleState
-from jaxbiped.dynamics._rigid_state import RigidState
-from jaxbiped.dynamics._state import State
-from jaxbiped.scene._parameters import with_parameters
-from jaxbiped.scene._rigid_scene import RigidScene
-from jaxbiped.scene._scene import Scene
+from jaxbiped.dynamics._state import BristleState, RigidState, State
+from jaxbiped.scene._parameter_access import with_parameters
+from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep.starts._coordinates import (
     axis_values,
