@@ -11,8 +11,11 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from _options import Options, parse
-
-from jaxbiped import extremes
+from extreme_cases.catalogue import RANGES, catalogue
+from extreme_cases.gaits import GaitJudge, gaits
+from extreme_cases.grazing import Grazing, grazing
+from extreme_cases.store import by_group, counts, reasons, study
+from extreme_cases.verdict import VERDICTS, judge
 
 COLOURS = ("tab:green", "tab:blue", "tab:gray", "tab:red", "tab:orange")
 WITHIN = 1e-2
@@ -22,21 +25,19 @@ WITHIN = 1e-2
 def main() -> None:
     options = parse("Simulations and gaits at the extremes, held against equations written anew.")
     store = options.path("extremes.jsonl")
-    cases = extremes.catalogue(quick=options.quick)
-    rows = extremes.study(cases, extremes.judge, store=store)
-    judge = extremes.GaitJudge()
-    found = extremes.study(
-        list(extremes.gaits(quick=options.quick)), judge, store=store, follow=judge.follow
-    )
+    cases = catalogue(quick=options.quick)
+    rows = study(cases, judge, store=store)
+    of_gaits = GaitJudge()
+    found = study(list(gaits(quick=options.quick)), of_gaits, store=store, follow=of_gaits.follow)
     compared = [row for row in found if row["multipliers"] is not None]
     told = [row for row in rows if row["told"] is not None and row["verdict"] == "accurate"]
-    swept = extremes.grazing(each=4, laws=1) if options.quick else extremes.grazing()
+    swept = grazing(each=4, laws=1) if options.quick else grazing()
     numbers = {
         "catalogue": len(cases),
-        **extremes.counts(rows, extremes.VERDICTS),
+        **counts(rows, VERDICTS),
         "precise": sum(row["precise"] for row in rows),
-        "groups": _merged(extremes.by_group(rows, extremes.VERDICTS)),
-        "reasons": {verdict: extremes.reasons(rows, verdict) for verdict in extremes.VERDICTS[1:]},
+        "groups": _merged(by_group(rows, VERDICTS)),
+        "reasons": {verdict: reasons(rows, verdict) for verdict in VERDICTS[1:]},
         "errors": {
             "told": len(told),
             "within_told": sum(row["error"] <= row["told"] for row in told),
@@ -44,11 +45,9 @@ def main() -> None:
             "median_doubt": _median([row["doubt"] for row in rows]),
         },
         "gaits": {
-            **extremes.counts(found, extremes.VERDICTS),
-            "groups": extremes.by_group(found, extremes.VERDICTS),
-            "reasons": {
-                verdict: extremes.reasons(found, verdict) for verdict in extremes.VERDICTS[1:]
-            },
+            **counts(found, VERDICTS),
+            "groups": by_group(found, VERDICTS),
+            "reasons": {verdict: reasons(found, verdict) for verdict in VERDICTS[1:]},
             "compared": len(compared),
             "median_error": {
                 name: _median([row[name] for row in compared])
@@ -62,7 +61,7 @@ def main() -> None:
         "picture": str(_draw(options, rows)),
     }
     for about in (numbers, numbers["gaits"]):
-        options.say(", ".join(f"{name} {about[name]}" for name in ("run", *extremes.VERDICTS)))
+        options.say(", ".join(f"{name} {about[name]}" for name in ("run", *VERDICTS)))
     options.finish(numbers)
 
 
@@ -75,14 +74,14 @@ def _merged(groups: dict[str, dict[str, int]]) -> dict[str, dict[str, int]]:
     merged: dict[str, dict[str, int]] = {}
     for name, counted in groups.items():
         first, _, second = name.partition(", ")
-        pair = first in extremes.RANGES and second in extremes.RANGES
+        pair = first in RANGES and second in RANGES
         into = merged.setdefault("pairs" if pair else name, dict.fromkeys(counted, 0))
         for key, value in counted.items():
             into[key] += value
     return merged
 
 
-def _grazed(swept: extremes.Grazing) -> dict[str, Any]:
+def _grazed(swept: Grazing) -> dict[str, Any]:
     """How derivatives about a graze compare with differences of the check."""
     accurate, flagged = swept.errors <= WITHIN, swept.flagged
     return {
@@ -99,13 +98,13 @@ def _grazed(swept: extremes.Grazing) -> dict[str, Any]:
 
 def _draw(options: Options, rows: list[dict[str, Any]]) -> Any:
     """Verdicts of the cases of one parameter by its value."""
-    names = list(extremes.RANGES)
+    names = list(RANGES)
     figure, axes = plt.subplots(4, 4, figsize=(11.0, 8.5), layout="constrained")
     for ax, name in zip(axes.flat, names, strict=False):
         own = [row for row in rows if name in row["case"]["at"] and row["case"]["group"] != "laws"]
         values = sorted({row["case"]["at"][name] for row in own})
         bottom = np.zeros(len(values))
-        for verdict, colour in zip(extremes.VERDICTS, COLOURS, strict=True):
+        for verdict, colour in zip(VERDICTS, COLOURS, strict=True):
             height = np.array(
                 [
                     sum(r["case"]["at"][name] == v and r["verdict"] == verdict for r in own)

@@ -24,7 +24,6 @@ LAYERS = [
     "sweep",
     "optimise",
     "trade",
-    "extremes",
     "plot",
     "cli",
 ]

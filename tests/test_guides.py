@@ -123,7 +123,7 @@ def test_flags_of_the_command_line_exist(capsys):
     from jaxbiped.cli import main
 
     helps = ""
-    studies = ("models", "constraints", "trade", "extremes", "cache", "doctor")
+    studies = ("models", "constraints", "trade", "cache", "doctor")
     own = ("walk", "gait", "continue", "fit", "optimise", "basin", *studies)
     for command in own:
         with pytest.raises(SystemExit):

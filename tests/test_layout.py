@@ -9,7 +9,7 @@ import jaxbiped as jb
 from tests.import_graph import LAYERS, PACKAGE, drawn, import_graph, imports_of, layer_of
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
-EXPERIMENTS = sorted((PACKAGE.parent / "experiments").glob("*.py"))
+EXPERIMENTS = sorted((PACKAGE.parent / "experiments").rglob("*.py"))
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(PACKAGE)))

@@ -22,7 +22,6 @@ from jaxbiped.cli.commands._cache import Cache
 from jaxbiped.cli.commands._constraints import Constraints
 from jaxbiped.cli.commands._continue import ContinueGait
 from jaxbiped.cli.commands._doctor import Doctor
-from jaxbiped.cli.commands._extremes import Extremes
 from jaxbiped.cli.commands._fit import Fit
 from jaxbiped.cli.commands._gait import FindGait
 from jaxbiped.cli.commands._models import Models
@@ -40,11 +39,16 @@ _Command = (
     | Annotated[Models, subcommand("models")]
     | Annotated[Constraints, subcommand("constraints")]
     | Annotated[Trade, subcommand("trade")]
-    | Annotated[Extremes, subcommand("extremes")]
     | Annotated[Cache, subcommand("cache")]
     | Annotated[Doctor, subcommand("doctor")]
     | Annotated[None, subcommand("version")]
 )
+
+_MOVED = {
+    "extremes": "extremes is no longer a command: the study of extreme cases is "
+    "experiments/extremes.py in jaxbiped's repository."
+}
+"""Commands of the last release, and where what they did is now."""
 
 
 class _Runnable(Protocol):
@@ -74,6 +78,9 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _run(given: list[str]) -> None:
+    if given and given[0] in _MOVED:
+        print(f"jaxbiped: {_MOVED[given[0]]}", file=sys.stderr)
+        sys.exit(2)
     command = None if given == ["--version"] else _parse(given)
     if command is None:
         from importlib.metadata import version

@@ -6,18 +6,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from extreme_cases.case import check_numbers
+from extreme_cases.grazing import START, TIME, lowest
+from reference.scipy_solves import scales, states_of
 
 import jaxbiped as jb
-from jaxbiped.extremes._case import check_numbers
-from jaxbiped.extremes._check_solve import scales, states_of
-from jaxbiped.extremes._grazing import _START, _TIME, _lowest
-from jaxbiped.scene._ground import AlwaysTouching
 
 pytestmark = pytest.mark.slow
 
 LAW = jb.laws.normal_law_like("kelvin-voigt", K=1e6, c=1e7, n=1.5, mass=2.0)
 SCENE = dataclasses.replace(
-    jb.seed_scene(), normal=LAW, clearance=AlwaysTouching()
+    jb.seed_scene(), normal=LAW, clearance=jb.laws.AlwaysTouching()
 )  # its force jumps at touchdown, so that even a shallow contact is felt
 NUMBERS = check_numbers(SCENE)
 DEPTH, LONG, SHORT = 1e-7, 3.196e-4, 1e-5
@@ -25,11 +24,11 @@ DEPTH, LONG, SHORT = 1e-7, 3.196e-4, 1e-5
 
 
 def walk(depth, dt, **options):
-    start = _START.copy()
-    start[1] = _START[1] - _lowest(NUMBERS) - depth
-    how = dict(duration=_TIME, dt=dt, solver="rodas5p", watch=(), save="end") | options
+    start = START.copy()
+    start[1] = START[1] - lowest(NUMBERS) - depth
+    how = dict(duration=TIME, dt=dt, solver="rodas5p", watch=(), save="end") | options
     found = jb.simulate(SCENE, jb.State(*map(jnp.asarray, start)), **how)
-    truth = states_of(start, NUMBERS, _TIME, 1e-13, points=12000)[-1]
+    truth = states_of(start, NUMBERS, TIME, 1e-13, points=12000)[-1]
     apart = np.abs(np.array(found.final) - truth) / scales(NUMBERS, 8)
     return int(found.missed_contacts), float(np.max(apart))
 
@@ -57,11 +56,11 @@ def test_they_are_counted_beside_footsteps_and_extremes(options):
 
 
 def test_each_of_a_batch_counts_its_own():
-    height = _START[1] - _lowest(NUMBERS)
+    height = START[1] - lowest(NUMBERS)
 
     def missed(z):
-        start = jb.State(*map(jnp.asarray, _START))._replace(hip_z=z)
-        how = dict(duration=_TIME, dt=LONG, solver="rodas5p", watch=(), save="end")
+        start = jb.State(*map(jnp.asarray, START))._replace(hip_z=z)
+        how = dict(duration=TIME, dt=LONG, solver="rodas5p", watch=(), save="end")
         return jb.simulate(SCENE, start, **how).missed_contacts
 
     found = jax.vmap(missed)(height - jnp.array([DEPTH, -DEPTH]))

@@ -4,25 +4,24 @@ import dataclasses
 
 import numpy as np
 import pytest
+from extreme_cases.case import check_numbers
+from extreme_cases.grazing import START, lowest
 
 import jaxbiped as jb
-from jaxbiped.extremes._case import check_numbers
-from jaxbiped.extremes._grazing import _START, _lowest
-from jaxbiped.scene._ground import AlwaysTouching
-from jaxbiped.sweep._labelling_settings import effort_of
+from jaxbiped.sweep._effort import effort_of
 
 pytestmark = pytest.mark.slow
 
 LAW = jb.laws.normal_law_like("kelvin-voigt", K=1e6, c=1e7, n=1.5, mass=2.0)
-SCENE = dataclasses.replace(jb.seed_scene(), normal=LAW, clearance=AlwaysTouching())
+SCENE = dataclasses.replace(jb.seed_scene(), normal=LAW, clearance=jb.laws.AlwaysTouching())
 DEPTHS = np.array([1e-4, 2e-8, 1e-9, -1e-9, -2e-8, -1e-4])
 """How deep a swinging foot would come had there been no ground [m]; known to 1.2e-6 m."""
 
 
 @pytest.fixture(scope="module")
 def states():
-    touching = _START[1] - _lowest(check_numbers(SCENE))
-    columns = [np.full(len(DEPTHS), value) for value in _START]
+    touching = START[1] - lowest(check_numbers(SCENE))
+    columns = [np.full(len(DEPTHS), value) for value in START]
     columns[1] = touching - DEPTHS
     return jb.State(*columns)
 

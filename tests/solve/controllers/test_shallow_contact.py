@@ -6,12 +6,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from extreme_cases.case import check_numbers
+from extreme_cases.grazing import START, TIME, lowest
+from reference.scipy_solves import scales, states_of
 
 import jaxbiped as jb
-from jaxbiped.extremes._case import check_numbers
-from jaxbiped.extremes._check_solve import scales, states_of
-from jaxbiped.extremes._grazing import _START, _TIME, _lowest
-from jaxbiped.scene._ground import AlwaysTouching
 
 pytestmark = pytest.mark.slow
 
@@ -19,7 +18,7 @@ DEPTHS = np.array([1e-5, 1e-6, 1e-7, 1e-8])
 """Of the contact that a swinging foot would come to had there been no ground [m]."""
 LAW = jb.laws.normal_law_like("kelvin-voigt", K=1e6, c=1e7, n=1.5, mass=2.0)
 SCENE = dataclasses.replace(
-    jb.seed_scene(), normal=LAW, clearance=AlwaysTouching()
+    jb.seed_scene(), normal=LAW, clearance=jb.laws.AlwaysTouching()
 )  # its force jumps at touchdown, so that even a shallow contact is felt
 
 
@@ -27,12 +26,12 @@ SCENE = dataclasses.replace(
 def ends():
     """Starts, and the states at the end with a contact and with none."""
     p = check_numbers(SCENE)
-    touching = _START[1] - _lowest(p)
+    touching = START[1] - lowest(p)
 
     def end(height, points):
-        start = _START.copy()
+        start = START.copy()
         start[1] = height
-        return states_of(start, p, _TIME, 1e-13, points=points)[-1]
+        return states_of(start, p, TIME, 1e-13, points=points)[-1]
 
     heights = touching - DEPTHS
     points = (4000 * np.sqrt(1e-6 / np.minimum(DEPTHS, 1e-6))).astype(int)
@@ -45,9 +44,9 @@ def test_a_shallow_contact_is_not_stepped_over(ends, engine, accuracy, within):
     heights, expected = ends
 
     def end(height):
-        start = jb.State(*map(jnp.asarray, _START))._replace(hip_z=height)
+        start = jb.State(*map(jnp.asarray, START))._replace(hip_z=height)
         return jb.simulate(
-            SCENE, start, duration=_TIME, save="end", watch=(), engine=engine, accuracy=accuracy
+            SCENE, start, duration=TIME, save="end", watch=(), engine=engine, accuracy=accuracy
         ).final
 
     found = np.stack(jax.vmap(end)(jnp.asarray(heights)), axis=1)
@@ -65,12 +64,12 @@ def test_contacts_are_found_wherever_a_step_ends(law, solver):
     )
     normal = jb.laws.normal_law_like(law, K=1e6, c=1e7, n=1.5, mass=2.0)
     scene, p = dataclasses.replace(SCENE, normal=normal), check_numbers(SCENE)
-    touching = _START[1] - _lowest(p)
+    touching = START[1] - lowest(p)
 
     def end(depth, rtol):
-        start = jb.State(*map(jnp.asarray, _START))._replace(hip_z=touching - depth)
+        start = jb.State(*map(jnp.asarray, START))._replace(hip_z=touching - depth)
         how = dict(save="end", watch=(), engine="lanes", solver=solver)
-        return jb.simulate(scene, start, duration=_TIME, rtol=rtol, atol=1e-2 * rtol, **how).final
+        return jb.simulate(scene, start, duration=TIME, rtol=rtol, atol=1e-2 * rtol, **how).final
 
     found, exact = (
         np.stack(jax.vmap(end)(jnp.asarray(depths), jnp.asarray(each)), axis=1)

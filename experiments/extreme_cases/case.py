@@ -6,22 +6,10 @@ import json
 import math
 from typing import Any
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
+from reference.compliant import FRICTION, FRICTION_AT, NORMAL, NORMAL_AT, SIZE
 
-from jaxbiped.dynamics._state import BristleState, State, within_a_turn
-from jaxbiped.extremes._check_equations import (
-    FRICTION,
-    FRICTION_AT,
-    NORMAL,
-    NORMAL_AT,
-    SIZE,
-)
-from jaxbiped.scene._ground import AlwaysTouching, StanceRotation
-from jaxbiped.scene._ready_scenes import seed_scene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene.laws._catalogue import friction_law_like, normal_law_like
+import jaxbiped as jb
 
 _FIELDS = ("hip_x", "hip_z", "theta_1", "theta_2", "hip_vx", "hip_vz", "omega_1", "omega_2")
 _DEPTH = 6.3e-4
@@ -78,19 +66,19 @@ class Case:
         """A name for the store, the same wherever the case is the same."""
         return key_of(self)
 
-    def scene(self) -> Scene:
+    def scene(self) -> jb.Scene:
         """The scene.
 
         Raises:
             ArgumentError: a parameter that is not allowed.
         """
-        scene = seed_scene(**self.parameters)
-        clearance = StanceRotation() if self.clears else AlwaysTouching()
+        scene = jb.seed_scene(**self.parameters)
+        clearance = jb.laws.StanceRotation() if self.clears else jb.laws.AlwaysTouching()
         scene = dataclasses.replace(scene, clearance=clearance)
         normal: Any = scene.normal
         friction = scene.friction
         if self.normal != "ristow-schafer":
-            law = normal_law_like(
+            law = jb.laws.normal_law_like(
                 self.normal,
                 K=normal.K,
                 c=normal.c,
@@ -103,7 +91,8 @@ class Case:
             values = {
                 name: getattr(friction, name) for name in ("mu_static", "mu_kinetic", "v0", "xi")
             }
-            scene = dataclasses.replace(scene, friction=friction_law_like(self.friction, **values))
+            law = jb.laws.friction_law_like(self.friction, **values)
+            scene = dataclasses.replace(scene, friction=law)
         return scene
 
     def state(self) -> dict[str, float]:
@@ -121,7 +110,7 @@ class Case:
         if "hip_z" not in changed:
             told["hip_z"] = r + (l - r) * math.cos(told["theta_2"]) + height
         for name in ("theta_1", "theta_2"):
-            told[name] = float(within_a_turn(jnp.asarray(told[name])))
+            told[name] = _within_a_turn(told[name])
         return {name: float(told[name]) for name in _FIELDS}
 
     @property
@@ -134,33 +123,38 @@ class Case:
         return math.sqrt(max(self.parameters.get("g", 9.8), 1e-3) / 9.8)
 
 
+def _within_a_turn(angle: float) -> float:
+    """The angle without whole turns [rad]."""
+    turn = 2.0 * math.pi
+    return angle if abs(angle) <= math.pi else angle - turn * round(angle / turn)
+
+
 def key_of(case: Any) -> str:
     """The same text for the same numbers of a dataclass."""
     told = json.dumps(dataclasses.asdict(case), sort_keys=True)
     return hashlib.sha1(told.encode()).hexdigest()[:16]
 
 
-def start_of(scene: Scene, start: dict[str, float], dtype: str = "float64") -> Any:
+def start_of(scene: jb.Scene, start: dict[str, float], dtype: str = "float64") -> Any:
     """The start as `simulate` takes it."""
     cast: dict[str, Any] = {name: np.asarray(value, dtype) for name, value in start.items()}
     if scene.has_bristles:
         zero: Any = np.zeros((), dtype)
-        return BristleState(**cast, bristle_1=zero, bristle_2=zero)
-    return State(**cast)
+        return jb.dynamics.BristleState(**cast, bristle_1=zero, bristle_2=zero)
+    return jb.State(**cast)
 
 
-def check_numbers(scene: Scene) -> np.ndarray:
-    """A scene as the check's equations take it: plain numbers, shape (SIZE,)."""
+def check_numbers(scene: jb.Scene) -> np.ndarray:
+    """A scene as the independent equations take it: plain numbers, shape (SIZE,)."""
     walker, ground = scene.walker, scene.ground
     p = np.zeros(SIZE)
     told = (walker.m, walker.J, walker.l, walker.d, walker.r, walker.hip_mass, ground.g)
     p[:7] = [float(value) for value in told]
-    p[7], p[8] = float(ground.slope), isinstance(scene.clearance, StanceRotation)
+    p[7], p[8] = float(ground.slope), isinstance(scene.clearance, jb.laws.StanceRotation)
     for at, names, law in (
         (NORMAL_AT, NORMAL, scene.normal),
         (FRICTION_AT, FRICTION, scene.friction),
     ):
-        assert isinstance(law, eqx.Module)
         name = law.name
         values = [value for value in vars(law).values() if value is not None]
         p[at] = names.index(name)
@@ -168,7 +162,7 @@ def check_numbers(scene: Scene) -> np.ndarray:
     return p
 
 
-def check_start(scene: Scene, start: dict[str, float]) -> np.ndarray:
-    """A start as the check's equations take it, shape (8,), or (10,) with bristles."""
+def check_start(scene: jb.Scene, start: dict[str, float]) -> np.ndarray:
+    """A start as the independent equations take it, shape (8,), or (10,) with bristles."""
     told = [start[name] for name in _FIELDS]
     return np.array(told + [0.0, 0.0] * scene.has_bristles)

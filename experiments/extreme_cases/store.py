@@ -1,19 +1,22 @@
-"""Study of extremes: verdicts of many cases, kept in a store that a later run goes on from."""
+"""Store of verdicts: of many cases, kept in a file that a later run goes on from."""
 
 import dataclasses
+import functools
+import hashlib
 import json
 import re
+import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from tqdm import tqdm
 
-from jaxbiped._files import strict_json
-from jaxbiped._identity import DECISIVE, provenance
-from jaxbiped._types import JsonObject
+Row = dict[str, Any]
+"""A case's fields under "case", its verdict's beside."""
 
 
 def study(
@@ -21,8 +24,8 @@ def study(
     judge: Callable[[Any], Any],
     *,
     store: Path | None = None,
-    follow: Callable[[JsonObject], None] | None = None,
-) -> list[JsonObject]:
+    follow: Callable[[Row], None] | None = None,
+) -> list[Row]:
     """Verdicts of cases, in their order; those that the store holds of this version are not run
     again.
 
@@ -33,20 +36,19 @@ def study(
         store: file of JSON lines to read and to add to; None keeps nothing.
 
     Returns:
-        For each case its fields under "case", and its verdict's beside.
+        A row for each case.
     """
-    writer = {name: provenance()[name] for name in DECISIVE}
-    held = {} if store is None or not store.exists() else _read(store, writer)
+    held = {} if store is None or not store.exists() else _read(store)
     todo = sum(case.key not in held for case in cases)
     rows = []
     with tqdm(total=todo, unit="cases", file=sys.stderr, disable=todo == 0) as bar:
         for case in cases:
             if case.key not in held:
-                row = {"key": case.key, "case": dataclasses.asdict(case), "writer": writer}
+                row = {"key": case.key, "case": dataclasses.asdict(case), "writer": _writer()}
                 held[case.key] = row | dataclasses.asdict(judge(case))
                 if store is not None:
                     with store.open("a") as lines:
-                        lines.write(strict_json(held[case.key], unknown=str) + "\n")
+                        lines.write(json.dumps(held[case.key]) + "\n")
                 bar.update()
             elif follow is not None:
                 follow(held[case.key])
@@ -54,7 +56,24 @@ def study(
     return rows
 
 
-def _read(store: Path, writer: JsonObject) -> dict[str, JsonObject]:
+@functools.cache
+def _writer() -> dict[str, str]:
+    """What judges: the version, and the revision with a digest of its changes."""
+    folder = Path(__file__).parents[2]
+
+    def git(*command: str) -> str:
+        asked = ["git", "-C", str(folder), *command]
+        return subprocess.run(asked, capture_output=True, text=True, check=True).stdout
+
+    try:
+        revision = git("rev-parse", "HEAD").strip()
+        changes = hashlib.sha256(git("diff", "HEAD", "--", "jaxbiped").encode()).hexdigest()[:12]
+    except (OSError, subprocess.CalledProcessError):
+        revision = changes = "unknown"
+    return {"version_jaxbiped": version("jaxbiped"), "revision": revision, "changes": changes}
+
+
+def _read(store: Path) -> dict[str, Row]:
     """What this version has judged."""
     held = {}
     for line in store.read_text().splitlines():
@@ -62,26 +81,26 @@ def _read(store: Path, writer: JsonObject) -> dict[str, JsonObject]:
             row = json.loads(line)
         except json.JSONDecodeError:
             continue  # cut off while it was written
-        if row.get("writer") == writer:
+        if row.get("writer") == _writer():
             held[row["key"]] = row
     return held
 
 
-def counts(rows: Sequence[JsonObject], verdicts: Sequence[str]) -> JsonObject:
+def counts(rows: Sequence[Row], verdicts: Sequence[str]) -> Row:
     """How many cases were run, and how many came out how."""
     found = Counter(row["verdict"] for row in rows)
     return {"run": len(rows)} | {name: found[name] for name in verdicts}
 
 
-def by_group(rows: Sequence[JsonObject], verdicts: Sequence[str]) -> dict[str, JsonObject]:
+def by_group(rows: Sequence[Row], verdicts: Sequence[str]) -> dict[str, Row]:
     """The counts of each group, in the order in which groups come first."""
-    groups: dict[str, list[JsonObject]] = {}
+    groups: dict[str, list[Row]] = {}
     for row in rows:
         groups.setdefault(row["case"]["group"], []).append(row)
     return {name: counts(each, verdicts) for name, each in groups.items()}
 
 
-def reasons(rows: Sequence[JsonObject], verdict: str) -> dict[str, int]:
+def reasons(rows: Sequence[Row], verdict: str) -> dict[str, int]:
     """How often each reason was told; numbers in it are left out."""
     told = [_without_numbers(row["reason"]) for row in rows if row["verdict"] == verdict]
     return dict(Counter(told).most_common())

@@ -2,7 +2,11 @@
 
 import dataclasses
 
-from jaxbiped.extremes import VERDICTS, Case, by_group, catalogue, counts, reasons, study
+import pytest
+from extreme_cases.case import Case
+from extreme_cases.catalogue import catalogue
+from extreme_cases.store import by_group, counts, reasons, study
+from extreme_cases.verdict import VERDICTS, judge
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,3 +52,15 @@ def test_the_catalogue_is_large_and_names_each_case_once():
     assert len(cases) == len(keys) >= 2000
     assert [case.key for case in catalogue()] == [case.key for case in cases]
     assert len(catalogue(quick=True)) < 100
+
+
+@pytest.mark.slow
+def test_of_the_quick_cases_none_is_silently_wrong_and_none_is_run_again(tmp_path):
+    cases, store = catalogue(quick=True), tmp_path / "store.jsonl"
+    rows = study(cases, judge, store=store)
+    found, kept = counts(rows, VERDICTS), store.read_text()
+    assert found["run"] == sum(found[each] for each in VERDICTS) == len(kept.splitlines())
+    assert found["silently_wrong"] == 0
+    assert found["accurate"] > 0.7 * found["run"]
+    assert counts(study(cases, judge, store=store), VERDICTS) == found
+    assert store.read_text() == kept

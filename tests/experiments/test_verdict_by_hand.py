@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from extreme_cases import verdict as verdicts
+from extreme_cases.case import Case
+from extreme_cases.verdict import judge
+from reference.scipy_solves import Checked
 
 import jaxbiped as jb
-from jaxbiped.extremes import Case, judge
-from jaxbiped.extremes import _verdict as verdicts
-from jaxbiped.extremes._check_solve import Checked
 from jaxbiped.solve._error_estimate import ErrorEstimate
 from jaxbiped.solve._trajectory import Trajectory
 
@@ -34,7 +35,7 @@ def test_a_verdict_is_by_the_error_that_was_asked_for(
     error = ErrorEstimate(None, 1e-5, 1e-4, 1e-7, 2, met, "" if met else "it is too stiff")
     whole = np.asarray(0)
     walk = Trajectory(np.array([0.02]), jb.State(*moved[:, None]), whole, whole, whole, error=error)
-    monkeypatch.setattr(verdicts, "simulate", lambda *_, **__: walk)
+    monkeypatch.setattr(jb, "simulate", lambda *_, **__: walk)
     monkeypatch.setattr(verdicts, "checked", lambda *_, **__: Checked(STATE, doubt, lowest))
     found = judge(CASE)
     assert found.verdict == verdict

@@ -1,4 +1,4 @@
-"""Derivatives of a gait by the check's equations: multipliers and elasticities of its period.
+"""Derivatives of a gait of the compliant walker: multipliers and elasticities of its period.
 
 By central differences of the flow over one period from a state of the gait, with two sizes of
 differences. No section is needed: the flow's own direction has the multiplier 1.
@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from jaxbiped.extremes._check_equations import derivative
-from jaxbiped.extremes._check_solve import final_state, scales
+from .compliant import derivative
+from .scipy_solves import final_state, scales
 
 _EXCHANGED = [0, 1, 3, 2, 4, 5, 7, 6]
 _FINE = 1e-12
@@ -45,7 +45,7 @@ def checked_gait(
     Args:
         start: a state of the gait, shape (8,), SI units.
         period: of one footstep, after which the legs have changed places [s].
-        p: numbers of the scene, see `_check_equations`.
+        p: numbers of the scene, see `compliant`.
         varied: places in p of the parameters.
     """
     units = scales(p, 8)

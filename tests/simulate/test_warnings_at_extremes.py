@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from extreme_cases.case import Case
+from extreme_cases.verdict import judge
 
 import jaxbiped as jb
-from jaxbiped.extremes import Case, judge
 
 pytestmark = pytest.mark.slow
 

@@ -6,20 +6,15 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from reference.scipy_solves import scales, states_of
 
-from jaxbiped._types import Parameter
-from jaxbiped.dynamics._state import State
-from jaxbiped.extremes._case import check_numbers
-from jaxbiped.extremes._check_solve import scales, states_of
-from jaxbiped.scene._ground import AlwaysTouching
-from jaxbiped.scene._ready_scenes import seed_scene
-from jaxbiped.scene._scene import Scene
-from jaxbiped.scene.laws._catalogue import normal_law_like
-from jaxbiped.simulate._simulate import simulate
+import jaxbiped as jb
 
-_START = np.array([0.0, 0.8, -0.5, -1.2, 0.3, 1.0, 10.0, 0.0])
+from .case import check_numbers
+
+START = np.array([0.0, 0.8, -0.5, -1.2, 0.3, 1.0, 10.0, 0.0])
 """A walker in flight: leg 1 swings past the vertical, leg 2 is held high."""
-_TIME = 0.08
+TIME = 0.08
 _POINTS, _SHALLOW = 4000, 1e-6
 """No step of the check is longer than that share of the time, and than a smaller one the shallower
 a contact is below that [m]: it is short."""
@@ -71,18 +66,18 @@ def grazing(*, each: int = 25, laws: int = len(_LAWS)) -> list[Grazing]:
 
 
 def _swept(name: str, heights: np.ndarray) -> list[Grazing]:
-    scene = dataclasses.replace(seed_scene(), clearance=AlwaysTouching())
-    law = normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
+    scene = dataclasses.replace(jb.seed_scene(), clearance=jb.laws.AlwaysTouching())
+    law = jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
     scene = dataclasses.replace(scene, normal=law)
     p = check_numbers(scene)
-    units, touching = scales(p, 8), _START[1] - _lowest(p)
+    units, touching = scales(p, 8), START[1] - lowest(p)
     starts = touching + heights
     differences = np.array(
         [_difference(z, h, p) * p[2] / units for z, h in zip(starts, heights, strict=True)]
     )
 
     def derivatives(accuracy: str) -> np.ndarray:
-        def end(height: Parameter) -> State:
+        def end(height: jax.Array) -> jb.State:
             return _end(scene, height, accuracy)
 
         found = jax.vmap(jax.jacfwd(end))(jnp.asarray(starts))
@@ -94,16 +89,16 @@ def _swept(name: str, heights: np.ndarray) -> list[Grazing]:
     ]
 
 
-def _end(scene: Scene, height: Parameter, accuracy: str) -> State:
-    state = State(*map(jnp.asarray, _START))._replace(hip_z=jnp.asarray(height))
-    return simulate(
-        scene, state, duration=_TIME, save="end", watch=(), engine="lanes", accuracy=accuracy
+def _end(scene: jb.Scene, height: jax.Array, accuracy: str) -> jb.State:
+    state = jb.State(*map(jnp.asarray, START))._replace(hip_z=jnp.asarray(height))
+    return jb.simulate(
+        scene, state, duration=TIME, save="end", watch=(), engine="lanes", accuracy=accuracy
     ).final
 
 
-def _lowest(p: np.ndarray) -> float:
-    """Height of foot 1's lowest point on the flight from `_START`, which stays in the air [m]."""
-    states = states_of(_START, p, _TIME, _FINE, points=_POINTS)
+def lowest(p: np.ndarray) -> float:
+    """Height of foot 1's lowest point on the flight from `START`, which stays in the air [m]."""
+    states = states_of(START, p, TIME, _FINE, points=_POINTS)
     height = states[:, 1] - (p[2] - p[4]) * np.cos(states[:, 2]) - p[4]
     k = int(np.argmin(height))
     a, b, _ = np.polyfit([-1.0, 0.0, 1.0], height[k - 1 : k + 2] - height[k], 2)
@@ -116,7 +111,7 @@ def _difference(height: float, above: float, p: np.ndarray) -> np.ndarray:
     points = int(_POINTS * np.sqrt(max(1.0, _SHALLOW / abs(above))))
     ends = []
     for sign in (1.0, -1.0):
-        start = _START.copy()
+        start = START.copy()
         start[1] = height + sign * step
-        ends.append(states_of(start, p, _TIME, _FINE, points=points)[-1])
+        ends.append(states_of(start, p, TIME, _FINE, points=points)[-1])
     return (ends[0] - ends[1]) / (2.0 * step)

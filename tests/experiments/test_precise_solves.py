@@ -4,14 +4,13 @@ import dataclasses
 
 import numpy as np
 import pytest
+from extreme_cases.case import Case, check_numbers, check_start
+from reference import scipy_solves as solves
+from reference.compliant import FRICTION, NORMAL, derivative
+from reference.precise_solves import _collocation, _context, _equations, precise_motion
+from reference.scipy_solves import checked, scales
 
 import jaxbiped as jb
-from jaxbiped.extremes import Case
-from jaxbiped.extremes import _check_solve as solves
-from jaxbiped.extremes._case import check_numbers, check_start
-from jaxbiped.extremes._check_equations import FRICTION, NORMAL, derivative
-from jaxbiped.extremes._check_precise import _collocation, _context, _equations, precise_motion
-from jaxbiped.extremes._check_solve import checked, scales
 
 SCENE = jb.seed_scene()
 

@@ -1,9 +1,10 @@
-"""Precise solve of the check's equations: Radau IIA collocation in multiple precision.
+"""Precise solves of the compliant walker: Radau IIA collocation in multiple precision.
 
 For motions that leave SciPy's solves in doubt, by rounding above all. The equations are those of
-`_check_equations`, run on mpmath's numbers; only Newton's corrections are of double precision.
+`compliant`, run on mpmath's numbers; only Newton's corrections are of double precision.
 """
 
+import functools
 import importlib
 import importlib.util
 import math
@@ -13,8 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxbiped.caching._caches import bounded_cache
-from jaxbiped.extremes import _check_equations
+from . import compliant
 
 _DIGITS, _STAGES = 40, 7
 _FINE, _COARSE = 1e-17, 1e-14
@@ -56,7 +56,7 @@ def precise_motion(start: np.ndarray, p: np.ndarray, duration: float, units: np.
 
     Args:
         start: shape (8,), or (10,) with bristles, SI units.
-        p: the numbers of the scene, see `_check_equations`.
+        p: the numbers of the scene, see `compliant`.
         duration: simulated time [s].
         units: of the state's numbers.
     """
@@ -75,7 +75,7 @@ class _Collocation(NamedTuple):
     before: np.ndarray
 
 
-@bounded_cache(1)
+@functools.cache
 def _context() -> Any:
     """Numbers of 40 digits, of a context that nobody else changes."""
     context = importlib.import_module("mpmath").mp.clone()
@@ -83,7 +83,7 @@ def _context() -> Any:
     return context
 
 
-@bounded_cache(1)
+@functools.cache
 def _collocation() -> _Collocation:
     """Nodes are the roots of P_s − P_(s−1), Legendre's polynomials on (0, 1)."""
     context = _context()
@@ -125,16 +125,16 @@ def _root(ascending: list[Any], guess: complex) -> Any:
     return x
 
 
-@bounded_cache(1)
+@functools.cache
 def _equations() -> Callable[[Any, np.ndarray, np.ndarray], np.ndarray]:
-    """The time derivative of `_check_equations`, its code run on numbers of 40 digits."""
+    """The time derivative of `compliant`, its code run on numbers of 40 digits."""
     context = _context()
 
     def zeros(shape: Any) -> np.ndarray:
         return np.full(shape, context.mpf(0), object)
 
     functions = ("sin", "cos", "exp", "sqrt", "tanh")
-    names = vars(_check_equations) | {
+    names = vars(compliant) | {
         "math": types.SimpleNamespace(
             copysign=lambda size, sign: size if sign >= 0 else -size,
             **{name: getattr(context, name) for name in functions},
@@ -142,7 +142,7 @@ def _equations() -> Callable[[Any, np.ndarray, np.ndarray], np.ndarray]:
         "np": types.SimpleNamespace(zeros=zeros, linalg=types.SimpleNamespace(solve=_eliminated)),
     }
     for name in ("ramp", "normal_force", "fallen", "friction_share", "derivative"):
-        function = getattr(_check_equations, name)
+        function = getattr(compliant, name)
         names[name] = types.FunctionType(getattr(function, "py_func", function).__code__, names)
     return names["derivative"]
 
@@ -217,7 +217,7 @@ def _stepped(
 
     # First in double precision, which costs next to nothing.
     begun = _corrected(
-        lambda z: _check_equations.derivative(0.0, rough + z, p),
+        lambda z: compliant.derivative(0.0, rough + z, p),
         h * np.outer(nodes.astype(float), rates.astype(float)),
         h * coarse, inverse, units, 1e-13, 1e-7,
     )  # fmt: skip
@@ -281,7 +281,7 @@ def _jacobian(y: np.ndarray, rates: np.ndarray, exact: np.ndarray) -> np.ndarray
     return np.stack(columns, axis=1).astype(float)
 
 
-@bounded_cache(1)
+@functools.cache
 def _real_eigenvalue() -> float:
     """Of the collocation's matrix, which has one for an odd number of stages."""
     values = np.linalg.eigvals(_collocation().matrix.astype(float))

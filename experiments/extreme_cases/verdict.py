@@ -6,13 +6,11 @@ import warnings
 from typing import Any
 
 import numpy as np
+from reference.scipy_solves import Checked, checked, distance, scales
 
-from jaxbiped._checks import ArgumentError
-from jaxbiped._ending import Ending
-from jaxbiped.extremes._case import Case, check_numbers, check_start, start_of
-from jaxbiped.extremes._check_solve import Checked, checked, distance, scales
-from jaxbiped.simulate._simulate import simulate
-from jaxbiped.solve._trajectory import Trajectory
+import jaxbiped as jb
+
+from .case import Case, check_numbers, check_start, start_of
 
 VERDICTS = ("accurate", "flagged", "refused", "silently_wrong", "unresolved")
 GROSS = 1e-2
@@ -21,7 +19,7 @@ SURE = 0.3
 """Share of the error allowed that the check's own doubt may have."""
 _AT_ONCE = 1e-3
 """Share of the time within which a simulation ended at its start."""
-_UNTOLD = (Ending.OUT_OF_STEPS, Ending.SOLVER_FAILED, Ending.TIMED_OUT)
+_UNTOLD = (jb.Ending.OUT_OF_STEPS, jb.Ending.SOLVER_FAILED, jb.Ending.TIMED_OUT)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,9 +60,9 @@ def judge(case: Case) -> Verdict:
             scene, start = case.scene(), case.state()
             asked = dict(case.asked)
             state = start_of(scene, start, asked.pop("dtype", "float64"))
-            walk = simulate(scene, state, duration=case.time, save="end", **asked)
+            walk = jb.simulate(scene, state, duration=case.time, save="end", **asked)
             end = np.array([float(leaf) for leaf in walk.final], float)
-        except ArgumentError as error:
+        except jb.ArgumentError as error:
             return Verdict("refused", str(error))
         except Exception as error:
             return Verdict("silently_wrong", f"{type(error).__name__}: {error}"[:300])
@@ -95,7 +93,7 @@ def judge(case: Case) -> Verdict:
     return Verdict("silently_wrong" if wrong else "accurate", wrong, **known)
 
 
-def _flag(walk: Trajectory, warned: list[str]) -> str:
+def _flag(walk: jb.Trajectory, warned: list[str]) -> str:
     """What the result itself says against it, one sentence; "" for nothing."""
     if walk.error is not None and not walk.error.met:
         return f"accuracy not met: {walk.error.reason}"
@@ -104,18 +102,18 @@ def _flag(walk: Trajectory, warned: list[str]) -> str:
     return warned[0] if warned else ""
 
 
-def _wrong_ending(outcome: Ending, check: Checked, p: np.ndarray) -> str:
+def _wrong_ending(outcome: jb.Ending, check: Checked, p: np.ndarray) -> str:
     """What the check's motion has against how the simulation ended; "" for nothing."""
     margin = 1e-3
     if check.lowest < -margin:
         return f"the hip had come down before it ended as {outcome}"
     y = check.state
     depth = p[4] - y[1] + (p[2] - p[4]) * np.cos(y[2:4])
-    if outcome == Ending.STOPPED:
+    if outcome == jb.Ending.STOPPED:
         slow = np.sqrt(p[6] / p[2]) * 0.11
         if not np.any((depth > -margin * p[2]) & (np.abs(y[6:8]) < slow)):
             return "no leg rests where it ended as stopped"
-    if outcome == Ending.STUMBLED and not np.any(depth > -margin * p[2]):
+    if outcome == jb.Ending.STUMBLED and not np.any(depth > -margin * p[2]):
         return "no foot is on the ground where it ended as stumbled"
     return ""
 

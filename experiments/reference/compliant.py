@@ -1,8 +1,7 @@
-"""Equations of motion of the check: the compliant walker from plain numbers, for SciPy.
+"""Equations of motion of the compliant walker, from plain numbers.
 
 Written from the equations alone: Lagrange's, with all four coordinates in one mass matrix, and the
-laws of contact from their sources. Nothing here is shared with the rest of the package, whose
-results they are to be held against. Compiled where numba is installed.
+laws of contact from their sources. Compiled where numba is installed.
 """
 
 import importlib

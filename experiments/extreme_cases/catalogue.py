@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from reference.compliant import FRICTION, NORMAL
 
-from jaxbiped.extremes._case import Case
-from jaxbiped.extremes._check_equations import FRICTION, NORMAL
+from .case import Case
 
 RANGES: dict[str, tuple[float, ...]] = {
     "K": tuple(np.geomspace(1e2, 1e12, 21)),

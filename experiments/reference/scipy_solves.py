@@ -1,4 +1,4 @@
-"""Solve of the check's equations: final states by SciPy, and how well they are known.
+"""Solves of the compliant walker: states by SciPy, and how well they are known.
 
 Where SciPy's solves leave too much doubt, the motion is solved in multiple precision.
 """
@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import odeint
 
-from jaxbiped.extremes._check_equations import derivative, jacobian
-from jaxbiped.extremes._check_precise import can_be_precise, precise_motion
+from .compliant import derivative, jacobian
+from .precise_solves import can_be_precise, precise_motion
 
 _TOLERANCES = ((1e-13, 3e-12), (1e-11, 2e-10))
 """Relative tolerances of a solve and of the second one that it is held against; the looser two
@@ -46,11 +46,11 @@ class Checked(NamedTuple):
 
 
 def checked(start: np.ndarray, p: np.ndarray, duration: float, *, doubt: float = np.inf) -> Checked:
-    """The motion from a start by the check's equations, with a second solve's doubt.
+    """The motion from a start by these equations, with a second solve's doubt.
 
     Args:
         start: shape (8,), or (10,) with bristles, SI units.
-        p: the numbers of the scene, see `_check_equations`.
+        p: the numbers of the scene, see `compliant`.
         duration: simulated time [s].
         doubt: from which on a solve in multiple precision follows, where mpmath is installed.
     """

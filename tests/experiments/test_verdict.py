@@ -5,9 +5,10 @@ import dataclasses
 import jax.tree_util as jtu
 import numpy as np
 import pytest
+from extreme_cases.case import Case
+from extreme_cases.verdict import judge
 
-from jaxbiped.extremes import Case, judge
-from jaxbiped.extremes import _verdict as verdicts
+import jaxbiped as jb
 
 pytestmark = pytest.mark.slow
 SHORT = Case("K", {"K": 1e9}, {"K": 1e9}, duration=0.02)
@@ -22,12 +23,12 @@ def test_a_stiff_walk_is_accurate():
 
 def test_a_wrong_state_is_seen(monkeypatch):
     def simulate(*args, **kwargs):
-        walk = verdicts_simulate(*args, **kwargs)
+        walk = simulate_truly(*args, **kwargs)
         moved = walk.state._replace(theta_1=walk.state.theta_1 + 1e-3)
         return dataclasses.replace(walk, state=moved)
 
-    verdicts_simulate = verdicts.simulate
-    monkeypatch.setattr(verdicts, "simulate", simulate)
+    simulate_truly = jb.simulate
+    monkeypatch.setattr(jb, "simulate", simulate)
     found = judge(SHORT)
     assert (found.verdict, found.reason) == ("silently_wrong", "the state is off")
     assert found.error == pytest.approx(1e-3, rel=1e-3)
@@ -35,11 +36,11 @@ def test_a_wrong_state_is_seen(monkeypatch):
 
 def test_a_state_that_is_no_number_and_does_not_say_so_is_seen(monkeypatch):
     def simulate(*args, **kwargs):
-        walk = verdicts_simulate(*args, **kwargs)
+        walk = simulate_truly(*args, **kwargs)
         return dataclasses.replace(walk, state=jtu.tree_map(lambda x: x * np.nan, walk.state))
 
-    verdicts_simulate = verdicts.simulate
-    monkeypatch.setattr(verdicts, "simulate", simulate)
+    simulate_truly = jb.simulate
+    monkeypatch.setattr(jb, "simulate", simulate)
     assert judge(SHORT).verdict == "silently_wrong"
 
 
@@ -47,7 +48,7 @@ def test_a_traceback_is_silently_wrong(monkeypatch):
     def simulate(*args, **kwargs):
         raise FloatingPointError("of no use")
 
-    monkeypatch.setattr(verdicts, "simulate", simulate)
+    monkeypatch.setattr(jb, "simulate", simulate)
     found = judge(SHORT)
     assert found.verdict == "silently_wrong"
     assert "FloatingPointError" in found.reason

@@ -8,17 +8,13 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from reference.gait_derivatives import apart, checked_gait
 
-from jaxbiped._checks import ArgumentError
-from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._state import State
-from jaxbiped.extremes._case import check_numbers, key_of
-from jaxbiped.extremes._catalogue import parameters_at
-from jaxbiped.extremes._check_gait import apart, checked_gait
-from jaxbiped.extremes._verdict import SURE
-from jaxbiped.gait._find_gait import find_gait
-from jaxbiped.gait._fixed_point_search import Search
-from jaxbiped.scene._ready_scenes import seed_scene
+import jaxbiped as jb
+
+from .case import check_numbers, key_of
+from .catalogue import parameters_at
+from .verdict import SURE
 
 WANTED = 1e-2
 """Relative error asked of gaits."""
@@ -116,19 +112,19 @@ class GaitJudge:
         self.follow(dataclasses.asdict(verdict))
         return verdict
 
-    def follow(self, row: JsonObject) -> None:
+    def follow(self, row: dict[str, Any]) -> None:
         """Goes on from a gait that a store holds."""
         self._near = tuple(row["state"]) or self._near
 
 
 def _judged(case: GaitCase, near: tuple[float, ...]) -> GaitVerdict:
     begun = time.perf_counter()
-    guess = State(*map(jnp.asarray, (0.0, *near))) if near else None
+    guess = jb.State(*map(jnp.asarray, (0.0, *near))) if near else None
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # the error estimate tells it, too
         try:
-            scene = seed_scene(**case.parameters)
-            gait = find_gait(
+            scene = jb.seed_scene(**case.parameters)
+            gait = jb.find_gait(
                 scene,
                 guess,
                 parameters=tuple(_VARIED),
@@ -136,12 +132,12 @@ def _judged(case: GaitCase, near: tuple[float, ...]) -> GaitVerdict:
                 radius_sensitivities=False,
                 max_evaluations=60,
             )
-        except ArgumentError as error:
+        except jb.ArgumentError as error:
             return GaitVerdict("refused", str(error))
     seconds = time.perf_counter() - begun
     assert gait.error is not None
     known: dict[str, Any] = dict(outcome=str(gait.outcome), seconds=seconds)
-    if gait.outcome is not Search.FOUND:
+    if gait.outcome is not jb.gait.Search.FOUND:
         return GaitVerdict("flagged", f"the search ended as {gait.outcome}", **known)
     state = tuple(float(leaf) for leaf in gait.measures.state if leaf is not None)[-7:]
     known |= dict(told=float(gait.error.relative), state=state)

@@ -1,13 +1,11 @@
-"""The check's equations against the tests' reference, and its laws against the package's."""
+"""The compliant reference's equations against the tests', and its laws against the package's."""
 
 import dataclasses
 
 import numpy as np
 import pytest
-
-import jaxbiped as jb
-from jaxbiped.extremes._case import check_numbers
-from jaxbiped.extremes._check_equations import (
+from extreme_cases.case import check_numbers
+from reference.compliant import (
     FRICTION,
     NORMAL,
     SIZE,
@@ -16,7 +14,9 @@ from jaxbiped.extremes._check_equations import (
     jacobian,
     normal_force,
 )
-from jaxbiped.extremes._check_solve import checked
+from reference.scipy_solves import checked
+
+import jaxbiped as jb
 from tests.reference import SEED, START, reference_states
 from tests.reference import derivative as reference_derivative
 
