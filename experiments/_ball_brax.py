@@ -11,7 +11,8 @@ import jax
 import jax.numpy as jnp
 from _ball_closed_form import Problem
 from _ball_mjcf import IMPEDANCE, RADIUS, ball_model
-from _ball_ways import Run, differentiate
+from _ball_ways import differentiate
+from _gradient_ways import Run
 
 
 def brax_law(problem: Problem) -> Problem | None:

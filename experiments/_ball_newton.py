@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 from _ball_closed_form import Problem
-from _ball_ways import Answer, Run
+from _gradient_ways import Answer, Run
 
 TIME_STEPS = (1e-3, 3e-4)
 """Finer ones take minutes: each step is several launches and a state of its own."""

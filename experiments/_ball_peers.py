@@ -15,7 +15,8 @@ from _ball_closed_form import Problem
 from _ball_mjcf import IMPEDANCE, RADIUS, ball_model
 from _ball_newton import TIME_STEPS as NEWTON_STEPS
 from _ball_newton import by_newton, newton_law
-from _ball_ways import TIME_STEPS, Answer, Run, Way, differentiate
+from _ball_ways import TIME_STEPS, differentiate
+from _gradient_ways import Answer, Run, Way
 
 
 def mujoco_law(problem: Problem) -> Problem | None:

@@ -1,10 +1,5 @@
-"""Ways to differentiate a bouncing ball: ours, and what other tools do with the same equations.
+"""Ways to differentiate a bouncing ball: ours, and what other tools do with the same equations."""
 
-Each way prepares a function that gives the state at the end, its derivatives with respect to the
-logarithms of the parameters, and what it says about their error (None where it says nothing).
-"""
-
-import dataclasses
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -15,31 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 from _ball_closed_form import Problem
+from _gradient_ways import Answer, Run, Way, with_estimate
 
 import jaxbiped as jb
-
-
-class Answer(NamedTuple):
-    """What a way says.
-
-    Attributes:
-        state: height [m] and velocity [m/s].
-        gradient: two rows, with respect to the logarithm of each parameter.
-        said: its own estimate of the gradient's error, as `relative_error` measures; or None.
-    """
-
-    state: Any
-    gradient: Any
-    said: float | None = None
-
-
-def relative_error(rows: Any, truth: Any) -> float:
-    """Largest difference of two gradients, relative to the largest entry of each row."""
-    rows, truth = np.asarray(rows), np.asarray(truth)
-    return float(np.max(np.abs(rows - truth) / np.max(np.abs(truth), axis=1, keepdims=True)))
-
-
-Run = Callable[[], Answer]
 
 
 class Ball(NamedTuple):
@@ -97,16 +70,6 @@ class Deadline(jb.dynamics.AbstractSection):
     def counts(self, args: Ball, y: Any) -> Any:
         """Always."""
         return jnp.asarray(True)
-
-
-def with_estimate(fine: Answer, *, loose: Answer, other: Answer) -> Answer:
-    """An answer that says the changes of its gradient by two witnesses together.
-
-    `loose` is by a ten times looser tolerance; `other` by another method, and counts twice. A sum,
-    as in the bars of gaits: either may agree by chance.
-    """
-    first, second = (relative_error(each.gradient, fine.gradient) for each in (loose, other))
-    return fine._replace(said=first + 2.0 * second)
 
 
 def ours(problem: Problem, rtol: float) -> Run:
@@ -202,27 +165,6 @@ def by_semi_implicit_euler(problem: Problem, dt: float) -> Run:
 KVAERNO = diffrax.Kvaerno5(
     root_finder=diffrax.with_stepsize_controller_tols(optx.Chord)(),
 )
-
-
-@dataclasses.dataclass(frozen=True)
-class Way:
-    """A tool and the settings at which it is asked.
-
-    Attributes:
-        name: a word for it.
-        setting: what is varied.
-        settings: its values, from rough to fine.
-        prepare: makes ready what answers a problem at a setting.
-        module: what must be installed beside this project's own requirements; "" for nothing.
-        law: the problem that it solves, where its contact is not the problem's own.
-    """
-
-    name: str
-    setting: str
-    settings: tuple[float, ...]
-    prepare: Callable[[Problem, float], Run]
-    module: str = ""
-    law: Callable[[Problem], Problem | None] = lambda problem: problem
 
 
 TOLERANCES, TIME_STEPS = (1e-4, 1e-6, 1e-8), (1e-3, 1e-4, 1e-5)

@@ -8,9 +8,9 @@ from typing import Any
 
 import _casadi
 import numpy as np
-from _ball_ways import Answer, Run
-from _footstep_equations import START
 from _footstep_ways import UPRIGHT
+from _gradient_ways import Answer, Run
+from reference.footstep import MID_STANCE as START
 
 GUESS, ROUNDS = 0.44, 20
 

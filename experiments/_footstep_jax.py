@@ -8,9 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from _ball_ways import Answer, Run
-from _footstep_equations import LAWS, PARAMETERS, START
 from _footstep_ways import INPUTS, UPRIGHT
+from _gradient_ways import Answer, Run
+from reference.footstep import LAWS, PARAMETERS
+from reference.footstep import MID_STANCE as START
 
 import jaxbiped as jb
 

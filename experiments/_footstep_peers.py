@@ -4,18 +4,18 @@ As its users would write these: an event ends the solve where leg 1 is upright.
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import diffrax
 import numpy as np
-from _ball_ways import Answer, Run, relative_error
 from _footstep_casadi import by_cvodes
-from _footstep_equations import LAWS, PARAMETERS, START
 from _footstep_jax import KVAERNO5, by_diffrax, by_semi_implicit_euler
 from _footstep_ways import INPUTS, UPRIGHT
-from _independent import LAWS as STIFFNESS_DAMPING_DECAY
-from _independent import right_hand_side
-from scipy.integrate import solve_ivp
+from _gradient_ways import Answer, Run, Way, relative_error
+from reference.compliant import numbers
+from reference.footstep import LAWS, PARAMETERS
+from reference.footstep import MID_STANCE as START
+from reference.scipy_solves import solution
 
 DIFFERENCES = (1e-4, 1e-5, 1e-6, 1e-7)
 """Of the start [SI], and of logarithms of parameters."""
@@ -51,15 +51,13 @@ def _end(method: str, name: str, change: float, rtol: float) -> np.ndarray:
         laws[PARAMETERS.index(name)] *= np.exp(change)
     else:
         start[1 + INPUTS.index(name)] += change
-    numbers = (laws[0], laws[1], STIFFNESS_DAMPING_DECAY[2]), (laws[2], laws[3])
+    moved = numbers(**dict(zip(PARAMETERS, laws, strict=True)))
 
     def upright(t: float, y: np.ndarray, *_: Any) -> float:
         return y[UPRIGHT]
 
     upright.terminal, upright.direction = True, -1.0  # type: ignore[attr-defined]
-    how: dict[str, Any] = dict(method=method, rtol=rtol, atol=1e-2 * rtol, events=upright)
-    with np.errstate(over="ignore"):  # of columns of the Jacobian that are zero
-        found = solve_ivp(right_hand_side, (0.0, LONGEST), start, args=numbers, **how)
+    found = solution(LONGEST, rtol, method=method, start=start, p=moved, events=upright)
     return np.append(found.t[-1], found.y[:, -1])
 
 
@@ -68,30 +66,12 @@ def _without_upright(ends: np.ndarray, rows: np.ndarray) -> Answer:
     return Answer(np.delete(ends, at), np.delete(rows, at, 0))
 
 
-class Peer(NamedTuple):
-    """Another way, and the settings at which it is asked.
-
-    Attributes:
-        name: a word for it.
-        setting: what is varied.
-        settings: its values, from rough to fine.
-        prepare: from the truth and a setting to what answers.
-        module: what must be installed beside this project's own requirements; "" for nothing.
-    """
-
-    name: str
-    setting: str
-    settings: tuple[float, ...]
-    prepare: Callable[[Answer, float], Run]
-    module: str = ""
-
-
 TOLERANCES, TIME_STEPS = (1e-4, 1e-6, 1e-8), (1e-4, 1e-5, 1e-6)
 PEERS = (
-    Peer("diffrax Tsit5", "rtol", TOLERANCES, by_diffrax(diffrax.Tsit5())),
-    Peer("diffrax Kvaerno5", "rtol", TOLERANCES, by_diffrax(KVAERNO5)),
-    Peer("semi-implicit Euler in JAX", "dt", TIME_STEPS, by_semi_implicit_euler),
-    Peer("CasADi CVODES", "rtol", TOLERANCES, by_cvodes, "casadi"),
-    Peer("differences of SciPy's LSODA", "rtol", (*TOLERANCES, 1e-10), differences_of("LSODA")),
-    Peer("differences of SciPy's Radau", "rtol", TOLERANCES, differences_of("Radau")),
+    Way("diffrax Tsit5", "rtol", TOLERANCES, by_diffrax(diffrax.Tsit5())),
+    Way("diffrax Kvaerno5", "rtol", TOLERANCES, by_diffrax(KVAERNO5)),
+    Way("semi-implicit Euler in JAX", "dt", TIME_STEPS, by_semi_implicit_euler),
+    Way("CasADi CVODES", "rtol", TOLERANCES, by_cvodes, "casadi"),
+    Way("differences of SciPy's LSODA", "rtol", (*TOLERANCES, 1e-10), differences_of("LSODA")),
+    Way("differences of SciPy's Radau", "rtol", TOLERANCES, differences_of("Radau")),
 )

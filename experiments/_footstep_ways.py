@@ -2,9 +2,9 @@
 
 import jax.numpy as jnp
 import numpy as np
-from _ball_ways import Answer, Run, relative_error, with_estimate
-from _footstep_collocation import Footstep, footstep
-from _footstep_equations import PARAMETERS, START
+from _gradient_ways import Answer, Run, relative_error, with_estimate
+from reference.footstep import MID_STANCE as START
+from reference.footstep import PARAMETERS, Footstep, footstep
 
 import jaxbiped as jb
 

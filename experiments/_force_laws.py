@@ -1,13 +1,12 @@
 """A law of contact in the seed's walk: its cost, its gait, and whether it suits."""
 
-import statistics
-import time
 from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from _timing import seconds_of
 
 import jaxbiped as jb
 
@@ -132,7 +131,7 @@ def findings(scene: jb.Scene, repeats: int) -> Findings:
         outcome=str(first.outcome),
         end_s=DURATION if walks else end_time(scene),
         attempted_steps=int(first.attempted),
-        wall_ms=1e3 * median_time(run, repeats),
+        wall_ms=1e3 * seconds_of({0: run}, repeats, warm=False)[0],
         search=str(gait.outcome) if found else f"{gait.outcome}, last walk: {gait.walk_outcome}",
         found_by="search" if found else ("walk" if walked else None),
         measures=searched if found else walked,
@@ -184,16 +183,6 @@ def end_time(scene: jb.Scene) -> float:
     """When a walk from the seed's start ends [s]."""
     walk = jb.simulate(scene, jb.seed_state(), duration=DURATION, save="end", engine="lanes")
     return float(walk.t[-1])
-
-
-def median_time(run: jb.CompiledSimulation, repeats: int) -> float:
-    """Median wall time of a run [s]."""
-    times = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - began)
-    return statistics.median(times)
 
 
 def deviations(found: Findings, seed: Findings) -> dict[str, float | None]:

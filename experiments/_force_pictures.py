@@ -52,7 +52,7 @@ def normal_picture(options: Options, stances: dict[str, Stance | None]) -> None:
     figure.legend(
         *left.get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False
     )
-    finish(options, figure, "force_models_normal.png")
+    options.save(figure, "force_models_normal.png")
 
 
 def friction_picture(options: Options, stances: dict[str, Stance | None]) -> None:
@@ -79,7 +79,7 @@ def friction_picture(options: Options, stances: dict[str, Stance | None]) -> Non
     figure.suptitle(
         "The first heel strike and the step that follows, by law of friction", fontsize=11
     )
-    finish(options, figure, "force_models_friction.png")
+    options.save(figure, "force_models_friction.png")
 
 
 def draw_friction(row: Any, each: Stance, style: dict[str, Any]) -> None:
@@ -142,7 +142,7 @@ def measures_picture(options: Options, found: dict[str, dict[str, Findings]]) ->
     grid[1, 1].set_xlabel(f"attempted steps in {DURATION:g} s of walking (–)")
     handles, names = legend_of_marks(grid[0, 0])
     figure.legend(handles, names, loc="outside upper center", ncols=5, frameon=False)
-    finish(options, figure, "force_models_measures.png")
+    options.save(figure, "force_models_measures.png")
 
 
 def draw_deviations(ax: Axes, laws: dict[str, Findings], kind: str) -> None:
@@ -184,8 +184,3 @@ def legend_of_marks(ax: Axes) -> tuple[list[Any], list[str]]:
         handles.append(handle)
         names.append(MARKS[key][0])
     return handles, names
-
-
-def finish(options: Options, figure: Any, name: str) -> None:
-    figure.savefig(options.path(name), dpi=150)
-    plt.close(figure)

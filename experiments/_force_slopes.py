@@ -61,10 +61,8 @@ def descents(options: Options) -> list[Descent]:
     label(angles, angle_axes, r"leg angle, $\theta$ (rad)", "Leg angles on different slopes")
     force_axes[0, 0].set_ylim(0.0, TALLEST)
     label(forces, force_axes, "normal force, $F_N$ (N)", "Contact forces on different slopes")
-    angles.savefig(options.path("figure_9_leg_angle.png"), dpi=150)
-    forces.savefig(options.path("figure_10_contact_force.png"), dpi=150)
-    plt.close(angles)
-    plt.close(forces)
+    options.save(angles, "figure_9_leg_angle.png")
+    options.save(forces, "figure_10_contact_force.png")
     return found
 
 

@@ -1,5 +1,6 @@
 """What the experiments on the hip's constraints share."""
 
+import functools
 import json
 import subprocess
 import sys
@@ -11,6 +12,8 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from _options import Options
+from _timing import seconds_of
 
 import jaxbiped as jb
 
@@ -156,14 +159,14 @@ def relative_costs(
     scenes |= {name: jb.RedundantScene(scene, name) for name in methods}
     one, many = jb.seed_state(), starts(count)
     alone = {
-        name: (eqx.filter_jit(_ends(held, integrator, single)), one)
+        name: functools.partial(eqx.filter_jit(_ends(held, integrator, single)), one)
         for name, held in scenes.items()
     }
     together = {
-        name: (eqx.filter_jit(jax.vmap(_ends(held, integrator, batch))), many)
+        name: functools.partial(eqx.filter_jit(jax.vmap(_ends(held, integrator, batch))), many)
         for name, held in scenes.items()
     }
-    seconds = {"single": in_turns(alone, turns), "batch": in_turns(together, turns)}
+    seconds = {"single": seconds_of(alone, turns), "batch": seconds_of(together, turns)}
     return {
         name: {f"{key}_s": found[name] for key, found in seconds.items()}
         | {key: found[name] / found["standard"] for key, found in seconds.items()}
@@ -189,23 +192,8 @@ def _ends(scene: Any, integrator: Integrator, duration: float) -> Callable[[Any]
     return end
 
 
-def in_turns(runs: dict[str, tuple[Callable[[Any], Any], Any]], turns: int) -> dict[str, float]:
-    """Median time of each function on its argument, warm [s]: one run of each, then another."""
-    for function, argument in runs.values():
-        jax.block_until_ready(function(argument))
-    seconds: dict[str, list[float]] = {name: [] for name in runs}
-    for _ in range(turns):
-        for name, (function, argument) in runs.items():
-            begin = time.perf_counter()
-            jax.block_until_ready(function(argument))
-            seconds[name].append(time.perf_counter() - begin)
-    return {name: float(np.median(values)) for name, values in seconds.items()}
-
-
-def cost_lines(costs: dict[str, dict[str, float]]) -> list[str]:
+def say_costs(options: Options, costs: dict[str, dict[str, float]]) -> None:
     """The costs as a table."""
-    head = f"{'':<12}{'one walk s':>12}{'to standard':>12}{'batch s':>12}{'to standard':>12}"
+    rows = ({"method": name} | row for name, row in costs.items())
     keys = ("single_s", "single", "batch_s", "batch")
-    return [head] + [
-        f"{name:<12}" + "".join(f"{row[key]:>12.3g}" for key in keys) for name, row in costs.items()
-    ]
+    options.table(rows, method="", **dict.fromkeys(keys, ".3g"))

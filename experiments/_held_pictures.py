@@ -1,7 +1,5 @@
 """Pictures of the hip's violation and of what holding it costs."""
 
-from typing import Any
-
 import numpy as np
 from _held import COLOURS, FLOOR, STYLES, Curve
 from _options import Options
@@ -26,7 +24,7 @@ def draw_each(options: Options, curves: dict[str, Curve]) -> str:
         axes[k].set_title("", loc="left")
     for ax in axes[len(curves) :]:
         ax.set_visible(False)
-    return saved(options, figure, "fig11_violation.png")
+    return options.save(figure, "fig11_violation.png")
 
 
 def draw_all(options: Options, name: str, curves: dict[str, Curve], title: str) -> str:
@@ -48,7 +46,7 @@ def draw_all(options: Options, name: str, curves: dict[str, Curve], title: str) 
     figure.legend(
         handles, labels, loc="outside lower center", ncols=min(len(labels), 4), frameon=False
     )
-    return saved(options, figure, name)
+    return options.save(figure, name)
 
 
 def _envelope(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
@@ -71,7 +69,7 @@ def draw_costs(options: Options, costs: dict[str, dict[str, float]]) -> str:
     ax.axhline(1.0, color="#595959", linewidth=0.8)
     dress(ax, "", "method", "time by Euler steps, standard = 1")
     figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=2)
-    return saved(options, figure, "fig14_time_ratio.png")
+    return options.save(figure, "fig14_time_ratio.png")
 
 
 def draw_integrators(
@@ -86,7 +84,7 @@ def draw_integrators(
     ax.set_yscale("log")
     dress(ax, f"Integrators, {method} method", "time (s)", "violation (m)")
     figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    return saved(options, figure, name)
+    return options.save(figure, name)
 
 
 def draw_times(options: Options, curves: dict[tuple[str, str], Curve]) -> str:
@@ -104,10 +102,4 @@ def draw_times(options: Options, curves: dict[tuple[str, str], Curve]) -> str:
     ax.margins(y=0.15)
     dress(ax, "Time of the integrators", "integrator", "time of a run (s)")
     figure.legend(*ax.get_legend_handles_labels(), loc="outside upper right", ncols=2)
-    return saved(options, figure, "fig17_times.png")
-
-
-def saved(options: Options, figure: Any, name: str) -> str:
-    path = options.path(name)
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return options.save(figure, "fig17_times.png")

@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from _batches import perturbed
 from _smoothed_laws import smoothed_seed
 
 import jaxbiped as jb
@@ -99,9 +100,7 @@ def scenes(count: int, duration: float, *, quick: bool) -> list[dict[str, Any]]:
     if quick:
         choices = {name: choices[name] for name in ("smooth laws", "frictionless Hertz")}
     rows = []
-    noise = np.random.default_rng(0).standard_normal((count, 8))
-    start = np.array([float(leaf) for leaf in jb.seed_state()])
-    starts = [jnp.asarray(column) for column in (start * (1.0 + 1e-3 * noise)).T]
+    starts = [jnp.asarray(column) for column in perturbed(count).T]
     for name, (force, slip) in choices.items():
         scene = jb.Scene(walker=seed.walker, ground=seed.ground, normal=force, friction=slip)
 

@@ -60,13 +60,10 @@ def cheapest(speed: float) -> Design:
 
 
 def say_designs(options: Options, designs: list[Design]) -> None:
-    options.say()
-    options.say("cheapest designs that push off: speed m/s, cost, the seed's, outcome, variables")
-    for each in designs:
-        options.say(
-            f"{each.speed_m_s:.5f}  {each.cost_of_transport:.6f}  {each.seed_cost:.6f}  "
-            f"{each.outcome}  {each.variables}"
-        )
+    options.say("\ncheapest designs that push off")
+    rows = [each._asdict() | each.variables for each in designs]
+    formats = dict(speed_m_s=".5f", cost_of_transport=".6f", seed_cost=".6f", outcome="")
+    options.table(rows, **formats, **dict.fromkeys(VARY, ".5g"))
 
 
 def draw_designs(ax: Axes, designs: list[Design]) -> None:

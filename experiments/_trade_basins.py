@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import _batches
-import _classify
-import _independent
 import numpy as np
 from _trade_store import Case, Store
 from _trade_walks import tolerances
+from reference import labels
+from reference.numbalsoda_solves import lsoda_address
 
 import jaxbiped as jb
 from jaxbiped.trade import Row, Truth, failed_row, row_of, work_of
@@ -61,7 +61,7 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
     for name in () if quick else jb.ACCURACIES:
         how = functools.partial(ours, "rodas4p by lanes", name, accuracy=name)
         yield Case("named basin", "rodas4p by lanes", name, how)
-    if _independent.lsoda_address() is None:
+    if lsoda_address() is None:
         missing = functools.partial(failed_row, "numbalsoda", "rtol=1e-6", "not installed")
         yield Case("basin", "numbalsoda", "rtol=1e-6", missing)
         return
@@ -112,8 +112,8 @@ def peer(
     states = np.stack(list(map(np.asarray, batch.states)), axis=1)
     attractor = labelling.family.rows[0][0]
     known = truth()
-    _classify.by_numbalsoda(states[:2], attractor, rtol)  # numba compiles apart
-    codes, work = work_of(lambda: _classify.by_numbalsoda(states, attractor, rtol), repeats)
+    labels.by_numbalsoda(states[:2], attractor, rtol)  # numba compiles apart
+    codes, work = work_of(lambda: labels.by_numbalsoda(states, attractor, rtol), repeats)
     values = shares_off(codes, exact())
     del values["labels"]
     return row_of("numbalsoda", f"rtol={rtol:g}", "ok", known, values, work)

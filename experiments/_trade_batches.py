@@ -4,12 +4,14 @@ import functools
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import _independent
 import jax
 import jax.numpy as jnp
 import numpy as np
+from _batches import perturbed
 from _trade_store import Case, Store
 from _trade_walks import FINEST, tolerances, walk_of
+from reference.numbalsoda_solves import lsoda_address, lsoda_batch
+from reference.scipy_solves import final_of
 
 import jaxbiped as jb
 from jaxbiped.trade import Row, Truth, failed_row, row_of, work_of
@@ -17,14 +19,7 @@ from jaxbiped.trade import Row, Truth, failed_row, row_of, work_of
 LANES, QUICK_LANES = 4096, 64
 CHECKED, QUICK_CHECKED = 8, 2
 """Walks of the batch whose errors are looked at."""
-PERTURBATION = 1e-3
 WAYS = (("rodas4p", "lanes"), ("rodas5p", "lanes"), ("rodas4", "lanes"), ("rodas4p", "xla"))
-
-
-def starts_of(count: int) -> np.ndarray:
-    """Starts about the seed's (n, 8), every number off by about a thousandth of itself."""
-    noise = np.random.default_rng(0).standard_normal((count, 8))
-    return _independent.START * (1.0 + PERTURBATION * noise)
 
 
 def cases(store: Store, quick: bool) -> Iterator[Case]:
@@ -50,16 +45,15 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
 
     def truth() -> Truth:
         def references() -> tuple[Any, Any]:
-            some = starts_of(count)[:checked]
-            how = "Radau", walk.duration, FINEST, 1e-2 * FINEST
-            other = np.stack([_independent.solved(*how, start) for start in some])
+            some = perturbed(count)[:checked]
+            other = np.stack([final_of(walk.duration, FINEST, start=start) for start in some])
             ours = states(solver_of("rodas5p", "lanes", FINEST)(some))
             return {"state": ours}, {"state": other / walk.units()}
 
         return store.truth("batch", references)
 
     def measure(solver: str, engine: str, rtol: float) -> Row:
-        run, starts = solver_of(solver, engine, rtol), starts_of(count)
+        run, starts = solver_of(solver, engine, rtol), perturbed(count)
         found, work = work_of(lambda: run(starts), 1 if quick else 3)
         endings, accepted, rejected = map(np.asarray, found[1:])
         fell = int(np.sum(endings != 0))
@@ -80,13 +74,13 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
         for rtol in tolerances(quick, -3, -8) if engine == "lanes" else (1e-4, 1e-6):
             how = lambda s=solver, e=engine, r=rtol: measure(s, e, r)  # noqa: E731
             yield Case("batch", f"{solver} by {engine}", f"rtol={rtol:g}", how)
-    if _independent.lsoda_address() is None:
+    if lsoda_address() is None:
         missing = lambda: failed_row("numbalsoda", "rtol=1e-6", "not installed")  # noqa: E731
         yield Case("batch", "numbalsoda", "rtol=1e-6", missing)
         return
 
     def measure_peer(rtol: float) -> Row:
-        batch, starts = _independent.lsoda_batch(), starts_of(count)
+        batch, starts = lsoda_batch(), perturbed(count)
         times = np.array([0.0, walk.duration])
         batch(starts[:2], times, rtol, 1e-2 * rtol)  # numba compiles apart
         repeats = 1 if quick else 3

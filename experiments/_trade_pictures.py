@@ -45,9 +45,7 @@ def draw(
         ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7, frameon=False)
     for ax in axes[len(shown) :]:
         ax.set_visible(False)
-    path = options.path("trade.png")
-    figure.savefig(path, dpi=110)
-    return str(path)
+    return options.save(figure, "trade.png")
 
 
 def _has_errors(rows: Sequence[Any], axis: str) -> bool:

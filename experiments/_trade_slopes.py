@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import _casadi
-import _independent
 import diffrax
 import equinox as eqx
 import jax
@@ -14,6 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from _trade_store import Case, Store
 from _trade_walks import tolerances, walk_of
+from reference.compliant import SEED, numbers
+from reference.scipy_solves import final_of
 
 import jaxbiped as jb
 from jaxbiped.trade import Row, Truth, failed_row, row_of, work_of
@@ -114,11 +115,6 @@ def independent_slopes(duration: float) -> np.ndarray:
 
 def _moved(method: str, duration: float, rtol: float, k: int, step: float) -> np.ndarray:
     """The final state with one of K, c and ξ moved by a step of its logarithm."""
-    from scipy.integrate import solve_ivp
-
-    laws = list(_independent.LAWS)
-    laws[k] *= math.exp(step)
-    how: dict[str, Any] = dict(method=method, rtol=rtol, atol=1e-2 * rtol, args=(tuple(laws),))
-    with np.errstate(over="ignore"):
-        found = solve_ivp(_independent.right_hand_side, (0.0, duration), _independent.START, **how)
-    return found.y[:, -1]
+    name = ("K", "c", "xi")[k]
+    moved = numbers(**{name: SEED[name] * math.exp(step)})
+    return final_of(duration, rtol, method=method, p=moved)

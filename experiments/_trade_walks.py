@@ -4,13 +4,15 @@ import functools
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import _independent
-import _independent_walk
 import jax
 import jax.numpy as jnp
 import numpy as np
 from _smoothed_laws import smoothed_seed
 from _trade_store import Case, Store
+from reference.numbalsoda_solves import lsoda, lsoda_address
+from reference.scipy_solves import solution
+from reference.walks import Walk
+from reference.walks import walk as independent_walk
 
 import jaxbiped as jb
 from jaxbiped.trade import Row, Truth, WalkTrade, Way, failed_row, row_of, work_of
@@ -41,15 +43,16 @@ def seed_truth(store: Store, quick: bool) -> Truth:
     walk = walk_of(jb.seed_scene(), quick)
 
     def references() -> tuple[Any, Any]:
-        other = _independent_walk.walk(walk.duration, FINEST)
+        other = independent_walk(walk.duration, FINEST)
         state = {"state": other.state / walk.units()}
         return walk.truth().values, state | _books(walk, other)
 
     return store.truth("walk", references)
 
 
-def _books(walk: WalkTrade, found: _independent_walk.Walk) -> dict[str, np.ndarray]:
-    return {"step_time": found.strikes / walk.time_unit(), "energy": found.ledger}
+def _books(walk: WalkTrade, found: Walk) -> dict[str, np.ndarray]:
+    energy = np.array(list(found.ledger.values()))
+    return {"step_time": found.strikes / walk.time_unit(), "energy": energy}
 
 
 def cases(store: Store, quick: bool) -> Iterator[Case]:
@@ -67,7 +70,7 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
             how = functools.partial(_peer, walk, name, rtol, truth)
             yield Case("walk", f"SciPy {name}", f"rtol={rtol:g}", how)
     missing = functools.partial(failed_row, "numbalsoda", "rtol=1e-6", "not installed")
-    if _independent.lsoda_address() is None:
+    if lsoda_address() is None:
         yield Case("walk", "numbalsoda", "rtol=1e-6", missing)
     else:
         for rtol in tolerances(quick, last=-9):
@@ -135,20 +138,12 @@ def _peer(walk: WalkTrade, name: str, rtol: float, truth: Callable[[], Truth]) -
 
     Heel strikes and energies are of a second solve with the powers beside the state.
     """
-    from scipy.integrate import solve_ivp
-
-    def run() -> Any:
-        how: dict[str, Any] = dict(method=name, rtol=rtol, atol=1e-2 * rtol)
-        with np.errstate(over="ignore"):
-            return solve_ivp(
-                _independent.right_hand_side, (0.0, walk.duration), _independent.START, **how
-            )
-
+    run = functools.partial(solution, walk.duration, rtol, method=name)
     run()  # numba compiles apart
     found, work = work_of(run, walk.repeats)
     values = {"state": found.y[:, -1] / walk.units()}
     if found.success:
-        values |= _books(walk, _independent_walk.walk(walk.duration, rtol, name))
+        values |= _books(walk, independent_walk(walk.duration, rtol, name))
     return row_of(
         f"SciPy {name}",
         f"rtol={rtol:g}",
@@ -160,9 +155,7 @@ def _peer(walk: WalkTrade, name: str, rtol: float, truth: Callable[[], Truth]) -
 
 
 def _numbalsoda(walk: WalkTrade, rtol: float, truth: Callable[[], Truth]) -> Row:
-    found, work = work_of(
-        lambda: _independent.lsoda(walk.duration, rtol, 1e-2 * rtol), walk.repeats
-    )
+    found, work = work_of(lambda: lsoda(walk.duration, rtol, 1e-2 * rtol), walk.repeats)
     values = {"state": found / walk.units()}
     return row_of("numbalsoda", f"rtol={rtol:g}", "ok", truth(), values, work)
 

@@ -60,7 +60,7 @@ def main() -> None:
         "gaits": _counts(gaits),
         "rigid": _counts(rigid),
         "coverage": {name: _coverage(scenes) for name, scenes in pairs.items()},
-        "picture": str(_draw(options, pairs)),
+        "picture": _draw(options, pairs),
     }
     for name, row in numbers["coverage"].items():
         options.say(
@@ -264,7 +264,7 @@ def _judged(error: Any, bar: Any, own: Any) -> tuple[Any, Any]:
     return judged, judged & (error <= bar)
 
 
-def _draw(options: Options, pairs: dict[str, list[np.ndarray]]) -> Any:
+def _draw(options: Options, pairs: dict[str, list[np.ndarray]]) -> str:
     figure, ax = plt.subplots(figsize=(5.5, 5.0), layout="constrained")
     for name, points in pairs.items():
         error, bar, _ = np.concatenate(points).T
@@ -275,10 +275,7 @@ def _draw(options: Options, pairs: dict[str, list[np.ndarray]]) -> Any:
     ax.set_xlabel("error bar [SI units of the number]")
     ax.set_ylabel("true error [SI units of the number]")
     ax.legend()
-    path = options.path("accuracy_coverage.png")
-    figure.savefig(path)
-    plt.close(figure)
-    return path
+    return options.save(figure, "accuracy_coverage.png")
 
 
 KINDS: dict[str, Callable[[np.random.Generator], dict[str, Any]]] = {

@@ -8,7 +8,6 @@ from typing import Any
 import _basin_along
 import _basin_push
 import _basin_slice
-import matplotlib.pyplot as plt
 import numpy as np
 from _options import Options, parse
 
@@ -36,7 +35,8 @@ def main() -> None:
     pictures.append(draw_refined(options, labelling, boundary))
     numbers["refined"] = of_refined(options, boundary)
     rows = _basin_slice.tolerances(labelling.scene, QUICK_CHECKED if quick else CHECKED)
-    say_tolerances(options, rows)
+    formats = dict(accuracy="", changed=".3%", changed_beside_boundary=".0%", walking=".3%")
+    options.table(rows, **formats, walking_changed=".3%")
     numbers |= {"tolerances": rows, "pushes": _basin_push.pushes(labelling)}
     say_pushes(options, numbers["pushes"])
     names = ["c"] if quick else list(_basin_along.UNITS)
@@ -78,24 +78,9 @@ def of_refined(options: Options, boundary: jb.basins.RefinedBoundary) -> dict[st
     }
 
 
-def say_tolerances(options: Options, rows: list[dict[str, Any]]) -> None:
-    options.say("\naccuracy  labels changed  beside a boundary  walking  of it changed")
-    for row in rows:
-        beside = row["changed_beside_boundary"]
-        where = "–" if beside is None else f"{beside:.0%}"
-        options.say(
-            f"{row['accuracy']:<9} {row['changed']:14.3%} {where:>18} "
-            f"{row['walking']:8.3%} {row['walking_changed']:14.3%}"
-        )
-
-
 def say_pushes(options: Options, rows: list[dict[str, Any]]) -> None:
-    options.say("\nsmallest fatal push       distance  angle     labels  seconds")
-    for row in rows:
-        options.say(
-            f"{row['way']:<24} {row['distance']:9.6f}  {_shown(row['angle'])}  {row['asked']:6d}  "
-            f"{row['seconds']:7.2f}"
-        )
+    options.say("\nsmallest fatal push")
+    options.table(rows, way="", distance=".6f", angle=".1e", asked="d", seconds=".2f")
     nearest = min(rows, key=lambda row: row["distance"])
     options.say("  ".join(f"{name} {value:+.2e}" for name, value in nearest["push"].items()))
 
@@ -133,7 +118,7 @@ def draw_slice(
         mark=mark_of(labelling),
         title=f"The seed's walker at a slope of {SLOPE:g} rad",
     )
-    return saved(options, figure, "basin_seed.png")
+    return options.save(figure, "basin_seed.png")
 
 
 def draw_refined(
@@ -146,7 +131,7 @@ def draw_refined(
         cells=False,
         mark=mark_of(labelling),
     )
-    return saved(options, figure, "basin_seed_refined.png")
+    return options.save(figure, "basin_seed_refined.png")
 
 
 def draw_along(options: Options, changes: dict[str, Any]) -> str:
@@ -162,18 +147,7 @@ def draw_along(options: Options, changes: dict[str, Any]) -> str:
             log=name != "slope",
             ax=ax,
         )
-    return saved(options, figure, "basin_seed_along.png")
-
-
-def saved(options: Options, figure: Any, name: str) -> str:
-    path = options.path(name)
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
-    return str(path)
-
-
-def _shown(angle: float | None) -> str:
-    return "unknown" if angle is None else f"{angle:.1e}"
+    return options.save(figure, "basin_seed_along.png")
 
 
 if __name__ == "__main__":

@@ -42,15 +42,12 @@ def basin_of(options: Options, slope: float, sides: tuple[int, ...], checked: in
     gait = _simplest.fixed_point(slope)
     apart = float(np.max(np.abs(best.family.rows[0][0].point[[1, 3]] - gait)))
     options.say(f"slope {slope:g}: gait at {gait.round(6)}, {apart:.0e} from the equations' own")
-    options.say("tolerance  grid   walking, with its interval")
     rows = []
     for name, labelling in labellings.items():
         for side in sides:
             part = _basin_thin.fractions_of(labelling, side)
             rows.append({"accuracy": name, "side": side, **vars(part)})
-            options.say(
-                f"{name:<9} {side:>4}²   {part.estimate:.3%} [{part.low:.3%}, {part.high:.3%}]"
-            )
+    options.table(rows, accuracy="", side="d", estimate=".3%", low=".3%", high=".3%")
     reach = _basin_thin.reach(best, gait)
     for way, each in reach.items():
         options.say(f"from the gait, {way:<8} {each['distance']:.5f}, then {each['label']}")
@@ -82,9 +79,7 @@ def draw(options: Options, side: int) -> str:
         gait = _simplest.fixed_point(slope)
         draw_plane(grid[0, column], labelling, slope, gait, side)
         draw_strip(grid[1, column], labelling, slope, gait, side)
-    path = options.path("basin_simplest.png")
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return options.save(figure, "basin_simplest.png")
 
 
 def draw_plane(ax: Any, labelling: jb.Labelling, slope: float, gait: np.ndarray, side: int) -> None:

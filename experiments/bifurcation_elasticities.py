@@ -41,7 +41,7 @@ def main() -> None:
     for name, case in tqdm(chosen.items(), desc="bifurcations"):
         numbers[name] = _studied(*case)
     _print(options, numbers)
-    options.finish({"cases": numbers, "picture": str(_draw(options, numbers))})
+    options.finish({"cases": numbers, "picture": _draw(options, numbers)})
 
 
 def _located(scene: Any, kind: BranchEvent, bounds: tuple[float, float]) -> Any:
@@ -81,7 +81,7 @@ def _print(options: Options, numbers: dict[str, Any]) -> None:
             options.say(f"  {parameter:12s}{row['elasticity']:+.7f}{beside}")
 
 
-def _draw(options: Options, numbers: dict[str, Any]) -> Any:
+def _draw(options: Options, numbers: dict[str, Any]) -> str:
     names = list(dict.fromkeys(each for found in numbers.values() for each in found["parameters"]))
     figure, ax = plt.subplots(figsize=(8.0, 4.2), layout="constrained")
     width = 0.8 / len(numbers)
@@ -98,10 +98,7 @@ def _draw(options: Options, numbers: dict[str, Any]) -> Any:
     ax.set_xlabel("parameter")
     ax.set_ylabel("elasticity of the critical slope [1]")
     ax.legend()
-    path = options.path("bifurcation_elasticities.png")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
-    return path
+    return options.save(figure, "bifurcation_elasticities.png")
 
 
 if __name__ == "__main__":

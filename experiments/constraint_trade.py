@@ -17,8 +17,8 @@ from _held import (
     MARKERS,
     Integrator,
     compared,
-    cost_lines,
     relative_costs,
+    say_costs,
     truth_of,
 )
 from _options import Options, parse
@@ -149,13 +149,10 @@ def damping_map(scene: jb.Scene, duration: float, count: int, quick: bool) -> di
 def say(
     options: Options, runs: list[dict[str, Any]], maps: dict[str, Any], costs: dict[str, Any]
 ) -> None:
-    options.say("method      integrator      by  ending    violation    error   steps     time s")
-    for run in runs:
-        options.say(
-            f"{run['method']:<11} {run['integrator']:<8} {run['rtol_or_dt']:>9.0e}  "
-            f"{run['ending']:<8} {shown(run['max_violation_m'])}  {shown(run['state_error'])}  "
-            f"{run['steps']:>7d}  {run['wall_s_run']:>8.3f}"
-        )
+    options.table(
+        runs, method="", integrator="", rtol_or_dt=".0e", ending="", max_violation_m=".1e",
+        state_error=".1e", steps="d", wall_s_run=".3f",
+    )  # fmt: skip
     for name, found in maps.items():
         error = np.array(found["state_error"], dtype=float)
         if np.isfinite(error).any():
@@ -165,12 +162,7 @@ def say(
                 f"{found['row'][i]:.3g}, {found['columns']} = {found['column'][j]:.3g}; "
                 f"{int(np.sum(found['failed']))} of {error.size} failed"
             )
-    for line in cost_lines(costs):
-        options.say(line)
-
-
-def shown(value: float | None) -> str:
-    return f"{'':>9}" if value is None else f"{value:>9.1e}"
+    say_costs(options, costs)
 
 
 def draw_trade(options: Options, runs: list[dict[str, Any]]) -> str:
@@ -198,9 +190,7 @@ def draw_trade(options: Options, runs: list[dict[str, Any]]) -> str:
     axes[0].set_ylabel("error of the state (SI)")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
-    path = options.path("trade.png")
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return options.save(figure, "trade.png")
 
 
 def edges_of(values: list[float]) -> np.ndarray:
@@ -227,9 +217,7 @@ def draw_maps(options: Options, maps: dict[str, Any]) -> str:
             ax.set_ylabel(found["rows"])
             ax.set_title(name, loc="left", fontsize="medium")
             figure.colorbar(image, ax=ax, label=f"log10, {title}")
-    path = options.path("constants.png")
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return options.save(figure, "constants.png")
 
 
 if __name__ == "__main__":

@@ -58,7 +58,7 @@ def main() -> None:
             },
         },
         "grazing": [_grazed(each) for each in swept],
-        "picture": str(_draw(options, rows)),
+        "picture": _draw(options, rows),
     }
     for about in (numbers, numbers["gaits"]):
         options.say(", ".join(f"{name} {about[name]}" for name in ("run", *VERDICTS)))
@@ -96,7 +96,7 @@ def _grazed(swept: Grazing) -> dict[str, Any]:
     }
 
 
-def _draw(options: Options, rows: list[dict[str, Any]]) -> Any:
+def _draw(options: Options, rows: list[dict[str, Any]]) -> str:
     """Verdicts of the cases of one parameter by its value."""
     names = list(RANGES)
     figure, axes = plt.subplots(4, 4, figsize=(11.0, 8.5), layout="constrained")
@@ -121,10 +121,7 @@ def _draw(options: Options, rows: list[dict[str, Any]]) -> Any:
         ax.set_axis_off()
     handles, labels = axes.flat[0].get_legend_handles_labels()
     axes.flat[-1].legend(handles, [label.replace("_", " ") for label in labels], loc="center")
-    path = options.path("extremes.png")
-    figure.savefig(path)
-    plt.close(figure)
-    return path
+    return options.save(figure, "extremes.png")
 
 
 UNITS = {

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 from _force_laws import (
     CRITERIA,
-    MEASURES,
     SEED,
     SLOPE,
     Findings,
@@ -75,41 +74,22 @@ def numbers(kind: str, found: dict[str, Findings]) -> dict[str, Any]:
     }
 
 
-COLUMNS = {
-    "period_s": ("period s", "10.5f"),
-    "step_length_m": ("length m", "10.5f"),
-    "speed_m_s": ("speed m/s", "11.5f"),
-    "peak_normal_N": ("peak N", "9.2f"),
-    "spectral_radius": ("radius", "9.4f"),
-}
+COLUMNS = dict(
+    attempted_steps="d", wall_ms=".2f", period_s=".5f", step_length_m=".5f", speed_m_s=".5f",
+    peak_normal_N=".2f", spectral_radius=".4f", unit_multiplier_error=".1e",
+    largest_penetration_m=".2e", most_normal_N=".2f", most_friction_over_load=".4f",
+)  # fmt: skip
 
 
 def report(options: Options, table: dict[str, dict[str, Any]]) -> None:
     """Prints a table of numbers and one of verdicts for each kind."""
-    head = f"{'steps':>7}{'ms':>7}"
-    head += "".join(f"{title:>{form.split('.')[0]}}" for title, form in COLUMNS.values())
-    head += f"{'unit error':>12}{'depth mm':>10}{'most N':>9}{'F_T/F_N':>9}"
     for kind, laws in table.items():
-        options.say(f"\n{kind + ' law':<23}{head}")
-        for name, row in laws.items():
-            options.say(f"{name:<23}{cells(row)}")
+        options.say()
+        rows = ({kind: name} | row | (row["measures"] or {}) for name, row in laws.items())
+        options.table(rows, **{kind: ""}, **COLUMNS)
         options.say()
         for name, row in laws.items():
             options.say(f"{name:<23}{row['verdict']}")
-
-
-def cells(row: dict[str, Any]) -> str:
-    measures = row["measures"] or dict.fromkeys(MEASURES)
-    text = f"{row['attempted_steps']:7d}{row['wall_ms']:7.2f}"
-    for name, (_, form) in COLUMNS.items():
-        text += cell(measures[name], form)
-    text += cell(row["unit_multiplier_error"], "12.1e")
-    text += f"{1e3 * row['largest_penetration_m']:10.4f}{row['most_normal_N']:9.2f}"
-    return text + f"{row['most_friction_over_load']:9.4f}"
-
-
-def cell(value: float | None, form: str) -> str:
-    return f"{'–':>{form.split('.')[0]}}" if value is None else f"{value:{form}}"
 
 
 def report_slopes(options: Options, found: list[Descent]) -> None:

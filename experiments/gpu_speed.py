@@ -5,7 +5,6 @@ where JAX computes on the same device, the share of the device's measured peak, 
 there is no device nothing runs on one, and it says so. Writes gpu_speed.png where there is one.
 """
 
-import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -15,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from _options import Options, parse
+from _timing import seconds_of
 
 import jaxbiped as jb
 from jaxbiped.compiler import CUDA, DEVICES, Program, Request
@@ -58,28 +58,13 @@ def main() -> None:
 
 def registers(options: Options) -> list[dict[str, Any]]:
     """What the assembler says of each program."""
-    options.say("program       device  blocks  registers  stored  loaded  warps of 64 at once")
     kinds = ("sm_90",) if options.quick else ("sm_80", "sm_90", "sm_100")
-    rows = []
-    for row in _ptxas.rows(kinds, _ptxas.BOUNDS[:1] if options.quick else _ptxas.BOUNDS):
-        rows.append(row)
-        options.say(
-            f"{row['program']:<12}  {row['architecture']:<6}  {row['blocks']:6}  "
-            f"{row['registers']:9}  {row['spill_stores']:6}  {row['spill_loads']:6}  "
-            f"{row['warps']:5}"
-        )
+    rows = list(_ptxas.rows(kinds, _ptxas.BOUNDS[:1] if options.quick else _ptxas.BOUNDS))
+    options.table(
+        rows, program="", architecture="", blocks="d", registers="d", spill_stores="d",
+        spill_loads="d", warps="d",
+    )  # fmt: skip
     return rows
-
-
-def seconds_of(run: Callable[[], Any], rounds: int) -> float:
-    """Median of a few runs after the first."""
-    run()
-    taken = []
-    for _ in range(rounds):
-        began = time.perf_counter()
-        run()
-        taken.append(time.perf_counter() - began)
-    return float(np.median(taken))
 
 
 def peak(count: int, attempts: int, rounds: int) -> float:
@@ -101,7 +86,8 @@ def peak(count: int, attempts: int, rounds: int) -> float:
     )
     inputs = tuple(np.full(count, value) for value in (0.999, 1e-3, float(attempts)))
     request = Request(program, inputs, batch=True)
-    return 2.0 * count * attempts * CHAINS * TURNS / seconds_of(lambda: CUDA.run(request), rounds)
+    seconds = seconds_of({0: lambda: CUDA.run(request)}, rounds)[0]
+    return 2.0 * count * attempts * CHAINS * TURNS / seconds
 
 
 def perturbed(count: int) -> jb.State:
@@ -128,17 +114,15 @@ def walks(
 ) -> list[dict[str, Any]]:
     """Attempted steps a second by each engine."""
     engines = ["cuda", "lanes", *(["xla"] if jax.default_backend() == "gpu" else [])]
-    options.say("\nwalks     starts       steps/s by " + ", ".join(engines))
     rows = []
     for size in sizes:
         starts, row = perturbed(size), dict[str, Any](size=size)
         for engine in engines if size <= MOST_BY_LANES else engines[:1]:
             run = walker(engine, duration)
             steps = float(np.sum(run(starts)[1]))
-            row[f"{engine}_steps_per_s"] = steps / seconds_of(partial(run, starts), rounds)
+            row[f"{engine}_steps_per_s"] = steps / seconds_of({0: partial(run, starts)}, rounds)[0]
         rows.append(row)
-        shown = "  ".join(f"{value:12.4g}" for name, value in row.items() if name != "size")
-        options.say(f"       {size:9}  {shown}")
+    options.table(rows, size="d", **{f"{engine}_steps_per_s": ".4g" for engine in engines})
     return rows
 
 
@@ -149,7 +133,6 @@ def field_operations() -> int:
 
 def errors(options: Options, tolerances: tuple[float, ...], size: int) -> list[dict[str, Any]]:
     """Median error of final states against a tight solve, and how many are the lanes' bits."""
-    options.say("\ntolerance  error     the lanes' bits")
     starts, rows = perturbed(size), []
     truth = np.array(walker("lanes", QUICK_DURATION, 1e-9)(starts)[0])
     for rtol in tolerances:
@@ -160,7 +143,7 @@ def errors(options: Options, tolerances: tuple[float, ...], size: int) -> list[d
         error = float(np.median(np.abs(found - truth).max(axis=0)))
         same = float(np.mean(np.all(found == ours, axis=0)))
         rows.append({"rtol": rtol, "error": error, "same_bits": same})
-        options.say(f"{rtol:9.0e}  {error:.1e}  {same:15.3f}")
+    options.table(rows, rtol=".0e", error=".1e", same_bits=".3f")
     return rows
 
 
@@ -168,7 +151,6 @@ def labels(
     options: Options, sizes: tuple[int, ...], footsteps: int, rounds: int
 ) -> list[dict[str, Any]]:
     """Labelled starts of the seed's slice a second, and how many labels are the lanes'."""
-    options.say("\nlabels    starts  starts/s: cuda    lanes  that differ")
     cuda, lanes = (
         jb.labelling(jb.seed_scene(), footsteps=footsteps, engine=engine)
         for engine in ("cuda", "lanes")
@@ -178,16 +160,14 @@ def labels(
         ranges = {"omega_swing": (-4.0, 5.0), "theta_swing": (-0.5, 0.8)}
         states = jb.starts.sample(cuda.scene, ranges, size).batch(cuda, 0, size).states
         row: dict[str, Any] = {"size": size}
-        row["cuda_starts_per_s"] = size / seconds_of(partial(cuda, states), rounds)
+        row["cuda_starts_per_s"] = size / seconds_of({0: partial(cuda, states)}, rounds)[0]
         if size <= MOST_BY_LANES:
-            row["lanes_starts_per_s"] = size / seconds_of(partial(lanes, states), rounds)
+            row["lanes_starts_per_s"] = size / seconds_of({0: partial(lanes, states)}, rounds)[0]
             differ = cuda(states).label != lanes(states).label
             row["labels_that_differ"] = int(np.sum(differ))
         rows.append(row)
-        options.say(
-            f"       {size:9}  {row['cuda_starts_per_s']:14.0f} "
-            f"{row.get('lanes_starts_per_s', np.nan):8.0f}  {row.get('labels_that_differ', '–')}"
-        )
+    formats = dict(size="d", cuda_starts_per_s=".0f", lanes_starts_per_s=".0f")
+    options.table(rows, **formats, labels_that_differ="d")
     return rows
 
 
@@ -203,7 +183,7 @@ def draw(options: Options, numbers: dict[str, Any]) -> None:
     ax.set_xlabel("starts in the batch")
     ax.set_ylabel("attempted steps a second")
     ax.legend()
-    figure.savefig(options.path("gpu_speed.png"))
+    options.save(figure, "gpu_speed.png")
 
 
 if __name__ == "__main__":

@@ -177,19 +177,6 @@ def residual(exact: Exact) -> float:
     return float(jnp.max(jnp.abs(exact.orbit.recurring - jnp.stack(exact.start[1:]))))
 
 
-def report(options: Options, points: dict[str, list[Point]]) -> None:
-    options.say(
-        f"{'stepping':10}{'rtol':>8}{'steps':>8}{'state':>10}{'period [s]':>12}"
-        f"{'multiplier':>12}{'d/dlogK':>10}"
-    )
-    for name, row in points.items():
-        for p in row:
-            options.say(
-                f"{name:10}{p.rtol:8.0e}{p.steps:8d}{p.state:10.1e}{p.period_s:12.1e}"
-                f"{p.unit_multiplier:12.1e}{p.period_slope:10.1e}"
-            )
-
-
 def picture(options: Options, found: dict[str, dict[str, list[Point]]]) -> None:
     rows = len(found)
     figure, grid = plt.subplots(
@@ -206,8 +193,7 @@ def picture(options: Options, found: dict[str, dict[str, list[Point]]]) -> None:
     for axes in grid[-1]:
         axes.set_xlabel("attempted steps of a footstep")
     grid[0, 0].legend(fontsize=8)
-    figure.savefig(options.path("gradient_accuracy.png"), dpi=150)
-    plt.close(figure)
+    options.save(figure, "gradient_accuracy.png")
 
 
 def main() -> None:
@@ -231,7 +217,8 @@ def main() -> None:
         }
         options.say(f"\n{law}, in {time.perf_counter() - began:.0f} s")
         options.say(f"reference: {references[law]}")
-        report(options, found[law])
+        rows = ({"stepping": name} | p._asdict() for name in STEPPINGS for p in found[law][name])
+        options.table(rows, stepping="", rtol=".0e", steps="d", **dict.fromkeys(ERRORS, ".1e"))
     picture(options, found)
     options.finish(
         {

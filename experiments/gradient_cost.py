@@ -11,9 +11,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import jax
 import numpy as np
-from _options import Options, parse
+from _options import parse
+from _timing import seconds_of
 from tqdm import tqdm
 
 import jaxbiped as jb
@@ -33,12 +33,7 @@ def driven(count: int, quick: bool) -> Any:
 
 def cpu_ms(run: Callable[[], Any]) -> float:
     """Median CPU time of all threads, compiled before [ms]."""
-    times = []
-    for _ in range(REPEATS + 1):
-        began = time.process_time()
-        jax.block_until_ready(run())
-        times.append(1e3 * (time.process_time() - began))
-    return float(np.median(times[1:]))
+    return 1e3 * seconds_of({0: run}, REPEATS, clock=time.process_time)[0]
 
 
 def costs(count: int, quick: bool) -> dict[str, float]:
@@ -72,17 +67,8 @@ def costs(count: int, quick: bool) -> dict[str, float]:
 def main() -> None:
     options = parse(__doc__ or "")
     rows = [costs(n, options.quick) for n in tqdm(QUICK_COUNTS if options.quick else COUNTS)]
-    _print(options, rows)
+    options.table(rows, parameters="d", **dict.fromkeys(list(rows[0])[1:], ".1f"))
     options.finish({"rows": rows})
-
-
-def _print(options: Options, rows: list[dict[str, float]]) -> None:
-    options.say("parameters  return  with columns  radius: adjoint  differences  (CPU, ms)")
-    for row in rows:
-        options.say(
-            f"{row['parameters']:10d}{row['return_ms']:8.1f}{row['return_with_columns_ms']:14.1f}"
-            f"{row['radius_by_adjoint_ms']:17.1f}{row['radius_by_differences_ms']:13.1f}"
-        )
 
 
 if __name__ == "__main__":

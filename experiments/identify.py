@@ -115,7 +115,7 @@ def draw(options: Options, scores: dict[str, np.ndarray]) -> None:
         axis.set_xlabel(f"error of {LABELS[name]},\nin standard errors")
     axes[0].set_ylabel("density")
     axes[0].legend(frameon=False)
-    figure.savefig(options.path("identify.png"), dpi=150)
+    options.save(figure, "identify.png")
 
 
 def main() -> None:

@@ -98,9 +98,7 @@ def draw_branches(options: Options, branches: dict[str, Any]) -> str:
         grid[1, column].set_ylim(0.0, 2.0)
         grid[1, column].set_title("")
         grid[0, column].get_legend().remove()
-    path = options.path("k_c_xi_branches.png")
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return options.save(figure, "k_c_xi_branches.png")
 
 
 def draw_curves(options: Options, curves: dict[str, list[Any]]) -> str:
@@ -108,9 +106,7 @@ def draw_curves(options: Options, curves: dict[str, list[Any]]) -> str:
     axes = figure.subplots(1, len(curves), squeeze=False)[0]
     for ax, row in zip(axes, curves.values(), strict=True):
         plot.bifurcation_curves(row, ax=ax)
-    path = options.path("k_c_xi_curves.png")
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return options.save(figure, "k_c_xi_curves.png")
 
 
 if __name__ == "__main__":

@@ -227,10 +227,7 @@ def draw(
     right.set_xlim(min(TOLERANCES), max(TOLERANCES))
     right.set_ylim(0.5 / count, None)
     right.legend()
-    path = options.path("label_accuracy.png")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
-    return str(path)
+    return options.save(figure, "label_accuracy.png")
 
 
 if __name__ == "__main__":

@@ -106,18 +106,17 @@ def say_rungs(
     apart: dict[str, dict[str, float]],
     costs: dict[str, Cost],
 ) -> None:
-    options.say(
-        "rung      period s  length m  radius   from above: period  length  radius"
-        "   rtol   error    single us  batch us per footstep"
-    )
-    for name, found in measures.items():
-        off, cost = apart[name], costs[name]
-        options.say(
-            f"{name:<9} {found['period']:.5f}  {found['step_length']:.5f}  "
-            f"{found['spectral_radius']:.4f}  {off['period']:>18.1%}  {off['step_length']:>6.1%}  "
-            f"{off['spectral_radius']:>6.1%}  {cost.rtol:.0e}  {cost.error:.1e}  "
-            f"{cost.single_us:>9.1f}  {cost.batch_us:>8.3f}"
-        )
+    options.table(
+        ({"rung": name} | found for name, found in measures.items()),
+        rung="", period=".5f", step_length=".5f", spectral_radius=".4f",
+    )  # fmt: skip
+    options.say("distance from the rung above")
+    names = ("period", "step_length", "spectral_radius")
+    rows = ({"rung": name} | off for name, off in apart.items())
+    options.table(rows, rung="", **dict.fromkeys(names, ".1%"))
+    options.say("cost of a footstep")
+    rows = ({"rung": name} | cost._asdict() for name, cost in costs.items())
+    options.table(rows, rung="", rtol=".0e", error=".1e", single_us=".1f", batch_us=".3f")
 
 
 def say_paths(options: Options, paths: dict[str, Approach]) -> None:
@@ -165,9 +164,7 @@ def draw_rungs(options: Options, apart: dict[str, dict[str, float]], costs: dict
             columnspacing=1.0,
             handletextpad=0.2,
         )
-    path = options.path("ladder.png")
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return options.save(figure, "ladder.png")
 
 
 def draw_paths(options: Options, paths: dict[str, Approach]) -> str:
@@ -198,9 +195,7 @@ def draw_paths(options: Options, paths: dict[str, Approach]) -> str:
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
     figure.suptitle("Filled: below the rigid gait's; hollow: above it", fontsize=9)
-    path = options.path("rigid_limit.png")
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return options.save(figure, "rigid_limit.png")
 
 
 if __name__ == "__main__":

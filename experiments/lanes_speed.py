@@ -17,18 +17,20 @@ from collections.abc import Callable
 from typing import Any
 
 import _casadi
-import _independent
 import _lane_work
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
-from _options import Options, parse
+from _batches import perturbed
+from _options import Options, by, parse
+from _timing import seconds_of
+from reference.numbalsoda_solves import lsoda, lsoda_address, lsoda_batch
+from reference.scipy_solves import FINEST, final_of
 
 import jaxbiped as jb
 
 DURATION = 2.0
-PERTURBATION = 1e-3
 CHECKED, QUICK_CHECKED = 8, 1
 """Lanes whose error is measured."""
 SINGLES, QUICK_SINGLES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8), (1e-6,)
@@ -44,12 +46,6 @@ WAYS = {
 LANES = ("lanes", "lanes, rodas4")
 TOLERANCES = {"lanes": 7e-6, "lanes, rodas4": 2e-6, "xla": 2e-6, "numbalsoda": 1e-7}
 """Of batches: those that give errors of about 2e-5."""
-
-
-def perturbed(count: int) -> np.ndarray:
-    """Starts about the seed's (n, 8), every number off by about a thousandth of itself."""
-    noise = np.random.default_rng(0).standard_normal((count, 8))
-    return _independent.START * (1.0 + PERTURBATION * noise)
 
 
 def options_of(way: str, rtol: float) -> dict[str, Any]:
@@ -75,34 +71,21 @@ def ours(way: str, rtol: float) -> Callable[[np.ndarray], tuple[np.ndarray, int]
 
 
 def numbalsoda(rtol: float) -> Callable[[np.ndarray], tuple[np.ndarray, int]]:
-    times, batch = np.array([0.0, DURATION]), _independent.lsoda_batch()
+    times, batch = np.array([0.0, DURATION]), lsoda_batch()
     return lambda starts: (batch(starts, times, rtol, 1e-2 * rtol), 0)
-
-
-def timed(work: dict[str, Callable[[], Any]], rounds: int) -> dict[str, float]:
-    """Median seconds of runs that take turns, after one run each that does not count."""
-    for run in work.values():
-        run()
-    seconds = {name: np.empty(rounds) for name in work}
-    for turn in range(rounds):
-        for name, run in work.items():
-            began = time.perf_counter()
-            run()
-            seconds[name][turn] = time.perf_counter() - began
-    return {name: float(np.median(times)) for name, times in seconds.items()}
 
 
 def batches(
     sizes: list[int], rounds: int, exact: np.ndarray, ways: tuple[str, ...]
 ) -> list[dict[str, Any]]:
     runners = {way: ours(way, TOLERANCES[way]) for way in ways}
-    if _independent.lsoda_address() is not None:
+    if lsoda_address() is not None:
         runners["numbalsoda"] = numbalsoda(TOLERANCES["numbalsoda"])
     rows = []
     for size in sizes:
         starts = perturbed(size)
         work = {n: lambda run=run, starts=starts: run(starts) for n, run in runners.items()}
-        seconds = timed(work, rounds)
+        seconds = seconds_of(work, rounds)
         for name, run in runners.items():
             finals, steps = run(starts)
             checked = min(len(exact), len(finals))
@@ -138,13 +121,11 @@ def singles(rounds: int, exact: np.ndarray, tolerances: tuple[float, ...]) -> li
     for rtol in tolerances:
         for way in WAYS:
             work[way, rtol] = one_walk(way, rtol)
-        if _independent.lsoda_address() is not None:
+        if lsoda_address() is not None:
             atol = 1e-2 * rtol
-            work["numbalsoda", rtol] = lambda r=rtol, a=atol: _independent.lsoda(DURATION, r, a)
-        work["SciPy LSODA", rtol] = lambda r=rtol: _independent.solved(
-            "LSODA", DURATION, r, 1e-2 * r
-        )
-    seconds = timed(work, rounds)  # type: ignore[arg-type]
+            work["numbalsoda", rtol] = lambda r=rtol, a=atol: lsoda(DURATION, r, a)
+        work["SciPy LSODA", rtol] = lambda r=rtol: final_of(DURATION, r, method="LSODA")
+    seconds = seconds_of(work, rounds)  # type: ignore[arg-type]
     return [
         dict(way=way, rtol=rtol, error=float(np.max(np.abs(run() - exact))),
              seconds=seconds[way, rtol])  # type: ignore[index]
@@ -184,7 +165,7 @@ def gaits(rounds: int, engines: tuple[str, ...]) -> tuple[dict[str, float], dict
         for radius in (False, True)
         for name in [f"{engine}, {'with' if radius else 'without'} the radius's"]
     }
-    return timed(work, rounds), periods
+    return seconds_of(work, rounds), periods
 
 
 def derivatives(rounds: int, tolerances: tuple[float, ...]) -> list[dict[str, Any]]:
@@ -198,7 +179,7 @@ def derivatives(rounds: int, tolerances: tuple[float, ...]) -> list[dict[str, An
     if _casadi.is_installed():
         for rtol in tolerances:
             work["CasADi CVODES", rtol] = _casadi.sensitivities(DURATION, rtol)
-    seconds = timed(work, rounds)  # type: ignore[arg-type]
+    seconds = seconds_of(work, rounds)  # type: ignore[arg-type]
     return [
         dict(way=way, rtol=rtol, error=float(np.max(np.abs(run()[1] - exact))),
              seconds=seconds[way, rtol])  # type: ignore[index]
@@ -208,15 +189,13 @@ def derivatives(rounds: int, tolerances: tuple[float, ...]) -> list[dict[str, An
 
 def picture(options: Options, rows: list[dict[str, Any]], alone: list[dict[str, Any]]) -> None:
     figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4.5), layout="constrained")
-    for way in dict.fromkeys(row["way"] for row in rows):
-        picked = [row for row in rows if row["way"] == way]
+    for way, picked in by("way", rows).items():
         sizes = [row["simulations"] for row in picked]
         left.loglog(sizes, [row["simulations_per_s"] for row in picked], "o-", base=10, label=way)
     left.set_xlabel("simulations in the batch")
     left.set_ylabel(f"simulations of {DURATION:g} s a second")
     left.set_title("batches on two cores, errors of about 2e-5")
-    for way in dict.fromkeys(row["way"] for row in alone):
-        picked = [row for row in alone if row["way"] == way]
+    for way, picked in by("way", alone).items():
         times = [1e3 * row["seconds"] for row in picked]
         right.loglog([row["error"] for row in picked], times, "o-", label=way)
     right.set_xlabel("largest error of the final state (SI units)")
@@ -225,21 +204,17 @@ def picture(options: Options, rows: list[dict[str, Any]], alone: list[dict[str, 
     for axes in (left, right):
         axes.grid(alpha=0.3)
         axes.legend()
-    figure.savefig(options.path("lanes_speed.png"), dpi=150)
-    plt.close(figure)
+    options.save(figure, "lanes_speed.png")
 
 
 def report(options: Options, numbers: dict[str, Any]) -> None:
-    options.say("batches                 sims    rtol   error   sims/s  Msteps/s")
-    for row in numbers["batches"]:
-        steps = "–" if row["steps_per_s"] is None else f"{row['steps_per_s'] / 1e6:.2f}"
-        line = f"{row['way']:20}{row['simulations']:8}{row['rtol']:8.0e}{row['error_median']:8.0e}"
-        options.say(line + f"{row['simulations_per_s']:9.0f}{steps:>10}")
+    options.table(
+        numbers["batches"], way="", simulations="d", rtol=".0e", error_median=".0e",
+        simulations_per_s=".0f", steps_per_s=".3g",
+    )  # fmt: skip
     for title in ("singles", "derivatives"):
-        options.say(f"\n{title:20}    rtol   error       ms")
-        for row in numbers[title]:
-            line = f"{row['way']:20}{row['rtol']:8.0e}{row['error']:8.0e}"
-            options.say(line + f"{1e3 * row['seconds']:9.2f}")
+        options.say(f"\n{title}")
+        options.table(numbers[title], way="", rtol=".0e", error=".0e", seconds=".2e")
     options.say()
     for name, seconds in numbers["gaits_s"].items():
         options.say(f"gait by {name:30}{1e3 * seconds:9.1f} ms")
@@ -247,21 +222,19 @@ def report(options: Options, numbers: dict[str, Any]) -> None:
     peak, used = numbers["peak_flops"], numbers["flops_per_step"]
     options.say(f"peak {peak / 1e9:.0f} GFLOP/s; a step has {used} floating-point operations")
     options.say(f"share of the peak reached: {numbers['share_of_peak']:.2f}")
-    options.say("\nscene                        instructions  Msteps/s")
-    for row in numbers["scenes"]:
-        options.say(f"{row['scene']:28}{row['instructions']:13}{row['steps_per_s'] / 1e6:10.2f}")
+    options.table(numbers["scenes"], scene="", instructions="d", steps_per_s=".3g")
 
 
 def main() -> None:
     options = parse(__doc__ or "")
     rounds = 1 if options.quick else 5
     starts = perturbed(QUICK_CHECKED if options.quick else CHECKED)
-    exact = np.stack([_independent.reference(DURATION, start) for start in starts])
+    exact = np.stack([final_of(DURATION, *FINEST, start=start) for start in starts])
     sizes = [64] if options.quick else [8, 64, 512, 8192]
     # XLA's programs for batches and gaits compile for long: a quick version leaves them out.
     rows = batches(sizes, rounds, exact, LANES if options.quick else tuple(WAYS))
     levels = QUICK_SINGLES if options.quick else SINGLES
-    alone = singles(rounds, _independent.reference(DURATION), levels)
+    alone = singles(rounds, final_of(DURATION, *FINEST), levels)
     slopes = derivatives(rounds, QUICK_SLOPES if options.quick else SLOPES)
     gaits_s, periods_s = gaits(rounds, ("lanes",) if options.quick else ("lanes", "xla"))
     peak, used = _lane_work.peak_flops(), _lane_work.flops_per_step()

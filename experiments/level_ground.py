@@ -229,28 +229,16 @@ def say(
     options: Options, pairs: list[Pair], lost: list[float], curves: dict[str, list[Point]]
 ) -> None:
     options.say("simplest walker on level ground, against gravity's slope for equal steps")
-    options.say(
-        "angle rad  impulse   P/(v tan α)  work/(P²/2)  cost      by gravity  ratio  radius"
-    )
-    for p in pairs:
-        options.say(
-            f"{p.angle_rad:9.5f}  {p.impulse:.6f}  {p.impulse_over_speed_tan:11.9f}  "
-            f"{p.work_over_half_square:11.9f}  {p.cost:.6f}  {np.sin(p.slope):10.6f}  "
-            f"{p.ratio:5.3f}  {p.spectral_radius:.3f}"
-        )
+    options.table(
+        pairs, angle_rad=".5f", impulse=".6f", impulse_over_speed_tan=".9f",
+        work_over_half_square=".9f", cost=".6f", slope=".6f", ratio=".3f", spectral_radius=".3f",
+    )  # fmt: skip
     for impulse in lost:
         options.say(f"no gait found at the impulse {impulse:.6f}")
     for name, curve in curves.items():
-        options.say()
-        options.say(f"seed's walker by {name}: strength, speed m/s, step m, cost, radius")
-        for each in curve:
-            if not each.found:
-                options.say(f"{each.value:9.5f}  no gait")
-                continue
-            options.say(
-                f"{each.value:9.5f}  {each.speed_m_s:.5f}  {each.step_length_m:.5f}  "
-                f"{each.cost_of_transport:.6f}  {each.spectral_radius:.4f}"
-            )
+        options.say(f"\nseed's walker by {name}")
+        formats = dict(value=".5f", found="", speed_m_s=".5f", step_length_m=".5f")
+        options.table(curve, **formats, cost_of_transport=".6f", spectral_radius=".4f")
 
 
 def draw(
@@ -274,9 +262,7 @@ def draw(
     dress(right, "Seed's walker; hollow: unstable", "speed (m/s)", "cost of transport (–)")
     right.set_yscale("log")
     legend_below(right, columns=3)
-    path = options.path("level_ground.png")
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return options.save(figure, "level_ground.png")
 
 
 def draw_simplest(ax: Axes, pairs: list[Pair]) -> None:

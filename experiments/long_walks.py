@@ -28,7 +28,7 @@ def main() -> None:
     walked = [_walked(each) for each in tqdm((count // 10, count, count), desc="walks")]
     numbers = _numbers(float(gait.measures.period), walked)
     _print(options, numbers)
-    options.finish(numbers | {"picture": str(_draw(options, numbers, walked[-1]["durations"]))})
+    options.finish(numbers | {"picture": _draw(options, numbers, walked[-1]["durations"])})
 
 
 def _walked(count: int) -> dict[str, Any]:
@@ -83,17 +83,14 @@ def _print(options: Options, numbers: dict[str, Any]) -> None:
     options.say(f"the same again: {'identical' if numbers['repeats'] else 'DIFFERENT'}")
 
 
-def _draw(options: Options, numbers: dict[str, Any], durations: np.ndarray) -> Any:
+def _draw(options: Options, numbers: dict[str, Any], durations: np.ndarray) -> str:
     figure, ax = plt.subplots(figsize=(7.0, 3.8), layout="constrained")
     off = np.abs(durations / numbers["period_s"] - 1.0)
     ax.semilogy(np.arange(1, len(off) + 1), np.maximum(off, 1e-16), ",", rasterized=True)
     ax.set_ylim(1e-12, 10.0 * float(np.max(off)))
     ax.set_xlabel("footstep [1]")
     ax.set_ylabel("duration's difference from the period [relative]")
-    path = options.path("long_walks.png")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
-    return path
+    return options.save(figure, "long_walks.png")
 
 
 if __name__ == "__main__":

@@ -93,8 +93,7 @@ def picture(
     right.set_xlabel("spectral radius under scatter")
     right.set_ylabel("speed (m/s)")
     right.legend(frameon=False)
-    figure.savefig(options.path("optimise_robust.png"), dpi=150)
-    plt.close(figure)
+    options.save(figure, "optimise_robust.png")
 
 
 def main() -> None:

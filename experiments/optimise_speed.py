@@ -118,10 +118,7 @@ def picture(options: Options, own: jb.Gait, best: jb.optimise.Optimum) -> str:
     right.set_xlabel("real part of a multiplier")
     right.set_ylabel("imaginary part")
     right.legend(frameon=False)
-    path = options.path("optimise_speed.png")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
-    return str(path)
+    return options.save(figure, "optimise_speed.png")
 
 
 def main() -> None:

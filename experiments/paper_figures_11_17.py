@@ -11,9 +11,9 @@ from _held import (
     PROJECTING,
     Curve,
     Integrator,
-    cost_lines,
     curve_of,
     relative_costs,
+    say_costs,
     truth_of,
 )
 from _held_pictures import (
@@ -212,16 +212,13 @@ def say(
         ("integrators", {f"{m}, {i}": c for (m, i), c in by_integrator.items()}),
         ("a hundred footsteps by rodas4", long),
     ):
-        if curves:
-            options.say(f"{title}: violation in the first and last half, at steps, error, time")
-        for name, curve in curves.items():
-            options.say(
-                f"  {name:<20} {curve.ending:<14} {curve.largest(0.0, 0.5):.1e} m "
-                f"{curve.largest(0.5, 1.0):.1e} m  {curve.at_steps:.1e} m  "
-                f"{curve.error:.1e}  {curve.seconds:.3f} s"
-            )
-    for line in cost_lines(costs):
-        options.say(line)
+        options.say(title)
+        options.table(
+            ({"run": name} | numbers(curve) for name, curve in curves.items()), run="", ending="",
+            first_half_m=".1e", last_half_m=".1e", max_violation_m=".1e", state_error=".1e",
+            wall_s_run=".3f",
+        )  # fmt: skip
+    say_costs(options, costs)
     for each in verdicts:
         word = "confirmed" if each["confirmed"] else "CONTRADICTED"
         options.say(f'figure {each["figure"]}, {word}: "{each["sentence"]}" ({each["numbers"]})')

@@ -208,9 +208,7 @@ def draw(options: Options, branches: list[Any], walks: tuple[np.ndarray, ...]) -
     low, high = np.nanmin(angles), np.nanmax(angles)
     right.set_ylim(low - 0.01, high + 0.01)
     right.set_title("The cascade, and where walks settle (grey)", loc="left")
-    path = options.path("period_doubling.png")
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return options.save(figure, "period_doubling.png")
 
 
 if __name__ == "__main__":

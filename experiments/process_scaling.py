@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import _batches
-import matplotlib.pyplot as plt
 import numpy as np
 from _options import Options, parse
 
@@ -88,17 +87,14 @@ def picture(options: Options, rows: list[dict[str, Any]]) -> None:
     axes.set_ylim(bottom=0.0)
     axes.grid(color="#DDDDDD")
     axes.legend(frameon=False)
-    figure.savefig(options.path("process_scaling.png"), dpi=150)
-    plt.close(figure)
+    options.save(figure, "process_scaling.png")
 
 
 def main() -> None:
     options = parse(__doc__ or "")
     rows = measured(options)
     efficiency = rows[1]["best"] / (2.0 * rows[0]["best"])
-    options.say("workers    starts/s (best)  labels that differ")
-    for row in rows:
-        options.say(f"{row['workers']:7} {row['best']:18.0f} {row['labels_differ']:19}")
+    options.table(rows, workers="d", best=".0f", labels_differ="d")
     options.say(f"two workers are {efficiency:.1%} of linear")
     picture(options, rows)
     options.finish({"rows": rows, "efficiency": efficiency})

@@ -30,7 +30,6 @@ def main() -> None:
     options = parse(__doc__ or "")
     count = QUICK_POINTS if options.quick else POINTS
     over = {k: v * np.geomspace(1.0 / FACTOR, FACTOR, count) for k, v in SEED.items()}
-    options.say("what                                   gaits  found  first [s]  then [s]  CPU [s]")
     rows, swept = [], None
     for kind, settings in list(KINDS.items())[: 1 if options.quick else None]:
         first, _, _ = timed(over, settings)
@@ -47,7 +46,7 @@ def main() -> None:
             "cpu_s": cpu,
         }
         rows.append(row)
-        options.say(f"{kind:<37} {count**2:6} {found:6}  {first:9.1f}  {seconds:8.1f}  {cpu:7.1f}")
+    options.table(rows, kind="", gaits="d", found="d", first_s=".1f", then_s=".1f", cpu_s=".1f")
     assert swept is not None
     picture = draw(options, swept)
     radius = swept.spectral_radius.data
@@ -80,10 +79,7 @@ def draw(options: Options, swept: Any) -> str:
     panel(left, swept, "spectral_radius", "spectral radius ρ")
     panel(right, swept, "period", "period [s]")
     figure.suptitle("Gaits of the seed's walker on 0.02 rad; white cross: its own K and c")
-    path = options.path("radius_map.png")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
-    return str(path)
+    return options.save(figure, "radius_map.png")
 
 
 def panel(axes: Axes, swept: Any, name: str, title: str) -> None:

@@ -66,7 +66,7 @@ def main() -> None:
         if row["labels"] is not None:
             options.say(f"{'':36s}{row['labels']} labels differ; gait {row['gait']:.1e}")
     picture = draw(options, rows, [apart(own, found[0]) for own in found])
-    options.finish({"walks": count, "rows": rows, "picture": str(picture)})
+    options.finish({"walks": count, "rows": rows, "picture": picture})
 
 
 def settings_of(count: int, *, quick: bool) -> list[Setting]:
@@ -182,7 +182,7 @@ def compared(
     return row
 
 
-def draw(options: Options, rows: list[dict[str, Any]], differences: list[np.ndarray]) -> Path:
+def draw(options: Options, rows: list[dict[str, Any]], differences: list[np.ndarray]) -> str:
     """How many walks differ by more than what, of the settings that differ at all."""
     figure, ax = plt.subplots(figsize=(6.4, 4.2), layout="constrained")
     for row, own in zip(rows, differences, strict=True):
@@ -193,10 +193,7 @@ def draw(options: Options, rows: list[dict[str, Any]], differences: list[np.ndar
     ax.set_xlabel("difference of the final state [relative]")
     ax.set_ylabel("share of walks that differ by more")
     ax.legend()
-    path = options.path("reproducibility.png")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
-    return path
+    return options.save(figure, "reproducibility.png")
 
 
 if __name__ == "__main__":

@@ -219,8 +219,7 @@ def picture(options: Options, found: dict[str, list[Result]], kinds: dict[str, F
         for verdict, (colour, marker) in MARKS.items()
     ]
     figure.legend(handles=handles, loc="outside upper center", ncols=3)
-    figure.savefig(options.path("search_robustness.png"), dpi=130)
-    plt.close(figure)
+    options.save(figure, "search_robustness.png")
 
 
 def main() -> None:

@@ -105,8 +105,7 @@ def picture(options: Options, found: dict[str, list[Point]], keys: list[str]) ->
         "bars: estimated errors; dotted: the seed's value",
         fontsize=11,
     )
-    figure.savefig(options.path("sensitivity_K_c_xi.png"), dpi=150)
-    plt.close(figure)
+    options.save(figure, "sensitivity_K_c_xi.png")
 
 
 def panel(axes: Axes, name: str, points: list[Point], key: str) -> None:
@@ -123,11 +122,14 @@ def panel(axes: Axes, name: str, points: list[Point], key: str) -> None:
 
 def report(options: Options, found: dict[str, list[Point]], keys: list[str]) -> None:
     for name, points in found.items():
-        options.say(f"\n{name:>9}" + "".join(f"{MEASURES[key]:>17}" for key in keys) + "  outcome")
-        for i, p in enumerate(points):
-            cells = "".join(f"{own(name, points, key)[i]:17.2e}" for key in keys)
-            word = "" if p.outcome != str(jb.gait.Search.FOUND) or p.stable else ", not stable"
-            options.say(f"{p.value:9.2e}{cells}  {p.outcome}{word}")
+        options.say()
+        rows = (
+            {name: p.value, "outcome": p.outcome, "stable": p.stable}
+            | {key: own(name, points, key)[i] for key in keys}
+            for i, p in enumerate(points)
+        )
+        formats = {name: ".2e"} | dict.fromkeys(keys, ".2e")
+        options.table(rows, **formats, outcome="", stable="")
 
 
 def main() -> None:

@@ -146,9 +146,7 @@ def draw(options: Options, branches: dict[str, Any]) -> str:
         grid[0, column].get_legend().remove()
         grid[1, column].set_ylim(0.0, 3.0)
         grid[1, column].set_title("")
-    path = options.path("slope_branch.png")
-    figure.savefig(path, dpi=150)
-    return str(path)
+    return options.save(figure, "slope_branch.png")
 
 
 if __name__ == "__main__":

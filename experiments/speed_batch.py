@@ -15,17 +15,19 @@ import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import _independent
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
+from _batches import perturbed
 from _options import Options, parse
+from _timing import seconds_of
+from reference.numbalsoda_solves import lsoda_address, lsoda_batch
+from reference.scipy_solves import FINEST, final_of
 
 import jaxbiped as jb
 
 DURATION = 2.0
-PERTURBATION = 1e-3
 TOLERANCES = (1e-4, 1e-6)
 TILE = 256
 WAYS = {"vmap": None, f"tiles of {TILE}": TILE}
@@ -56,12 +58,6 @@ class Runner(NamedTuple):
     lanes: int
     rtol: float
     run: Callable[[], tuple[Any, Any]]
-
-
-def perturbed(lanes: int) -> np.ndarray:
-    """Starts about the seed's (n, 8), every number off by about a thousandth of itself."""
-    noise = np.random.default_rng(0).standard_normal((lanes, 8))
-    return _independent.START * (1.0 + PERTURBATION * noise)
 
 
 def batch_program(lanes: int, tile: int | None) -> tuple[Any, float]:
@@ -104,7 +100,7 @@ def numbalsoda(lanes: int) -> list[Runner]:
     starts, times = perturbed(lanes), np.array([0.0, DURATION])
 
     def runner(rtol: float) -> Runner:
-        batch = _independent.lsoda_batch()
+        batch = lsoda_batch()
         return Runner(
             "numbalsoda", lanes, rtol, lambda: (batch(starts, times, rtol, 1e-2 * rtol), None)
         )
@@ -123,7 +119,7 @@ def runners(quick: bool) -> tuple[list[Runner], dict[str, float]]:
             program, seconds = batch_program(lanes, tile)
             compile_seconds[f"{way}, {lanes} lanes"] = seconds
             found += ours(way, lanes, program)
-    if _independent.lsoda_address() is not None:
+    if lsoda_address() is not None:
         for lanes in (64,) if quick else (64, 1024, 4096):
             found += numbalsoda(lanes)
     return [r for r in found if not quick or r.rtol == TOLERANCES[0]], compile_seconds
@@ -132,16 +128,9 @@ def runners(quick: bool) -> tuple[list[Runner], dict[str, float]]:
 def measured(found: list[Runner], rounds: int) -> tuple[list[Row], list[np.ndarray]]:
     """Median times of runs that take turns, after one run each that does not count."""
     results = [runner.run() for runner in found]
-    times = np.empty((rounds, len(found)))
-    for turn in range(rounds):
-        for i, runner in enumerate(found):
-            began = time.perf_counter()
-            runner.run()
-            times[turn, i] = time.perf_counter() - began
+    times = seconds_of(dict(enumerate(runner.run for runner in found)), rounds, warm=False)
     rows = []
-    for runner, (states, steps), seconds in zip(
-        found, results, np.median(times, axis=0), strict=True
-    ):
+    for runner, (states, steps), seconds in zip(found, results, times.values(), strict=True):
         rows.append(
             Row(
                 runner.way,
@@ -160,7 +149,7 @@ def measured(found: list[Runner], rounds: int) -> tuple[list[Row], list[np.ndarr
 def errors(found: list[Runner], finals: list[np.ndarray], checked: int) -> list[dict[str, Any]]:
     """Largest and median error over a few lanes of the largest batches."""
     lanes = max(runner.lanes for runner in found)
-    exact = np.stack([_independent.reference(DURATION, start) for start in perturbed(checked)])
+    exact = np.stack([final_of(DURATION, *FINEST, start=start) for start in perturbed(checked)])
     rows = []
     for runner, states in zip(found, finals, strict=True):
         if runner.lanes == lanes:
@@ -186,26 +175,18 @@ def picture(options: Options, rows: list[Row]) -> None:
     axes.set_title(f"{DURATION:g} s from perturbed starts on two cores")
     axes.grid(alpha=0.3)
     axes.legend()
-    figure.savefig(options.path("speed_batch.png"), dpi=150)
-    plt.close(figure)
+    options.save(figure, "speed_batch.png")
 
 
 def report(options: Options, rows: list[Row], off: list[dict[str, Any]], checked: int) -> None:
-    columns = (
-        f"{'lanes':>7}{'rtol':>9}{'s':>9}{'Msteps/s':>10}{'padded':>9}{'sims/s':>9}{'failed':>8}"
-    )
-    options.say(f"{'':14}{columns}")
-    for row in rows:
-        rates = (row.steps_per_second, row.padded_steps_per_second)
-        texts = ["–" if rate is None else f"{rate / 1e6:.3f}" for rate in rates]
-        line = f"{row.way:14}{row.lanes:>7}{row.rtol:9.0e}{row.seconds:9.3f}{texts[0]:>10}"
-        options.say(line + f"{texts[1]:>9}{row.simulations_per_second:9.0f}{row.failed:8}")
-    if _independent.lsoda_address() is None:
+    options.table(
+        rows, way="", lanes="d", rtol=".0e", seconds=".3f", steps_per_second=".3g",
+        padded_steps_per_second=".3g", simulations_per_second=".0f", failed="d",
+    )  # fmt: skip
+    if lsoda_address() is None:
         options.say("numbalsoda: not installed")
     options.say(f"\nError of {checked} lanes against Radau at 1e-11")
-    for entry in off:
-        line = f"{entry['way']:14}{entry['rtol']:9.0e}"
-        options.say(line + f"  median {entry['median']:.1e}  largest {entry['largest']:.1e}")
+    options.table(off, way="", rtol=".0e", median=".1e", largest=".1e")
 
 
 def main() -> None:
@@ -222,7 +203,7 @@ def main() -> None:
             "compile_s": compile_seconds,
             "rows": [row._asdict() for row in rows],
             "errors": off,
-            "numbalsoda": "not installed" if _independent.lsoda_address() is None else "run",
+            "numbalsoda": "not installed" if lsoda_address() is None else "run",
         }
     )
 

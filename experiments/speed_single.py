@@ -12,17 +12,21 @@ if CORES:
 FLAGS = "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
 os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {FLAGS}".strip()
 
+import functools
+import importlib.util
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import _independent
 import diffrax
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
 from _options import Options, parse
+from _timing import seconds_of
+from reference.numbalsoda_solves import lsoda, lsoda_address
+from reference.scipy_solves import FINEST, final_of
 
 import jaxbiped as jb
 
@@ -133,17 +137,15 @@ def methods(quick: bool) -> dict[str, tuple[Method | None, list[float]]]:
 
 
 def scipy_lsoda() -> Method | None:
-    if _independent.numba is None:
+    if importlib.util.find_spec("numba") is None:
         return None
-    return Method(
-        lambda rtol: (_independent.solved("LSODA", DURATION, rtol, 1e-2 * rtol), None), None
-    )
+    return Method(lambda rtol: (final_of(DURATION, rtol, method="LSODA"), None), None)
 
 
 def compiled_lsoda() -> Method | None:
-    if _independent.lsoda_address() is None:
+    if lsoda_address() is None:
         return None
-    return Method(lambda rtol: (_independent.lsoda(DURATION, rtol, 1e-2 * rtol), None), None)
+    return Method(lambda rtol: (lsoda(DURATION, rtol, 1e-2 * rtol), None), None)
 
 
 def measured(
@@ -152,16 +154,10 @@ def measured(
     """Median times of runs that take turns, after one run each that does not count."""
     cases = [(name, m, rtol) for name, (m, levels) in found.items() if m for rtol in levels]
     ends = [method.run(rtol) for _, method, rtol in cases]
-    times = np.empty((rounds, len(cases)))
-    for turn in range(rounds):
-        for i, (_, method, rtol) in enumerate(cases):
-            began = time.perf_counter()
-            method.run(rtol)
-            times[turn, i] = time.perf_counter() - began
+    runs = {i: functools.partial(method.run, rtol) for i, (_, method, rtol) in enumerate(cases)}
+    times = seconds_of(runs, rounds, warm=False)
     points: dict[str, list[Point]] = {name: [] for name in found}
-    for (name, _, rtol), (state, steps), seconds in zip(
-        cases, ends, np.median(times, axis=0), strict=True
-    ):
+    for (name, _, rtol), (state, steps), seconds in zip(cases, ends, times.values(), strict=True):
         error = float(np.max(np.abs(np.asarray(state) - exact)))
         count = None if steps is None else int(steps)
         points[name].append(Point(rtol, float(seconds), error, count))
@@ -198,8 +194,7 @@ def picture(options: Options, points: dict[str, list[Point]]) -> None:
     axes.set_title(f"{DURATION:g} simulated seconds of the seed's walker on one core")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
-    figure.savefig(options.path("speed_single.png"), dpi=150)
-    plt.close(figure)
+    options.save(figure, "speed_single.png")
 
 
 def cell(value: float | None, form: str) -> str:
@@ -207,15 +202,10 @@ def cell(value: float | None, form: str) -> str:
 
 
 def report(options: Options, points: dict[str, list[Point]], at: dict[str, Any]) -> None:
-    options.say(f"{'method':17}{'rtol':>9}{'error':>10}{'ms':>9}{'steps':>8}{'µs/step':>9}")
-    for name, row in points.items():
-        for p in row:
-            each = None if p.steps is None else 1e6 * p.seconds / p.steps
-            steps = "–" if p.steps is None else str(p.steps)
-            line = f"{name:17}{p.rtol:9.1e}{p.error:10.1e}{1e3 * p.seconds:9.2f}{steps:>8}"
-            options.say(line + f"{cell(each, '.1f'):>9}")
-        if not row:
-            options.say(f"{name:17}{NOT_INSTALLED:>18}")
+    rows = [{"method": name} | p._asdict() for name, row in points.items() for p in row]
+    options.table(rows, method="", rtol=".1e", error=".1e", seconds=".2e", steps="d")
+    for name in (name for name, row in points.items() if not row):
+        options.say(f"{name}: {NOT_INSTALLED}")
     options.say(f"\nTime at equal error [ms] (and how many times that of {BEST})")
     options.say(f"{'method':17}" + "".join(f"{error:>18.0e}" for error in ERRORS))
     for name, row in at.items():
@@ -259,7 +249,7 @@ def main() -> None:
     checked = found[BEST][0] if options.quick else ours(witness)
     first = checked.compile_seconds if first is None else first
     options.say(f"Compiling a first simulation (tracing and XLA): {first:.2f} s\n")
-    exact = _independent.reference(DURATION)
+    exact = final_of(DURATION, *FINEST)
     check = np.max(np.abs(np.asarray(checked.run(1e-11)[0]) - exact))
     points = measured(found, exact, 1 if options.quick else 7)
     at = at_equal_error(points)

@@ -17,12 +17,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import _independent
 import jax
 import jax.numpy as jnp
 import matplotlib.pyplot as plt
 import numpy as np
-from _options import Options, parse
+from _options import Options, by, parse
+from reference.compliant import START
+from reference.scipy_solves import FINEST, final_of
 
 import jaxbiped as jb
 
@@ -40,7 +41,7 @@ Run: TypeAlias = Callable[[], tuple[np.ndarray, float, float, float]]
 def walking_starts(count: int) -> np.ndarray:
     """Perturbed starts (count, 8) that walk on for all the time."""
     noise = np.random.default_rng(0).standard_normal((2 * count + 8, 8))
-    starts = _independent.START + SPREADS * noise
+    starts = START + SPREADS * noise
     walk = jax.vmap(
         lambda *y: (
             jb.simulate(
@@ -112,23 +113,21 @@ def measured(runs: dict[tuple[str, float], Run], exact: np.ndarray) -> list[dict
 
 def picture(options: Options, rows: list[dict[str, Any]]) -> None:
     figure, axes = plt.subplots(figsize=(6, 4.5), layout="constrained")
-    for way in dict.fromkeys(row["way"] for row in rows):
-        picked = [row for row in rows if row["way"] == way]
+    for way, picked in by("way", rows).items():
         errors = [row["error_median"] for row in picked]
         axes.loglog(errors, [1e6 * row["seconds"] for row in picked], "o-", label=way)
     axes.set_xlabel("median error of the final state (SI units)")
     axes.set_ylabel("CPU time of one walk in a batch [µs]")
     axes.grid(alpha=0.3)
     axes.legend()
-    figure.savefig(options.path("steps_tried.png"), dpi=150)
-    plt.close(figure)
+    options.save(figure, "steps_tried.png")
 
 
 def main() -> None:
     options = parse(__doc__ or "")
     starts = walking_starts(64 if options.quick else 2048)
     exact = np.stack(
-        [_independent.reference(DURATION, start) for start in starts[: 2 if options.quick else 64]]
+        [final_of(DURATION, *FINEST, start=start) for start in starts[: 2 if options.quick else 64]]
     )
     solvers = QUICK_SOLVERS if options.quick else SOLVERS
     tolerances = QUICK_TOLERANCES if options.quick else TOLERANCES
@@ -137,10 +136,8 @@ def main() -> None:
     if limit:
         runs |= {("limit", rtol): by_limit(limit, rtol, starts) for rtol in tolerances}
     rows = measured(runs, exact)
-    options.say("way           rtol    error   steps  rejected      µs")
-    for row in rows:
-        line = f"{row['way']:10}{row['rtol']:8.0e}{row['error_median']:9.1e}{row['steps']:8.0f}"
-        options.say(f"{line}{row['rejected']:10.3f}{1e6 * row['seconds']:8.1f}")
+    formats = dict(way="", rtol=".0e", error_median=".1e", steps=".0f", rejected=".3f")
+    options.table(rows, **formats, seconds=".2e")
     picture(options, rows)
     options.finish({"duration_s": DURATION, "rows": rows})
 

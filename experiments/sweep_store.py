@@ -56,8 +56,10 @@ def main() -> None:
         return
     options = parse(__doc__ or "")
     jobs = QUICK_JOBS if options.quick else JOBS
-    options.say("model        starts  kills  labelled last  seconds  µs a start  peak MB")
-    options.finish({"runs": [done(options, job) for job in jobs]})
+    runs = [done(options, job) for job in jobs]
+    formats = dict(model="", starts="d", killed="d", labelled_in_last_run="d", seconds=".1f")
+    options.table(runs, **formats, us_a_start=".1f", peak_mb=".0f")
+    options.finish({"runs": runs})
 
 
 def done(options: Options, job: Job) -> dict[str, Any]:
@@ -67,7 +69,7 @@ def done(options: Options, job: Job) -> dict[str, Any]:
     runs = [run(path, job, kill) for kill in (*job.kills, None)]
     last = runs[-1]
     seconds = sum(each["seconds"] for each in runs)
-    row = {
+    return {
         **dataclasses.asdict(job),
         "killed": sum(each["killed"] for each in runs),
         "seconds": seconds,
@@ -77,11 +79,6 @@ def done(options: Options, job: Job) -> dict[str, Any]:
         "pending": last["pending"],
         "differ_from_memory": last["differ"],
     }
-    options.say(
-        f"{job.model:<10} {job.starts:8}  {row['killed']:5}  {last['labelled']:13}  "
-        f"{seconds:7.1f}  {row['us_a_start']:10.1f}  {last['peak_mb']:7.0f}"
-    )
-    return row
 
 
 def run(path: Path, job: Job, kill: float | None) -> dict[str, Any]:

@@ -16,11 +16,10 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import _batches
-import _classify
-import _independent
-import matplotlib.pyplot as plt
 import numpy as np
 from _options import Options, parse
+from reference.labels import by_numbalsoda, by_scipy
+from reference.numbalsoda_solves import lsoda_address
 
 import jaxbiped as jb
 from jaxbiped.plot.style import new_figure
@@ -59,13 +58,12 @@ def by_size(
     options: Options, labellings: dict[str, jb.Labelling], sizes: tuple[int, ...], rounds: int
 ) -> list[dict[str, Any]]:
     """Costs of a start, and what is left of them less the time of a sweep of a single start."""
-    options.say("model      starts     starts/s   µs each  less the fixed cost")
     rows = []
     for model, labelling in labellings.items():
-        fixed = _batches.seconds_of({0: _batches.swept(labelling, 1)}, 3)[0]
+        fixed = _batches.least_seconds({0: _batches.swept(labelling, 1)}, 3)[0]
         for size in sizes:
             often = rounds if size <= 100_000 else 1
-            seconds = _batches.seconds_of({0: _batches.swept(labelling, size)}, often)[0]
+            seconds = _batches.least_seconds({0: _batches.swept(labelling, size)}, often)[0]
             row = {
                 "model": model,
                 "size": size,
@@ -75,37 +73,33 @@ def by_size(
                 "us_less_fixed": 1e6 * (seconds - fixed) / size,
             }
             rows.append(row)
-            options.say(
-                f"{model:<9} {size:8} {row['starts_per_s']:12.0f} {row['us_each']:9.2f}  "
-                f"{row['us_less_fixed']:9.2f}"
-            )
+    formats = dict(model="", size="d", starts_per_s=".0f", us_each=".2f", us_less_fixed=".2f")
+    options.table(rows, **formats)
     return rows
 
 
 def by_chunk(
     options: Options, labellings: dict[str, jb.Labelling], chunks: tuple[int, ...], rounds: int
 ) -> list[dict[str, Any]]:
-    options.say("\nmodel       chunk     starts/s")
     rows, size = [], chunks[-1]
     for model, labelling in labellings.items():
         work = {chunk: _batches.swept(labelling, size, chunk) for chunk in chunks}
-        for chunk, seconds in _batches.seconds_of(work, rounds).items():
+        for chunk, seconds in _batches.least_seconds(work, rounds).items():
             rows.append({"model": model, "chunk": chunk, "starts_per_s": size / seconds})
-            options.say(f"{model:<9} {chunk:7} {size / seconds:12.0f}")
+    options.table(rows, model="", chunk="d", starts_per_s=".0f")
     return rows
 
 
 def by_threads(
     options: Options, labellings: dict[str, jb.Labelling], size: int, rounds: int
 ) -> list[dict[str, Any]]:
-    options.say("\nmodel     threads     starts/s")
     rows = []
     for model, labelling in labellings.items():
         run = _batches.swept(labelling, size)
         work = {threads: with_threads(threads, run) for threads in (1, 2)}
-        for threads, seconds in _batches.seconds_of(work, rounds).items():
+        for threads, seconds in _batches.least_seconds(work, rounds).items():
             rows.append({"model": model, "threads": threads, "starts_per_s": size / seconds})
-            options.say(f"{model:<9} {threads:7} {size / seconds:12.0f}")
+    options.table(rows, model="", threads="d", starts_per_s=".0f")
     return rows
 
 
@@ -146,14 +140,10 @@ def by_peer(
     rows = peers_on(labelling, "all", states, rounds, scipy=False)
     rows += peers_on(labelling, "that walk", states[walking], rounds, scipy=True)
     rows += peers_on(labelling, "that fall", states[falling], rounds, scipy=True)
-    options.say(
-        "\nway                starts               starts/s  of ours  fates  walking agrees"
-    )
-    for row in rows:
-        options.say(
-            f"{row['way']:<18} {row['starts']:6} {row['which']:<10} {row['starts_per_s']:11.0f}  "
-            f"{row['of_ours']:7.4f}  {row['fates_agree']:6.1%}  {row['walking_agrees']:13.1%}"
-        )
+    options.table(
+        rows, way="", starts="d", which="", starts_per_s=".0f", of_ours=".4f", fates_agree=".1%",
+        walking_agrees=".1%",
+    )  # fmt: skip
     return rows
 
 
@@ -165,17 +155,15 @@ def peers_on(
     columns = jb.State(*states.T.copy())
     ours = labelling(columns).label.astype(int)
     work: dict[str, Callable[[], np.ndarray]] = {"ours": lambda: labelling(columns).label}
-    if _independent.lsoda_address() is not None:
+    if lsoda_address() is not None:
         for name in ("numbalsoda", "numbalsoda, finer"):
-            work[name] = lambda rtol=TOLERANCES[name]: _classify.by_numbalsoda(
-                states, attractor, rtol
-            )
-        _classify.by_numbalsoda(states[:2], attractor, 1e-5)
-    seconds = _batches.seconds_of(work, rounds)
+            work[name] = lambda rtol=TOLERANCES[name]: by_numbalsoda(states, attractor, rtol)
+        by_numbalsoda(states[:2], attractor, 1e-5)
+    seconds = _batches.least_seconds(work, rounds)
     rows = [compared(way, which, ours, work[way](), seconds[way]) for way in work]
     if scipy:
-        few: dict[Any, Any] = {0: lambda: _classify.by_scipy(states[:FEW], attractor, 1e-5)}
-        slow = _batches.seconds_of(few, 1)[0]
+        few: dict[Any, Any] = {0: lambda: by_scipy(states[:FEW], attractor, 1e-5)}
+        slow = _batches.least_seconds(few, 1)[0]
         rows.append(compared("SciPy LSODA", which, ours[:FEW], few[0](), slow))
     return [row | {"of_ours": row["starts_per_s"] / rows[0]["starts_per_s"]} for row in rows]
 
@@ -202,16 +190,15 @@ def fate(codes: np.ndarray) -> np.ndarray:
 
 def by_engine(options: Options, model: str = "compliant", size: int = 512) -> list[dict[str, Any]]:
     """Rates of both engines, and on how many of the same starts their labels agree."""
-    options.say("\nengine      starts/s  labels agree")
     rows, labels = [], {}
     for engine in ("lanes", "xla"):
         run = _batches.swept(_batches.labelling_of(model, engine=engine), size)
         labels[engine] = np.asarray(run().label)
-        seconds = _batches.seconds_of({0: run}, 2)[0]
+        seconds = _batches.least_seconds({0: run}, 2)[0]
         agree = float((labels[engine] == labels["lanes"]).mean())
         row = {"engine": engine, "starts": size, "starts_per_s": size / seconds}
         rows.append(row | {"labels_agree": agree})
-        options.say(f"{engine:<9} {size / seconds:10.0f}  {agree:12.1%}")
+    options.table(rows, engine="", starts_per_s=".0f", labels_agree=".1%")
     return rows
 
 
@@ -232,10 +219,7 @@ def draw(options: Options, numbers: dict[str, Any]) -> str:
     right.set_xscale("log")
     right.set_xlabel("labelled starts that walk, a second")
     right.invert_yaxis()
-    path = options.path("throughput.png")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
-    return str(path)
+    return options.save(figure, "throughput.png")
 
 
 if __name__ == "__main__":

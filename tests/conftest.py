@@ -10,11 +10,11 @@ from pathlib import Path
 import hypothesis
 import jax
 import pytest
+from reference.walks import reference_states
 
 import jaxbiped as jb
 from jaxbiped.caching._disk_cache import CACHE_VARIABLE
 from tests.nightly import Share
-from tests.reference import reference_states
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 
 # What decides whether a change lands draws the same examples every time; elsewhere they are new.

@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
-from reference.compliant import FRICTION, FRICTION_AT, NORMAL, NORMAL_AT, SIZE
+from reference.compliant import FRICTION, FRICTION_AT, NORMAL, NORMAL_AT, SIZE, gravity
 
 import jaxbiped as jb
 
@@ -148,9 +148,10 @@ def check_numbers(scene: jb.Scene) -> np.ndarray:
     """A scene as the independent equations take it: plain numbers, shape (SIZE,)."""
     walker, ground = scene.walker, scene.ground
     p = np.zeros(SIZE)
-    told = (walker.m, walker.J, walker.l, walker.d, walker.r, walker.hip_mass, ground.g)
-    p[:7] = [float(value) for value in told]
-    p[7], p[8] = float(ground.slope), isinstance(scene.clearance, jb.laws.StanceRotation)
+    told = (walker.m, walker.J, walker.l, walker.d, walker.r, walker.hip_mass)
+    p[:6] = [float(value) for value in told]
+    p[6:8] = gravity(float(ground.g), float(ground.slope))
+    p[8] = isinstance(scene.clearance, jb.laws.StanceRotation)
     for at, names, law in (
         (NORMAL_AT, NORMAL, scene.normal),
         (FRICTION_AT, FRICTION, scene.friction),

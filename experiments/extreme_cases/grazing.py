@@ -65,10 +65,15 @@ def grazing(*, each: int = 25, laws: int = len(_LAWS)) -> list[Grazing]:
     return [swept for name in _LAWS[:laws] for swept in _swept(name, heights)]
 
 
-def _swept(name: str, heights: np.ndarray) -> list[Grazing]:
-    scene = dataclasses.replace(jb.seed_scene(), clearance=jb.laws.AlwaysTouching())
+def grazing_scene(name: str) -> jb.Scene:
+    """The seed's walker under a normal law like its own, with feet that may always touch."""
     law = jb.laws.normal_law_like(name, K=1e6, c=1e7, n=1.5, mass=2.0)
-    scene = dataclasses.replace(scene, normal=law)
+    touching = jb.laws.AlwaysTouching()
+    return dataclasses.replace(jb.seed_scene(), normal=law, clearance=touching)
+
+
+def _swept(name: str, heights: np.ndarray) -> list[Grazing]:
+    scene = grazing_scene(name)
     p = check_numbers(scene)
     units, touching = scales(p, 8), START[1] - lowest(p)
     starts = touching + heights

@@ -8,13 +8,13 @@ import functools
 import importlib
 import importlib.util
 import math
-import types
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import compliant
+from .collocation import Radau, precise_radau
 
 _DIGITS, _STAGES = 40, 7
 _FINE, _COARSE = 1e-17, 1e-14
@@ -67,14 +67,6 @@ def precise_motion(start: np.ndarray, p: np.ndarray, duration: float, units: np.
     return Precise(fine[0].astype(float), float(apart), fine[1])
 
 
-class _Collocation(NamedTuple):
-    """Radau IIA: nodes (s,), matrix (s, s), weights that extrapolate to a step's beginning (s,)."""
-
-    nodes: np.ndarray
-    matrix: np.ndarray
-    before: np.ndarray
-
-
 @functools.cache
 def _context() -> Any:
     """Numbers of 40 digits, of a context that nobody else changes."""
@@ -83,46 +75,8 @@ def _context() -> Any:
     return context
 
 
-@functools.cache
-def _collocation() -> _Collocation:
-    """Nodes are the roots of P_s − P_(s−1), Legendre's polynomials on (0, 1)."""
-    context = _context()
-
-    def legendre(degree: int) -> list[Any]:
-        sign = (-1) ** degree
-        return [
-            sign * (-1) ** k * context.binomial(degree, k) * context.binomial(degree + k, k)
-            for k in range(degree + 1)
-        ]
-
-    lower = [*legendre(_STAGES - 1), 0]
-    ascending = [a - b for a, b in zip(legendre(_STAGES), lower, strict=True)]
-    nodes = [_root(ascending, guess) for guess in np.roots([float(a) for a in ascending[::-1]])]
-    nodes.sort()
-    vandermonde = context.matrix(_STAGES, _STAGES)
-    integrals = context.matrix(_STAGES, _STAGES)
-    for i, node in enumerate(nodes):
-        for k in range(_STAGES):
-            vandermonde[i, k] = node**k
-            integrals[i, k] = node ** (k + 1) / (k + 1)
-    inverse = vandermonde**-1
-    return _Collocation(
-        np.array(nodes, object),
-        np.array((integrals * inverse).tolist(), object),
-        np.array(inverse[0, :].tolist()[0], object),
-    )
-
-
-def _root(ascending: list[Any], guess: complex) -> Any:
-    """A real root of a polynomial, by Newton's method."""
-    x = _context().mpf(float(guess.real))
-    for _ in range(10):
-        value = slope = _context().mpf(0)
-        for coefficient in reversed(ascending):
-            slope = slope * x + value
-            value = value * x + coefficient
-        x -= value / slope
-    return x
+def _method() -> Radau:
+    return precise_radau(_STAGES, _context())
 
 
 @functools.cache
@@ -134,31 +88,11 @@ def _equations() -> Callable[[Any, np.ndarray, np.ndarray], np.ndarray]:
         return np.full(shape, context.mpf(0), object)
 
     functions = ("sin", "cos", "exp", "sqrt", "tanh")
-    names = vars(compliant) | {
-        "math": types.SimpleNamespace(
-            copysign=lambda size, sign: size if sign >= 0 else -size,
-            **{name: getattr(context, name) for name in functions},
-        ),
-        "np": types.SimpleNamespace(zeros=zeros, linalg=types.SimpleNamespace(solve=_eliminated)),
-    }
-    for name in ("ramp", "normal_force", "fallen", "friction_share", "derivative"):
-        function = getattr(compliant, name)
-        names[name] = types.FunctionType(getattr(function, "py_func", function).__code__, names)
-    return names["derivative"]
-
-
-def _eliminated(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solution of a positive definite system, by Gauss' elimination."""
-    matrix, x = matrix.copy(), right.copy()
-    n = len(x)
-    for k in range(n):
-        for i in range(k + 1, n):
-            factor = matrix[i, k] / matrix[k, k]
-            matrix[i, k:] = matrix[i, k:] - factor * matrix[k, k:]
-            x[i] = x[i] - factor * x[k]
-    for k in reversed(range(n)):
-        x[k] = (x[k] - np.dot(matrix[k, k + 1 :], x[k + 1 :])) / matrix[k, k]
-    return x
+    return compliant.on_numbers(
+        zeros=zeros,
+        copysign=lambda size, sign: size if sign >= 0 else -size,
+        **{name: getattr(context, name) for name in functions},
+    )["derivative"]
 
 
 def _end(
@@ -205,7 +139,7 @@ def _stepped(
     defect: float,
 ) -> tuple[np.ndarray, np.ndarray, float] | None:
     """State after a step, its rates and the step's defect; None where no correction converges."""
-    nodes, matrix, before = _collocation()
+    nodes, matrix, before, _ = _method()
     derivative, h, rough = _equations(), float(step), y.astype(float)
     coarse = matrix.astype(float)
     inverse = np.linalg.inv(np.eye(_STAGES * y.size) - h * np.kron(coarse, slopes))
@@ -284,5 +218,5 @@ def _jacobian(y: np.ndarray, rates: np.ndarray, exact: np.ndarray) -> np.ndarray
 @functools.cache
 def _real_eigenvalue() -> float:
     """Of the collocation's matrix, which has one for an odd number of stages."""
-    values = np.linalg.eigvals(_collocation().matrix.astype(float))
+    values = np.linalg.eigvals(_method().matrix.astype(float))
     return float(values[np.argmin(np.abs(values.imag))].real)

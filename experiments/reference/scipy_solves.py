@@ -6,19 +6,22 @@ Where SciPy's solves leave too much doubt, the motion is solved in multiple prec
 import contextlib
 import io
 import os
+import sys
 import warnings
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.integrate import odeint
+from scipy.integrate import odeint, solve_ivp
 
-from .compliant import derivative, jacobian
+from .compliant import START, derivative, jacobian, numbers
 from .precise_solves import can_be_precise, precise_motion
 
 _TOLERANCES = ((1e-13, 3e-12), (1e-11, 2e-10))
 """Relative tolerances of a solve and of the second one that it is held against; the looser two
 where rounding stands in the way of the finer."""
+FINEST = (1e-11, 1e-13)
+"""Tolerances of a single solve that counts as exact."""
 _NUDGE = 1e-14
 """Relative change of the second solve's start: what a chaotic motion makes of it counts."""
 _SHORT = 3e-4
@@ -26,6 +29,36 @@ _SHORT = 3e-4
 end: under the paper's clearance rule a leg that turns back in the ground may have none."""
 _POINTS, _MOST = 120, 20000
 """Moments at which a solve is looked at, and its most steps between two of them."""
+
+
+def solution(
+    duration: float,
+    rtol: float,
+    atol: float | None = None,
+    *,
+    method: str = "Radau",
+    start: np.ndarray = START,
+    p: np.ndarray | None = None,
+    **options: Any,
+) -> Any:
+    """The motion by one of SciPy's methods, as `solve_ivp` gives it.
+
+    Args:
+        duration: simulated time [s].
+        rtol, atol: tolerances, the absolute one a hundredth of the other unless given.
+        method, options: of `solve_ivp`.
+        start: the seed's unless given, SI units.
+        p: numbers of the scene, see `compliant`; the seed's unless given.
+    """
+    how = dict(method=method, rtol=rtol, atol=1e-2 * rtol if atol is None else atol) | options
+    numbers_of_it = (numbers() if p is None else p,)
+    with np.errstate(over="ignore"):  # of columns of the Jacobian that are zero
+        return solve_ivp(derivative, (0.0, duration), start, args=numbers_of_it, **how)
+
+
+def final_of(duration: float, rtol: float, atol: float | None = None, **options: Any) -> np.ndarray:
+    """The state at the end of `solution`."""
+    return solution(duration, rtol, atol, **options).y[:, -1]
 
 
 class Checked(NamedTuple):
@@ -111,7 +144,7 @@ def states_of(
 
 def scales(p: np.ndarray, size: int) -> np.ndarray:
     """Units of a state: l, √(g l), radians, √(g/l), and 1 for bristles."""
-    length, gravity = p[2], p[6] if p[6] > 0.0 else 1.0
+    length, gravity = p[2], np.hypot(p[6], p[7]) or 1.0
     time = np.sqrt(length / gravity)
     unit = np.ones(size)
     unit[:2], unit[4:6], unit[6:8] = length, length / time, 1.0 / time
@@ -135,7 +168,7 @@ def _solved(
 ) -> np.ndarray | None:
     """States at equal moments, shape (points + 1, n); None where the solve fails."""
     times = np.linspace(0.0, duration, points + 1)
-    with warnings.catch_warnings(), _silent():
+    with warnings.catch_warnings(), silent(1):
         warnings.simplefilter("ignore")
         states, told = odeint(
             derivative,
@@ -155,15 +188,18 @@ def _solved(
 
 
 @contextlib.contextmanager
-def _silent() -> Iterator[None]:
-    """LSODA prints from C: what goes to standard output meanwhile is lost."""
-    kept = os.dup(1)
+def silent(*streams: int) -> Iterator[None]:
+    """LSODA prints from C: what goes to these streams meanwhile is lost."""
+    kept = [os.dup(stream) for stream in streams]
     nowhere = os.open(os.devnull, os.O_WRONLY)
+    sys.stdout.flush()
     try:
-        os.dup2(nowhere, 1)
+        for stream in streams:
+            os.dup2(nowhere, stream)
         with contextlib.redirect_stdout(io.StringIO()):
             yield
     finally:
-        os.dup2(kept, 1)
-        os.close(kept)
+        for stream, old in zip(streams, kept, strict=True):
+            os.dup2(old, stream)
+            os.close(old)
         os.close(nowhere)

@@ -1,16 +1,16 @@
 """What becomes of starts, by SciPy's integrators and geometry alone."""
 
 import numpy as np
+from reference.compliant import SEED, foot
+from reference.rigid import rigid_walker
+from reference.scipy_solves import solution
 from scipy.integrate import solve_ivp
-
-from tests.reference import SEED, derivative
-from tests.rigid_reference import _rates, coordinates, impact_solution
 
 _LENGTH = SEED["l"] - SEED["r"]
 
 
-def _depths(y):
-    return [SEED["r"] - (y[1] - _LENGTH * np.cos(angle)) for angle in y[2:4]]
+def _depths(y, p):
+    return [foot(y, leg, p)[0] for leg in range(2)]
 
 
 def _falls(_, y, p):
@@ -20,13 +20,13 @@ def _falls(_, y, p):
 
 def _rests(_, y, p):
     """The rate of the leg that carries: of those under the ground the one that turns fastest."""
-    under = [w for depth, w in zip(_depths(y), y[6:8], strict=True) if depth > 0.0]
+    under = [w for depth, w in zip(_depths(y, p), y[6:8], strict=True) if depth > 0.0]
     return min(under, default=-1.0)
 
 
 def _passes(leg):
     def angle(_, y, p):
-        return y[2 + leg] if _depths(y)[leg] > 0.0 and y[6 + leg] < 0.0 else 1.0
+        return y[2 + leg] if _depths(y, p)[leg] > 0.0 and y[6 + leg] < 0.0 else 1.0
 
     angle.direction = -1
     return angle
@@ -35,10 +35,8 @@ def _passes(leg):
 def seed_fate(start, most_time):
     """In words, and when; of a walk, its states at mid-stance (n, 7), the carrying leg second."""
     _falls.terminal, _rests.terminal, _rests.direction = True, True, 1
-    solved = solve_ivp(
-        derivative, (0.0, most_time), start, "Radau", args=(SEED,), rtol=1e-6, atol=1e-8,
-        events=(_falls, _rests, _passes(0), _passes(1)),
-    )  # fmt: skip
+    events = (_falls, _rests, _passes(0), _passes(1))
+    solved = solution(most_time, 1e-6, start=np.asarray(start), events=events)
     fell, rested, first, second = solved.t_events
     if len(fell):
         return "fell forward" if solved.y[4, -1] > 0.0 else "fell back", fell[0], None
@@ -53,8 +51,7 @@ def seed_fate(start, most_time):
 
 def rigid_fate(scene, state, most):
     """In words, with the number of footsteps; of a walk, angles and rates after each (n, 4)."""
-    _, theta, rates = coordinates(scene, state)
-    met = []
+    walker, y, met = rigid_walker(scene), np.array([float(leaf) for leaf in state[1:]]), []
     for count in range(most):
 
         def strikes(t, y):
@@ -71,16 +68,14 @@ def rigid_fate(scene, state, most):
             event.terminal = True
         strikes.direction = -1
         solved = solve_ivp(
-            lambda t, y: _rates(scene, y), (0.0, 50.0), [*theta, *rates[2:], *rates[:2]],
-            "DOP853", rtol=1e-8, atol=1e-10, events=(strikes, forward, back),
+            lambda t, y: walker.rates(y), (0.0, 50.0), y, "DOP853",
+            rtol=1e-8, atol=1e-10, events=(strikes, forward, back),
         )  # fmt: skip
         if len(solved.t_events[1]):
             return "fell forward", count, None
         if len(solved.t_events[2]):
             return "fell back", count, None
-        y = solved.y[:, -1]
-        after = impact_solution(scene, y[:2], y[[4, 5, 2, 3]])
         # The leg that struck stands from now on, and is the second.
-        theta, rates = y[[1, 0]], after[[0, 1, 3, 2]]
-        met.append([*theta, *rates[2:]])
+        y = walker.after_impact(solved.y[:, -1])
+        met.append(y)
     return "walking", most, np.array(met)

@@ -8,11 +8,11 @@ import sys
 
 import jax
 import pytest
+from reference.rigid import rigid_walker
 
 import jaxbiped as jb
 from jaxbiped.cli import main
 from jaxbiped.cli._walk_options import SceneOptions
-from tests.rigid_reference import needed_friction
 
 
 def _run(*arguments):
@@ -130,7 +130,7 @@ def test_rigid_walk_and_gait(tmp_path, capsys):
     assert set(numbers["state"]) == set(jb.dynamics.RigidState._fields)
     # By multipliers of Lagrange for the rolling foot, along an integration of their own.
     state = jb.dynamics.RigidState(**numbers["state"])
-    needed = needed_friction(SceneOptions(model="rigid").scene(), state)
+    needed = rigid_walker(SceneOptions(model="rigid").scene()).needed_friction(state[1:])
     assert numbers["assumptions"]["needed_friction"] == pytest.approx(needed, rel=1e-9)
     said = f"a real foot needs a friction coefficient of {needed:.3f}"
     assert said in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""Actuators in the equations of motion, against Lagrange's equations written a second time."""
+"""Actuators in the equations of motion, against equations written a second time."""
 
 import dataclasses
 
@@ -6,11 +6,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from extreme_cases.case import check_numbers
+from reference.driven import driven_derivative
+from reference.rigid import rigid_walker
 from scipy.integrate import solve_ivp
 
 import jaxbiped as jb
-from tests import lagrange
-from tests.rigid_reference import coordinates, impact_solution, mass_matrix
 
 A = jb.actuation
 SEED = jb.seed_scene(hip_mass=0.3)
@@ -38,7 +39,8 @@ def extension(angle, rate):
 
 DRIVEN = dataclasses.replace(SEED, actuation=(*AT_HIP, PRELOAD))
 RIGID = jb.RigidScene(SEED.walker, SEED.ground, (*AT_HIP, PUSH))
-NUMBERS = lagrange.numbers_of(SEED)
+NUMBERS = check_numbers(SEED)
+ROLLING = rigid_walker(SEED, torques=lambda y: torques(y[:2], y[2:], np.array([[0.0], [1.0]])))
 
 
 def test_passive_scenes_take_the_operations_that_they_took():
@@ -70,11 +72,11 @@ def _states(count):
         yield jb.State(*map(jnp.asarray, place))
 
 
-def test_accelerations_are_those_of_lagranges_equations():
+def test_accelerations_are_those_of_equations_written_again():
     in_contact = 0
     for state in _states(30):
         y = np.array(state, dtype=float)
-        expected = lagrange.accelerations(y[:4], y[4:], NUMBERS, torques, extension)
+        expected = driven_derivative(0.0, y, NUMBERS, torques, extension)[4:]
         found = np.array(jb.dynamics.accelerations(DRIVEN, state))
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
         forces = jb.dynamics.foot_forces(DRIVEN, state)
@@ -91,11 +93,11 @@ def test_redundant_coordinates_move_alike(orientation):
         np.testing.assert_allclose(np.array(found.minimal), expected, rtol=1e-8, atol=1e-8)
 
 
-def test_rolling_is_that_of_lagranges_equations():
+def test_rolling_is_that_of_equations_written_again():
     for state in list(_states(12)):
         rigid = jb.dynamics.rigid_state(state)
         y = np.array(rigid[1:], dtype=float)
-        expected = lagrange.accelerations(y[:2], y[2:], NUMBERS, torques)
+        expected = ROLLING.rates(y)[2:]
         found = jb.dynamics.rolling(RIGID, rigid)
         np.testing.assert_allclose([found.alpha_1, found.alpha_2], expected, rtol=1e-11)
 
@@ -106,8 +108,8 @@ def test_a_driven_walk_is_scipys():
     scene = dataclasses.replace(jb.seed_scene(), actuation=(*AT_HIP, PRELOAD))
     start, end = jb.seed_state(), 0.5
     solved = solve_ivp(
-        lagrange.derivative, (0.0, end), np.array(start, dtype=float), "Radau",
-        args=(lagrange.numbers_of(scene), torques, extension), rtol=1e-9, atol=1e-11,
+        driven_derivative, (0.0, end), np.array(start, dtype=float), "Radau",
+        args=(check_numbers(scene), torques, extension), rtol=1e-9, atol=1e-11,
     )  # fmt: skip
     assert solved.success
     walk = jb.simulate(scene, start, duration=end, accuracy="tight", engine="lanes")
@@ -120,10 +122,8 @@ def test_a_driven_walk_is_scipys():
 def test_a_driven_rigid_footstep_is_scipys():
     start = jb.dynamics.rigid_state(jb.seed_state())
     y = np.array(start[1:], dtype=float)
-    solved = solve_ivp(
-        lagrange.derivative, (0.0, 0.3), y, "DOP853", args=(NUMBERS, torques),
-        rtol=1e-12, atol=1e-13,
-    )  # fmt: skip
+    rates = lambda t, y: ROLLING.rates(y)
+    solved = solve_ivp(rates, (0.0, 0.3), y, "DOP853", rtol=1e-12, atol=1e-13)
     walk = jb.rigid_walk(RIGID, start, duration=0.3, accuracy="tight", engine="lanes")
     assert int(walk.arrivals.total) == 0
     np.testing.assert_allclose(np.array(walk.final[1:]), solved.y[:, -1], rtol=1e-9)
@@ -135,20 +135,20 @@ def _before_impact():
 
 def test_a_push_off_is_an_impulse_on_the_free_walker_before_the_impact():
     state = _before_impact()
-    _, theta, rates = coordinates(RIGID, state)
-    matrix = mass_matrix(RIGID.walker, theta)
-    reach = float(RIGID.walker.hip_to_foot)
+    walker, y = rigid_walker(RIGID), np.array(state[1:], dtype=float)
+    theta, rates = y[:2], walker.whole_rates(y[:, None])[0]
+    (matrix,), reach = walker.mass_matrix(y[:, None]), walker.reach
     outward = np.array([-np.sin(theta[1]), np.cos(theta[1])])
     # On the foot's centre, whose velocity has these rows in (hip x, hip z, θ1, θ2).
     rows = np.zeros((2, 4))
     rows[:, :2] = np.eye(2)
     rows[:, 3] = reach * np.array([np.cos(theta[1]), np.sin(theta[1])])
     pushed = rates + np.linalg.solve(matrix, rows.T @ outward * 0.15)
-    expected = impact_solution(RIGID, theta, pushed)
+    (after,), (impulse,) = rigid_walker(RIGID, push_off=0.15).impact(y)
     found = jb.dynamics.impact(RIGID, state)
-    np.testing.assert_allclose(found.state.omega_2, expected[2], rtol=1e-12)
-    np.testing.assert_allclose(found.state.omega_1, expected[3], rtol=1e-12)
-    np.testing.assert_allclose([found.impulse_x, found.impulse_z], expected[4:], rtol=1e-11)
+    np.testing.assert_allclose(found.state.omega_2, after[2], rtol=1e-12)
+    np.testing.assert_allclose(found.state.omega_1, after[3], rtol=1e-12)
+    np.testing.assert_allclose([found.impulse_x, found.impulse_z], impulse, rtol=1e-11)
     gain = 0.5 * (pushed @ matrix @ pushed - rates @ matrix @ rates)
     assert float(jb.dynamics.push_off_work(RIGID, state)) == pytest.approx(gain, rel=1e-12)
     passive = jb.RigidScene(RIGID.walker, RIGID.ground)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference.compliant import START, derivative, numbers
 from scipy.special import ellipk
 
 import jaxbiped as jb
 from jaxbiped.dynamics._minimal_motion import leg_acceleration, leg_load
-from tests.reference import SEED, START, derivative
 
 # XLA takes subnormal numbers for zero, and a law that asks for a sign then answers otherwise.
 floats = partial(st.floats, allow_subnormal=False)
@@ -28,7 +28,7 @@ speed = floats(-3.0, 3.0)
     floats(-0.1, 0.2),
 )
 def test_vector_field_equals_the_independent_one(y, hip, slope):
-    expected = derivative(0.0, np.array(y), SEED | dict(hip=hip, slope=slope))
+    expected = derivative(0.0, np.array(y), numbers(hip_mass=hip, slope=slope))
     scene = jb.seed_scene(hip_mass=hip, slope=slope)
     got = jb.dynamics.vector_field(0.0, jb.State(*map(jnp.asarray, y)), scene)
     scale = max(1.0, np.abs(expected).max())
@@ -36,7 +36,7 @@ def test_vector_field_equals_the_independent_one(y, hip, slope):
 
 
 def test_vector_field_at_the_seed_start():
-    expected = derivative(0.0, START, SEED)
+    expected = derivative(0.0, START, numbers())
     np.testing.assert_allclose(
         np.array(jb.dynamics.vector_field(0.0, jb.seed_state(), jb.seed_scene())),
         expected,

@@ -1,4 +1,4 @@
-"""Rolling and impact of the rigid walker against a second derivation with multipliers."""
+"""Rolling and impact of the rigid walker against equations written a second time."""
 
 import jax
 import jax.numpy as jnp
@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference.rigid import rigid_walker
 
 import jaxbiped as jb
-from tests.rigid_reference import (
-    contact_rows,
-    coordinates,
-    impact_solution,
-    rolling_solution,
-)
 from tests.rigid_walkers import compass_gait, rigid_seed, simplest_walker
 
 WALKERS = [rigid_seed(0.03), compass_gait(), jb.RigidScene(
@@ -29,13 +24,13 @@ states = st.builds(
 @pytest.mark.parametrize("scene", WALKERS)
 @settings(deadline=None, max_examples=25)
 @given(states)
-def test_rolling_solves_the_equations_with_multipliers(scene, state):
-    _, theta, rates = coordinates(scene, state)
-    solved = rolling_solution(scene, theta, rates)
+def test_rolling_solves_the_equations(scene, state):
+    walker, y = rigid_walker(scene), np.array(state[1:], dtype=float)
+    solved = np.array([*walker.rates(y)[2:], *walker.force(y)])
     motion = jb.dynamics.rolling(scene, state)
     got = [motion.alpha_1, motion.alpha_2, motion.force.tangential, motion.force.normal]
     scale = np.abs(solved).max()
-    np.testing.assert_allclose(np.array(got), solved[2:], rtol=1e-10, atol=1e-12 * scale)
+    np.testing.assert_allclose(np.array(got), solved, rtol=1e-10, atol=1e-12 * scale)
 
 
 @pytest.mark.parametrize("scene", WALKERS)
@@ -45,10 +40,13 @@ def test_an_impact_keeps_two_angular_momenta_and_stops_the_new_contact(scene, st
     """And it is the plastic impulse of the equations with multipliers."""
     walker, reach = scene.walker, float(scene.walker.hip_to_foot)
     state = state._replace(theta_2=-state.theta_1)
-    whole, theta, before = coordinates(scene, state)
+    whole, reference = jb.dynamics.whole_state(scene, state), rigid_walker(scene)
+    whole_rates = lambda y: reference.whole_rates(y[:, None])[0]
+    y = np.array(state[1:], dtype=float)
+    theta, before = y[:2], whole_rates(y)
     found = jb.dynamics.impact(scene, state)
-    _, after_theta, after = coordinates(scene, found.state)
-    np.testing.assert_allclose(after_theta, theta[::-1], rtol=0.0, atol=0.0)
+    after = whole_rates(np.array(found.state[1:], dtype=float))
+    np.testing.assert_allclose(np.array(found.state[1:3]), theta[::-1], rtol=0.0, atol=0.0)
     after = np.array([after[0], after[1], after[3], after[2]])  # by the old names
     hip = np.array([0.0, float(whole.hip_z)])
     contact = hip + reach * np.array([np.sin(theta[0]), -np.cos(theta[0])])
@@ -72,11 +70,11 @@ def test_an_impact_keeps_two_angular_momenta_and_stops_the_new_contact(scene, st
     for point, legs, with_hip in ((contact, (0, 1), True), (hip, (1,), False)):
         kept = momentum_about(point, before, legs, with_hip)
         assert abs(momentum_about(point, after, legs, with_hip) - kept) < 1e-12 * scale
-    solved = impact_solution(scene, theta, before)
-    np.testing.assert_allclose(after, solved[:4], rtol=1e-9, atol=1e-11 * scale)
+    (rates,), (solved,) = reference.impact(y)
+    np.testing.assert_allclose(after, rates, rtol=1e-9, atol=1e-11 * scale)
     impulse = [found.impulse_x, found.impulse_z]
-    np.testing.assert_allclose(np.array(impulse), solved[4:], rtol=1e-9, atol=1e-11 * scale)
-    trailing = contact_rows(walker, theta[1], 1)[1] @ after
+    np.testing.assert_allclose(np.array(impulse), solved, rtol=1e-9, atol=1e-11 * scale)
+    trailing = reference.contact_rows(y[:, None], 1)[0, 1] @ after
     np.testing.assert_allclose(found.lifting, trailing, rtol=1e-9, atol=1e-11 * scale)
 
 

@@ -3,11 +3,11 @@
 import jax
 import numpy as np
 import pytest
+from reference.rigid_walks import rigid_walks
 
 import jaxbiped as jb
 from jaxbiped.solve._rolling_step import accelerations, rolling_step
 from tests.rigid_walkers import STABLE, rigid_seed, simplest_state, simplest_walker
-from tests.rolling_truth import walks
 
 START = jb.dynamics.rigid_state(jb.seed_state())
 
@@ -85,7 +85,7 @@ def test_a_fall_comes_where_the_stance_leg_is_1_rad_from_upright_and_has_bars(ra
     walk = jb.rigid_walk(rigid_seed(), start, footsteps=5, accuracy=1e-7)
     assert str(walk.outcome) == ending
     assert walk.error.met
-    true = walks(rigid_seed(), start, 5)
+    true = rigid_walks(rigid_seed(), start, 5)
     exact = np.array([*true.last[0], true.falls[0]])
     assert abs(float(walk.final.theta_2)) == pytest.approx(1.0, abs=1e-12)
     assert np.all(np.abs(_numbers(walk)[1:] - exact) <= _bars(walk)[1:] + 1e-12)

@@ -3,10 +3,9 @@
 import jax
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from reference.scipy_solves import final_of
 
 import jaxbiped as jb
-from tests.reference import SEED, START, derivative
 
 SCENE, STATE = jb.seed_scene(), jb.seed_state()
 pytestmark = pytest.mark.slow
@@ -18,9 +17,7 @@ def walk():
 
 
 def test_the_bars_hold_the_error_against_equations_written_again(walk):
-    exact = solve_ivp(
-        derivative, (0.0, 0.1), START, method="Radau", rtol=1e-9, atol=1e-11, args=(SEED,)
-    ).y[:, -1]
+    exact = final_of(0.1, 1e-9)
     told = np.array([float(leaf) for leaf in walk.final])
     bars = np.array([float(leaf[-1]) for leaf in walk.error.bars["state"]])
     assert walk.error.met

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference.walks import reference_states
 
 import jaxbiped as jb
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
 from jaxbiped.simulate._recorded_steps import recorded_steps
-from tests.reference import reference_states
 from tests.unknown_to_lanes import ErrorFunction
 
 pytestmark = pytest.mark.slow

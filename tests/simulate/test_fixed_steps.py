@@ -1,23 +1,19 @@
 """Fixed steps, against equations written anew: contacts between two are told."""
 
-import dataclasses
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from extreme_cases.case import check_numbers
-from extreme_cases.grazing import START, TIME, lowest
+from extreme_cases.grazing import START, TIME, grazing_scene, lowest
 from reference.scipy_solves import scales, states_of
 
 import jaxbiped as jb
 
 pytestmark = pytest.mark.slow
 
-LAW = jb.laws.normal_law_like("kelvin-voigt", K=1e6, c=1e7, n=1.5, mass=2.0)
-SCENE = dataclasses.replace(
-    jb.seed_scene(), normal=LAW, clearance=jb.laws.AlwaysTouching()
-)  # its force jumps at touchdown, so that even a shallow contact is felt
+SCENE = grazing_scene("kelvin-voigt")
+"""Its force jumps at touchdown, so that even a shallow contact is felt."""
 NUMBERS = check_numbers(SCENE)
 DEPTH, LONG, SHORT = 1e-7, 3.196e-4, 1e-5
 """Of the contact had there been no ground [m]; steps that miss it, and that do not [s]."""

@@ -3,13 +3,10 @@
 import jax
 import jax.numpy as jnp
 import pytest
-from scipy.integrate import solve_ivp
+from reference.scipy_solves import final_of
 
 import jaxbiped as jb
 from jaxbiped.solve._accuracy import ACCURACIES, tolerances
-from tests.reference import SEED as REFERENCE
-from tests.reference import START as INDEPENDENT
-from tests.reference import derivative
 
 SEED, START = jb.seed_scene(), jb.seed_state()
 
@@ -29,15 +26,7 @@ BOUNDS = {"draft": 1e-5, "balanced": 6e-7, "tight": 7e-10}
 
 def test_named_walks_are_as_exact_as_their_names_say():
     """Ten times looser tolerances have six to thirteen times the errors."""
-    exact = solve_ivp(
-        derivative,
-        (0.0, 0.3),
-        INDEPENDENT,
-        method="Radau",
-        rtol=1e-10,
-        atol=1e-12,
-        args=(REFERENCE,),
-    ).y[:, -1]
+    exact = final_of(0.3, 1e-10)
     for accuracy, bound in BOUNDS.items():
         walk = jb.simulate(SEED, START, duration=0.3, accuracy=accuracy, save="end")
         off = max(abs(float(a) - b) for a, b in zip(walk.final, exact, strict=True))

@@ -5,15 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 from extreme_cases.case import check_numbers
-from extreme_cases.grazing import START, lowest
+from extreme_cases.grazing import START, grazing_scene, lowest
 
 import jaxbiped as jb
 from jaxbiped.sweep._effort import effort_of
 
 pytestmark = pytest.mark.slow
 
-LAW = jb.laws.normal_law_like("kelvin-voigt", K=1e6, c=1e7, n=1.5, mass=2.0)
-SCENE = dataclasses.replace(jb.seed_scene(), normal=LAW, clearance=jb.laws.AlwaysTouching())
+SCENE = grazing_scene("kelvin-voigt")
 DEPTHS = np.array([1e-4, 2e-8, 1e-9, -1e-9, -2e-8, -1e-4])
 """How deep a swinging foot would come had there been no ground [m]; known to 1.2e-6 m."""
 

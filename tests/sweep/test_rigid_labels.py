@@ -4,10 +4,10 @@ import jax
 import jax.tree_util as jtu
 import numpy as np
 import pytest
+from reference.rigid_walks import rigid_walks
 
 import jaxbiped as jb
 from tests.rigid_walkers import rigid_seed
-from tests.rolling_truth import walks
 
 
 @pytest.mark.slow
@@ -40,7 +40,7 @@ def test_falls_are_told_with_the_time_of_the_fall_and_no_strike_is_counted_twice
     axes = {"omega_swing": np.linspace(-4.0, 5.0, 13), "theta_swing": np.linspace(-0.5, 0.8, 13)}
     states = jb.starts.grid(labelling.scene, axes).at(labelling, np.arange(169)).states
     found = labelling(states)
-    true = walks(labelling.scene, states, 3)
+    true = rigid_walks(labelling.scene, states, 3)
     fell = np.isfinite(true.falls)
     footsteps = np.isfinite(true.strikes).sum(axis=1)
     np.testing.assert_array_equal(found.footsteps[fell], footsteps[fell])
@@ -53,7 +53,7 @@ def test_labels_by_a_share_doubt_a_foot_that_grazes():
     labelling = jb.labelling(rigid_seed(), accuracy=1e-2)
     rates = np.array([-1.8965, -1.8964, -1.7])
     start = jb.dynamics.RigidState(0.0, 0.4209, 0.23985298, rates, -1.64274848)
-    early = walks(labelling.scene, start, 1, duration=1.0).strikes[:, 0]
+    early = rigid_walks(labelling.scene, start, 1, duration=1.0).strikes[:, 0]
     assert np.isfinite(early).tolist() == [False, True, True]
     found = labelling(jtu.tree_map(lambda leaf: np.broadcast_to(leaf, rates.shape), start))
     assert found.doubt is not None

@@ -124,9 +124,9 @@ def test_switches_are_where_the_reaction_reaches_zero(law):
     assert jb.laws.Hertz(K=1.0).switches(jnp.asarray(1e-3), jnp.asarray(0.0)) == ()
 
 
-@pytest.mark.parametrize("law", LAWS, ids=name)
+@pytest.mark.parametrize("law", [*LAWS, jb.laws.SmoothRistowSchafer(K=1e6, c=1e7)], ids=name)
 def test_elastic_energy_is_the_integral_of_elastic_force(law):
-    depth = jnp.array([-1e-4, 0.0, 1e-7, 3e-6, 7e-4])
+    depth = jnp.array([-1e-4, 0.0, 1e-7, 3e-6, 1e-5, 1e-4, 7e-4])
     slope = jax.vmap(jax.grad(law.elastic_energy))(depth)
     np.testing.assert_allclose(slope, law.elastic_force(depth), rtol=1e-12, atol=1e-15)
     assert float(law.elastic_energy(jnp.asarray(0.0))) == 0.0

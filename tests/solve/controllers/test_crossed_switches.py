@@ -5,12 +5,13 @@ import dataclasses
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from reference.walks import reference_states
 
 import jaxbiped as jb
 from jaxbiped.dynamics._feet import feet
 from jaxbiped.solve._units import units_of
-from jaxbiped.solve.controllers._walk_step_size import CrossedSwitches, ErrorControl, crosses
-from tests.reference import reference_states
+from jaxbiped.solve.controllers._crossed_switches import CrossedSwitches, crosses
+from jaxbiped.solve.controllers._error_control import ErrorControl
 
 SCENE = jb.seed_scene()
 V0 = float(SCENE.friction.v0)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from extreme_cases.case import check_numbers
-from extreme_cases.grazing import START, TIME, lowest
+from extreme_cases.grazing import START, TIME, grazing_scene, lowest
 from reference.scipy_solves import scales, states_of
 
 import jaxbiped as jb
@@ -16,10 +16,8 @@ pytestmark = pytest.mark.slow
 
 DEPTHS = np.array([1e-5, 1e-6, 1e-7, 1e-8])
 """Of the contact that a swinging foot would come to had there been no ground [m]."""
-LAW = jb.laws.normal_law_like("kelvin-voigt", K=1e6, c=1e7, n=1.5, mass=2.0)
-SCENE = dataclasses.replace(
-    jb.seed_scene(), normal=LAW, clearance=jb.laws.AlwaysTouching()
-)  # its force jumps at touchdown, so that even a shallow contact is felt
+SCENE = grazing_scene("kelvin-voigt")
+"""Its force jumps at touchdown, so that even a shallow contact is felt."""
 
 
 @pytest.fixture(scope="module")

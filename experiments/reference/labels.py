@@ -1,22 +1,23 @@
-"""Starts of the seed's walker labelled a second time: LSODA in pieces, judged after each.
+"""Labels of starts of the seed's walker: LSODA in pieces, judged after each.
 
-Nothing of `jaxbiped` but the gait's point, metric and radius. By numba where it is installed.
+Of jaxbiped only the gait's point, metric and radius are used.
 """
 
-import contextlib
 import functools
 import math
-import os
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
-import _independent
 import numpy as np
-from _independent import RADIUS, compiled, rates
 
-ARM = _independent.LENGTH - RADIUS
-UNIT = math.sqrt(9.8 / _independent.LENGTH)
+from .compliant import SEED as PARAMETERS
+from .compliant import compiled, derivative, foot, numbers
+from .numbalsoda_solves import lsoda_address
+from .scipy_solves import silent, solution
+
+SEED = numbers()
+RADIUS, ARM = PARAMETERS["r"], PARAMETERS["l"] - PARAMETERS["r"]
+UNIT = math.sqrt(PARAMETERS["g"] / PARAMETERS["l"])
 PIECE, SAMPLES = 0.44, 23
 """A footstep's time [s], and how many states are looked at in it."""
 FOOTSTEPS, PATIENCE = 30, 50.0 / UNIT
@@ -29,7 +30,7 @@ MOST_STEPS = 500
 @compiled
 def depth(y, leg):
     """How far a foot is under the ground [m]."""
-    return RADIUS - (y[1] - ARM * math.cos(y[2 + leg]))
+    return foot(y, leg, SEED)[0]
 
 
 @compiled
@@ -62,7 +63,7 @@ def ending(y):
 @compiled
 def mid_stance(a, b, span, leg):
     """The state where a standing leg is upright, by Hermite's cubic between two states."""
-    at_a, at_b = rates(a), rates(b)
+    at_a, at_b = derivative(0.0, a, SEED), derivative(0.0, b, SEED)
     low, high = 0.0, 1.0
     here = np.empty(8)
     for _ in range(40):
@@ -124,15 +125,12 @@ def judged(states, span, memory, point, metric, radius):
 
 def by_scipy(starts: np.ndarray, attractor: Any, rtol: float) -> np.ndarray:
     """Labels of starts (n, 8), by SciPy's LSODA; a piece that it gives up is a failure."""
-    from scipy.integrate import solve_ivp
-
     times = np.linspace(0.0, PIECE, SAMPLES)
-    options: dict[str, Any] = dict(method="LSODA", t_eval=times, rtol=rtol, atol=1e-2 * rtol)
     codes = []
     for start in starts:
         memory, y, code = np.array([-1.0, 0.0, 0.0, np.inf]), start, GOING_ON
         while code == GOING_ON:
-            found = solve_ivp(_independent.right_hand_side, (0.0, PIECE), y, **options)
+            found = solution(PIECE, rtol, method="LSODA", start=y, t_eval=times)
             states = np.ascontiguousarray(found.y.T)
             complete = len(states) == SAMPLES
             code = judged(states, times[1], memory, *_of(attractor)) if complete else FAILED
@@ -143,7 +141,7 @@ def by_scipy(starts: np.ndarray, attractor: Any, rtol: float) -> np.ndarray:
 
 def by_numbalsoda(starts: np.ndarray, attractor: Any, rtol: float) -> np.ndarray:
     """Labels of starts (n, 8), by numbalsoda on all of numba's threads."""
-    with _quiet():
+    with silent(1, 2):  # what LSODA prints
         return _batch()(starts, np.linspace(0.0, PIECE, SAMPLES), rtol, *_of(attractor))
 
 
@@ -156,7 +154,7 @@ def _batch() -> Callable[..., np.ndarray]:
     import numba
     from numbalsoda import lsoda
 
-    address = _independent.lsoda_address()
+    address = lsoda_address()
 
     @numba.njit
     def stuck(y, pause, rtol):
@@ -195,20 +193,3 @@ def _batch() -> Callable[..., np.ndarray]:
         return codes
 
     return batch
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Without LSODA's own messages."""
-    kept = [os.dup(stream) for stream in (1, 2)]
-    nothing = os.open(os.devnull, os.O_WRONLY)
-    sys.stdout.flush()
-    try:
-        for stream in (1, 2):
-            os.dup2(nothing, stream)
-        yield
-    finally:
-        for stream, old in zip((1, 2), kept, strict=True):
-            os.dup2(old, stream)
-            os.close(old)
-        os.close(nothing)
