@@ -160,7 +160,7 @@ def test_all_laws_run_by_lanes(normal, friction):
         assert str(walk.outcome) == "stopped"
         return
     assert str(walk.outcome) == "walking"
-    # As the seed's laws, by the independent equations of experiments/reference; Dahl's bristles give.
+    # As the seed's laws, by the independent equations; Dahl's bristles give.
     near = 1e-4 if friction == "dahl" else 3e-5
     assert float(walk.final.hip_x) == pytest.approx(0.02197, abs=near)
     assert float(walk.final.theta_1) == pytest.approx(-0.21805, abs=3e-4)

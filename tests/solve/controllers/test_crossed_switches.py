@@ -10,8 +10,7 @@ from reference.walks import reference_states
 import jaxbiped as jb
 from jaxbiped.dynamics._feet import feet
 from jaxbiped.solve._units import units_of
-from jaxbiped.solve.controllers._crossed_switches import CrossedSwitches, crosses
-from jaxbiped.solve.controllers._error_control import ErrorControl
+from jaxbiped.solve.controllers._walk_step_size import CrossedSwitches, ErrorControl, crosses
 
 SCENE = jb.seed_scene()
 V0 = float(SCENE.friction.v0)
