@@ -59,7 +59,7 @@ def _numbers(name: str, value: object) -> "np.ndarray":
         raise ArgumentError(f"{name} = {value!r} is not a number.") from None
 
 
-def _shown(array: "np.ndarray", bad: "np.ndarray") -> str:
+def _first_offender(array: "np.ndarray", bad: "np.ndarray") -> str:
     """The first offending value; where there are many, how many offend."""
     first = f"{array[bad].flat[0]:g}"
     return first if array.size == 1 else f"{first} (one of {int(bad.sum())} such entries)"
@@ -103,7 +103,7 @@ def _require(name: str, value: object, allowed: str, test: _Test) -> None:
         return  # the quick way for what is asked of every number at every door
     bad = ~(np.isfinite(array) & test(array))
     if bad.any():
-        shown = _shown(np.broadcast_to(array, bad.shape), bad)
+        shown = _first_offender(np.broadcast_to(array, bad.shape), bad)
         raise ArgumentError(f"{name} = {shown} is not allowed: it must be {allowed}.")
 
 

@@ -67,7 +67,7 @@ def identity(value: object) -> Any:
         return sorted(map(repr, value))
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return {"class": qualified_name(type(value))} | {
-            name: identity(part) for name, part in _telling(value)
+            name: identity(part) for name, part in _telling_fields(value)
         }
     if inspect.isfunction(value):
         return _function_identity(value)
@@ -117,10 +117,10 @@ def difference_of(
         old, new = _without_module(old), _without_module(new)
     if old == new or alike(old, new, name):
         return None
-    return f"{name} = {_shown(old)} there, {_shown(new)} here"
+    return f"{name} = {_short_json(old)} there, {_short_json(new)} here"
 
 
-def _shown(value: object) -> str:
+def _short_json(value: object) -> str:
     text = json.dumps(value)
     return text if len(text) < 60 else f"{text[:57]}..."
 
@@ -141,7 +141,7 @@ def code_digests(*values: object) -> dict[str, str]:
     return dict(sorted(found.items()))
 
 
-def _telling(value: Any) -> Iterator[tuple[str, object]]:
+def _telling_fields(value: Any) -> Iterator[tuple[str, object]]:
     """Static fields, and parts that have such."""
     for field in dataclasses.fields(value):
         part = getattr(value, field.name)

@@ -59,7 +59,7 @@ class SourceDigests:
         """
         with self._lock:
             if module not in self._digests:
-                reached = self._reached(module)
+                reached = self._reachable(module)
                 self._save()
                 parts = "\n".join(f"{name} {self._known[name].digest}" for name in sorted(reached))
                 self._digests[module] = hashlib.sha256(parts.encode()).hexdigest()
@@ -68,9 +68,9 @@ class SourceDigests:
     def reached(self, module: str) -> set[str]:
         """A module with those that its imports, and the packages that it lies in, lead to."""
         with self._lock:
-            return self._reached(module)
+            return self._reachable(module)
 
-    def _reached(self, module: str) -> set[str]:
+    def _reachable(self, module: str) -> set[str]:
         reached, waiting = set[str](), [module]
         while waiting:
             name = waiting.pop()

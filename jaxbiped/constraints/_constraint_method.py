@@ -97,7 +97,7 @@ def free_residual(system: Constrained) -> list[Scalar]:
     ]
 
 
-def stabilised(system: Constrained, damping: Scalar, stiffness: Scalar) -> list[Scalar]:
+def stabilised_residual(system: Constrained, damping: Scalar, stiffness: Scalar) -> list[Scalar]:
     """J M⁻¹ Q − γ + damping Φ̇ + stiffness Φ."""
     parts = zip(free_residual(system), system.rate, system.violation, strict=True)
     return [free + damping * rate + stiffness * off for free, rate, off in parts]

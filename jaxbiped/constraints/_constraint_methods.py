@@ -19,7 +19,7 @@ from jaxbiped.constraints._constraint_method import (
     gram,
     inverse_masses,
     projection,
-    stabilised,
+    stabilised_residual,
 )
 from jaxbiped.linalg._symmetric import Factors, factorise, solve
 
@@ -57,7 +57,7 @@ class Baumgarte(AbstractConstraintMethod):
     needs_independent: ClassVar[bool] = True
 
     def multipliers(self, system: Constrained) -> list[Scalar]:
-        return exact_multipliers(system, stabilised(system, 2.0 * self.a, self.b * self.b))
+        return exact_multipliers(system, stabilised_residual(system, 2.0 * self.a, self.b * self.b))
 
 
 def penalty_system(
@@ -68,7 +68,7 @@ def penalty_system(
     By Woodbury's identity (M + A JᵀJ)⁻¹ asks for no more than that k × k matrix, which is regular
     whatever the constraints say, and is well conditioned where M + A JᵀJ is not.
     """
-    right = stabilised(system, 2.0 * zeta * omega, omega * omega)
+    right = stabilised_residual(system, 2.0 * zeta * omega, omega * omega)
     return factorise(gram(system.rows, inverse_masses(system.masses), 1.0 / A)), right
 
 

@@ -136,7 +136,7 @@ def bifurcation_curve(
     ]
     (before, first_stop), (after, last_stop) = ways
     found = [*reversed(before), begin, *after]
-    return _told(setup, second, bifurcation.kind, found, (first_stop, last_stop))
+    return _curve_through(setup, second, bifurcation.kind, found, (first_stop, last_stop))
 
 
 def _extended_curve(setup: ContinuationSetup, second: Axis, kind: BranchEvent) -> Curve:
@@ -202,7 +202,7 @@ def _follow(
     return stopped(BranchEnd.UNFINISHED, f"{max_points} points were followed")
 
 
-def _told(
+def _curve_through(
     setup: ContinuationSetup,
     second: Axis,
     kind: BranchEvent,

@@ -206,7 +206,7 @@ def resume_branch(
     setup = setup_of(branch, axis=axis)
     forward = direction == "forward"
     kept = branch.points[: at + 1] if forward else branch.points[at:]
-    points = [_rescaled(point, old, axis) for point in kept]
+    points = [_point_on_axis(point, old, axis) for point in kept]
     last = points[-1 if forward else 0]
     along = last.tangent if forward else -last.tangent
     begin = correct(setup.curve, last.place, along, along)
@@ -225,7 +225,7 @@ def resume_branch(
     return setup.branch(known, beyond) if forward else setup.branch(beyond.reversed(), known)
 
 
-def _rescaled(point: BranchPoint, old: Axis, new: Axis) -> BranchPoint:
+def _point_on_axis(point: BranchPoint, old: Axis, new: Axis) -> BranchPoint:
     """The point in the sizes of another range of the same parameter."""
     place, tangent = point.place.copy(), point.tangent.copy()
     place[-1] = new.place(point.value)

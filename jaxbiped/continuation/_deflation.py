@@ -107,14 +107,14 @@ def find_isolated(
     for state in checked:
         search.learn(setup.recurring(state), keep=False)
     with stage(f"searching from {starts} starts"):
-        drawn = islice(_scattered(setup, int(starts), seed, engine), _TRIALS * int(starts))
+        drawn = islice(_scattered_starts(setup, int(starts), seed, engine), _TRIALS * int(starts))
         for point in islice(filter(search.returns, drawn), int(starts)):
             while (found := search.from_start(point)) is not None:
                 search.learn(found)
     return search.found()
 
 
-def _scattered(
+def _scattered_starts(
     setup: ContinuationSetup, count: int, seed: int, engine: str
 ) -> Iterator[np.ndarray]:
     """Components of starts, without end: about the gait that a search finds, itself the first.
@@ -180,10 +180,10 @@ class _DeflatedNewton:
             if np.linalg.norm(step) <= self._setup.curve.converged:
                 apart = [np.linalg.norm(point / self._sizes - each) for each in self._crossings]
                 return point if min(apart, default=np.inf) > _SAME else None
-            point, code = self._advance(point, self._deflated(point / self._sizes, step))
+            point, code = self._advance(point, self._deflated_step(point / self._sizes, step))
         return None
 
-    def _deflated(self, scaled: np.ndarray, step: np.ndarray) -> np.ndarray:
+    def _deflated_step(self, scaled: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Newton's step with the length, or in the sense, that avoids the known crossings."""
         away = [scaled - each for each in self._crossings]
         squares = [float(each @ each) for each in away]

@@ -78,7 +78,7 @@ def switch_branch(
     found = _first_doubling(branch) if doubling is None else doubling
     if found is None or found.kind is not BranchEvent.PERIOD_DOUBLING:
         raise ArgumentError("doubling is not allowed: it must be a period doubling of the branch.")
-    return _switched(branch, found, largest_step, max_points)
+    return _doubled_branch(branch, found, largest_step, max_points)
 
 
 def doubling_cascade(
@@ -113,7 +113,7 @@ def doubling_cascade(
     while len(found) < doublings:
         until = BranchEvent.PERIOD_DOUBLING
         branches.append(
-            _switched(branches[-1], found[-1], step, max_points, until=until, near=near)
+            _doubled_branch(branches[-1], found[-1], step, max_points, until=until, near=near)
         )
         after = _first_doubling(branches[-1])
         if after is None:
@@ -132,7 +132,7 @@ def _first_doubling(branch: Branch) -> BifurcationPoint | None:
     return next(kinds, None)
 
 
-def _switched(
+def _doubled_branch(
     branch: Branch,
     doubling: BifurcationPoint,
     largest_step: float,
@@ -142,7 +142,7 @@ def _switched(
     near: float = _NEAR,
 ) -> Branch:
     setup = setup_of(branch, footsteps=2 * branch.footsteps)
-    begin = _doubled(setup, branch.footsteps, doubling, near)
+    begin = _doubled_cycle(setup, branch.footsteps, doubling, near)
     if begin is None:
         raise ArgumentError(
             f"doubling at {branch.along} = {doubling.value:.6g} is not allowed: no gait of "
@@ -165,7 +165,7 @@ def _switched(
     return setup.branch(first, beyond)
 
 
-def _doubled(
+def _doubled_cycle(
     setup: ContinuationSetup, footsteps: int, doubling: BifurcationPoint, near: float
 ) -> CurvePoint | None:
     """A cycle of doubled period beside a doubling, its tangent pointing away from there."""

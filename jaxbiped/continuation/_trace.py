@@ -48,7 +48,7 @@ def limit_cause(
     """
     if _load(here, state) < _UNLOADED:
         return "no touch: the stance foot carries nothing on the section"
-    known, found = (_slipping(scene, state, period) for scene in (before, beyond))
+    known, found = (_slipping_load(scene, state, period) for scene in (before, beyond))
     if found > max(_SLIDES * known, known + _LITTLE):
         return "slip: beyond, a foot that lands slides on"
     return None
@@ -61,7 +61,7 @@ def _load(scene: Scene, state: WalkerState) -> float:
     return sum(float(force.normal) for force in both) / weight
 
 
-def _slipping(scene: Scene, state: WalkerState, period: float) -> float:
+def _slipping_load(scene: Scene, state: WalkerState, period: float) -> float:
     """Share of the load, summed over a cycle's time, on feet that slip faster than the speed over
     which friction builds up."""
     walk = simulate(scene, cast(State, state), duration=period)

@@ -97,11 +97,11 @@ def consistent_state(
                 f"state violates its constraints by {float(np.max(np.asarray(value))):.3g} {unit} "
                 f"({name}), which is too far to correct: at most {float(bound):g} is allowed."
             )
-    return _corrected(scene, state, off)
+    return _nearest_state(scene, state, off)
 
 
 @kept_alone
-def _corrected(scene: RedundantScene, state: LegsState, off: Violation) -> Consistent:
+def _nearest_state(scene: RedundantScene, state: LegsState, off: Violation) -> Consistent:
     """The nearest state that keeps the constraints."""
     q, v = coordinates_of(scene, state)
     masses = masses_of(scene.linkage)

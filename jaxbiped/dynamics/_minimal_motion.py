@@ -94,7 +94,7 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
         leg_load(scene, state.theta_2, state.omega_2, both.foot_2),
     )
     if scene.actuation is not None:
-        legs = _driven(scene, state, both, legs)
+        legs = _with_torques(scene, state, both, legs)
     mass, ground = scene.walker.total_mass, scene.ground
     m_xx, m_xz, m_zz = mass, jnp.zeros_like(mass), mass
     f_x = mass * ground.g * jnp.sin(ground.slope)
@@ -116,7 +116,7 @@ def accelerations(scene: Scene, state: State) -> Accelerations:
     )
 
 
-def _driven(
+def _with_torques(
     scene: Scene, state: State, both: Feet, legs: tuple[LegLoad, LegLoad]
 ) -> tuple[LegLoad, LegLoad]:
     """The legs' loads with the torques of the actuators."""

@@ -54,10 +54,10 @@ class MeasuredAngles:
     since: str | None = None
 
     def __post_init__(self) -> None:
-        check_not_negative("times", _filled(self.times), "s")
+        check_not_negative("times", _as_array(self.times), "s")
         if not np.size(self.times):
             raise ArgumentError("times = [] is not allowed: give one at least.")
-        _check_seconds("times", _filled(self.times))
+        _check_seconds("times", _as_array(self.times))
         check_positive("deviation", self.deviation, "rad")
         check_choice("since", self.since, CLOCKS)
         if not self.known:
@@ -68,10 +68,10 @@ class MeasuredAngles:
                     f"{name} has the shape {np.shape(values)}: it must be (n,), that of times, "
                     f"which is {np.shape(self.times)}."
                 )
-            check_finite(name, _filled(values))
-            if holds_somewhere(np.abs(_filled(values)) > 2.0 * np.pi):
+            check_finite(name, _as_array(values))
+            if holds_somewhere(np.abs(_as_array(values)) > 2.0 * np.pi):
                 raise ArgumentError(
-                    f"{name} holds {np.max(np.abs(_filled(values))):g}, which is beyond a whole "
+                    f"{name} holds {np.max(np.abs(_as_array(values))):g}, which is beyond a whole "
                     "turn: it must be in radians; are these degrees?"
                 )
         if not any(np.any(each) for each in self.seen.values()):
@@ -95,11 +95,11 @@ class MeasuredAngles:
     def values(self) -> np.ndarray:
         """The angles that are known, one leg behind the other."""
         return np.concatenate(
-            [np.asarray(_filled(self.known[n]))[at] for n, at in self.seen.items()]
+            [np.asarray(_as_array(self.known[n]))[at] for n, at in self.seen.items()]
         )
 
 
-def _filled(values: npt.ArrayLike) -> npt.ArrayLike:
+def _as_array(values: npt.ArrayLike) -> npt.ArrayLike:
     """Zeros where masked."""
     return np.ma.filled(values, 0.0) if isinstance(values, np.ma.MaskedArray) else values
 
@@ -231,7 +231,9 @@ def _gait(held: JsonObject) -> MeasuredGait:
             measures[_KEYS[key]] = tuple(value) if isinstance(value, list) else value
         elif key == "angles" and isinstance(value, dict):
             _check_keys("angles", value, _ANGLES)
-            angles: dict[str, Any] = {n: _masked(value.get(own)) for own, n in _ANGLES.items()}
+            angles: dict[str, Any] = {
+                n: _masked_array(value.get(own)) for own, n in _ANGLES.items()
+            }
             options["angles"] = MeasuredAngles(**angles)
         elif (key == "conditions" and isinstance(value, dict)) or key == "footsteps":
             options[key] = value
@@ -241,7 +243,7 @@ def _gait(held: JsonObject) -> MeasuredGait:
     return MeasuredGait(measures, **options)
 
 
-def _masked(value: Any) -> Any:
+def _masked_array(value: Any) -> Any:
     """A list with its nulls masked; anything else as it is."""
     if not isinstance(value, list) or None not in value:
         return value

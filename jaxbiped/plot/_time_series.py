@@ -86,14 +86,16 @@ def rigid_leg_angles(
     check_positive("duration", duration, "s")
     times = float(duration) * np.linspace(1.0 / _SAMPLES, 1.0, _SAMPLES)
     scene, state = jtu.tree_map(as_float, (scene, state))
-    total, one, two = map(np.asarray, _walked(scene, state, as_array(times)))
+    total, one, two = map(np.asarray, _walk_ends(scene, state, as_array(times)))
     odd = total % 2 == 1
     angles = (np.where(odd, two, one), np.where(odd, one, two))
     return draw_leg_angles(times, angles, "Leg angles on rigid feet", ax)
 
 
 @cached_jit
-def _walked(scene: RigidScene, state: RigidState, times: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+def _walk_ends(
+    scene: RigidScene, state: RigidState, times: Scalar
+) -> tuple[Scalar, Scalar, Scalar]:
     """Of walks for these times [s]: how many feet came down, and the legs' last angles."""
     walks = jax.vmap(lambda t: rigid_walk(scene, state, duration=t))(times)
     assert walks.arrivals is not None

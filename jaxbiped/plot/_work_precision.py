@@ -168,7 +168,7 @@ def constraint_runs(runs: Sequence[Mapping[str, Any]]) -> Figure:
     panels[0].set_ylim(len(methods) - 0.5, -0.5)
     panels[0].set_ylabel("method")
     handles, labels = panels[0].get_legend_handles_labels()
-    if any(_failed(run) for run in runs):
+    if any(_has_failed(run) for run in runs):
         (cross,) = panels[0].plot([], [], "x", color=GROUND_COLOUR)
         handles, labels = [*handles, cross], [*labels, "failed"]
     figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
@@ -185,7 +185,7 @@ def _draw_way(
 ) -> None:
     """One integrator's marks in one panel."""
     values = np.array([run[measure] for run in runs], dtype=float)
-    failed = np.array([_failed(run) for run in runs])
+    failed = np.array([_has_failed(run) for run in runs])
     # A run that failed took its time all the same.
     lost = failed & (measure != "wall_s_run") | ~np.isfinite(values)
     colour = _COLOURS[k % len(_COLOURS)]
@@ -206,5 +206,5 @@ def _integrator_label(run: Mapping[str, Any]) -> str:
     return f"{run['integrator']}, " + (f"steps of {by} s" if run["fixed"] else f"tolerance {by}")
 
 
-def _failed(run: Mapping[str, Any]) -> bool:
+def _has_failed(run: Mapping[str, Any]) -> bool:
     return bool(run["ending"] != "walking")

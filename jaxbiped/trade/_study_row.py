@@ -63,16 +63,16 @@ def work_of(run: Callable[[], Any], repeats: int) -> tuple[Any, Work]:
     Returns:
         What it returned last, and its work.
     """
-    first, found = _timed(run)
+    first, found = _time_of(run)
     spans: list[tuple[float, float]] = []
     while not spans or (len(spans) < repeats and sum(wall for wall, _ in spans) < _ENOUGH):
-        span, found = _timed(run)
+        span, found = _time_of(run)
         spans.append(span)
     wall, cpu = (statistics.median(span[k] for span in spans) for k in range(2))
     return found, Work(wall, cpu, max(first[0] - wall, 0.0))
 
 
-def _timed(run: Callable[[], Any]) -> tuple[tuple[float, float], Any]:
+def _time_of(run: Callable[[], Any]) -> tuple[tuple[float, float], Any]:
     """Time and CPU time of a run [s], and what it returned."""
     wall, cpu = time.perf_counter(), time.process_time()
     found = jax.block_until_ready(run())
@@ -161,7 +161,7 @@ def cheapest(rows: Iterable[Row], axis: str, error: float, cost: Cost) -> Row | 
         cost: of a row; None where it is not known.
     """
     good = [row for row in rows if _reaches(row, axis, error) and cost(row) is not None]
-    return min(good, key=lambda row: _known(cost(row)), default=None)
+    return min(good, key=lambda row: _as_number(cost(row)), default=None)
 
 
 def cost_at(rows: Sequence[Row], axis: str, error: float, cost: Cost) -> float | None:
@@ -180,7 +180,7 @@ def cost_at(rows: Sequence[Row], axis: str, error: float, cost: Cost) -> float |
         loosest setting has a smaller error costs what that costs.
     """
     points = [
-        (np.log(_known(row.errors[axis])), np.log(_known(cost(row))))
+        (np.log(_as_number(row.errors[axis])), np.log(_as_number(cost(row))))
         for row in rows
         if _reaches(row, axis, np.inf) and cost(row) is not None
     ]
@@ -199,5 +199,5 @@ def _reaches(row: Row, axis: str, error: float) -> bool:
     return row.outcome == OK and reached is not None and 0.0 < reached <= error
 
 
-def _known(value: Any) -> float:
+def _as_number(value: Any) -> float:
     return float(value)

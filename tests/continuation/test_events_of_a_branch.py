@@ -97,7 +97,7 @@ def test_a_geometric_cascade_has_its_ratio_and_its_limit(monkeypatch):
         return SimpleNamespace(points=ends, bifurcations=[doubling(k)], footsteps=2**k)
 
     following = iter([branch(1), branch(2), branch(3)])
-    monkeypatch.setattr(_switch_branch, "_switched", lambda *_, **__: next(following))
+    monkeypatch.setattr(_switch_branch, "_doubled_branch", lambda *_, **__: next(following))
     found = doubling_cascade(branch(0), 4)
     assert isinstance(found, DoublingCascade)
     assert found.values == pytest.approx(values)
@@ -140,7 +140,7 @@ def test_a_deflated_step_is_that_of_the_residual_over_the_squared_distance():
     slope = np.array([[2.0 * x[0], -0.3], [0.2, 1.0]])
     search = _DeflatedNewton.__new__(_DeflatedNewton)
     search._crossings = [a]
-    found = search._deflated(x, np.linalg.solve(slope, -f(x)))
+    found = search._deflated_step(x, np.linalg.solve(slope, -f(x)))
     away = x - a
     square = away @ away
     factor = 1.0 / square + 1.0

@@ -98,14 +98,14 @@ def view_basin(
         "title": title,
         "x": starts.values[x].tolist(),
         "y": starts.values[y].tolist(),
-        "xLabel": _told(quantities[x]),
-        "yLabel": _told(quantities[y]),
+        "xLabel": _axis_words(quantities[x]),
+        "yLabel": _axis_words(quantities[y]),
         "names": names,
         "colours": [label_colour(name) for name in names],
-        "cells": _encoded(np.vectorize(names.index)(words)),
+        "cells": _base64_of(np.vectorize(names.index)(words)),
         "columns": columns.tolist(),
         "rows": rows.tolist(),
-        "first": _first(words[np.ix_(rows, columns)]),
+        "first": _first_shown(words[np.ix_(rows, columns)]),
     }
     return BasinView(picture, tuple(_walks(labelling, starts, numbers, footsteps)))
 
@@ -142,16 +142,16 @@ def _walks(
     return found
 
 
-def _first(words: np.ndarray) -> list[int]:
+def _first_shown(words: np.ndarray) -> list[int]:
     """Column and row of the start that is shown at first: one that walks, if there is one."""
     walking = np.argwhere(np.char.startswith(words.astype(str), "walking"))
     row, column = walking[len(walking) // 2] if len(walking) else (0, 0)
     return [int(column), int(row)]
 
 
-def _told(quantity: Any) -> str:
+def _axis_words(quantity: Any) -> str:
     return f"{quantity.words} ({quantity.unit})" if quantity.unit else quantity.words
 
 
-def _encoded(cells: np.ndarray) -> str:
+def _base64_of(cells: np.ndarray) -> str:
     return base64.b64encode(cells.astype(np.uint8).tobytes()).decode("ascii")

@@ -65,10 +65,10 @@ def adaptive_knots(
         t = np.insert(t, left + 1, at)
         values = {name: np.insert(values[name], left + 1, found[name]) for name in values}
         fresh &= np.diff(t) > tolerances.shortest
-    return _thinned(t, values, tolerances)
+    return _necessary_knots(t, values, tolerances)
 
 
-def _thinned(
+def _necessary_knots(
     t: np.ndarray, values: Channels, tolerances: Tolerances
 ) -> tuple[np.ndarray, Channels]:
     for _ in range(_PASSES):

@@ -49,7 +49,7 @@ def played_request(scene: Scene, state: State, footsteps: int) -> Request:
     )
     request = run.lane_request()
     assert request is not None
-    return request._replace(program=_played(request.program), room=STEPS)
+    return request._replace(program=_recording_program(request.program), room=STEPS)
 
 
 def played_module(request: Request) -> bytes:
@@ -57,7 +57,7 @@ def played_module(request: Request) -> bytes:
     return web_module(LANES.compile(request).kernel.graph)
 
 
-def _played(program: Program) -> Program:
+def _recording_program(program: Program) -> Program:
     """The program with records for the viewer in place of the dense output."""
     steps = program.record
     assert steps is not None
@@ -67,7 +67,7 @@ def _played(program: Program) -> Program:
         state = State(*values[: len(State._fields)])
         shown = jax.lax.cond(
             noted,
-            lambda: _shown(solve.scene, state),
+            lambda: _shown_numbers(solve.scene, state),
             lambda: [jnp.zeros_like(t)] * (len(RECORDED) - 1 - len(state)),
         )
         return noted, [t, *state, *shown]
@@ -75,7 +75,7 @@ def _played(program: Program) -> Program:
     return dataclasses.replace(program, record=record)
 
 
-def _shown(scene: Any, state: State) -> list[Scalar]:
+def _shown_numbers(scene: Any, state: State) -> list[Scalar]:
     found, energy = contacts(scene, state), energies(scene, state)
     zero = jnp.zeros_like(state.hip_x)
     normal = [force.normal for force in found.forces]

@@ -73,16 +73,10 @@ class Recording:
 
     def numbers(self) -> JsonObject:
         """What is sent, ready for JSON: times in 64 bits, channels in 32, by base64."""
-        return {
-            "name": self.name,
-            "ending": self.ending,
-            "slope": self.slope,
-            "l": self.l,
-            "r": self.r,
-            "weight": self.weight,
-            "driven": self.driven,
-            "t": _encoded(self.t, "<f8"),
-            "channels": {name: _encoded(each, "<f4") for name, each in self.channels.items()},
+        plain = ("name", "ending", "slope", "l", "r", "weight", "driven")
+        return {name: getattr(self, name) for name in plain} | {
+            "t": _base64_of(self.t, "<f8"),
+            "channels": {name: _base64_of(each, "<f4") for name, each in self.channels.items()},
             "footprints": [each._asdict() for each in self.footprints],
         }
 
@@ -135,7 +129,7 @@ def tolerances_for(scene: Any, exact: float) -> Tolerances:
     )
 
 
-def _encoded(values: np.ndarray, kind: str) -> str:
+def _base64_of(values: np.ndarray, kind: str) -> str:
     return base64.b64encode(np.asarray(values, dtype=kind).tobytes()).decode("ascii")
 
 

@@ -49,7 +49,7 @@ def record_rigid_walk(
     began, starts, end = _footsteps(walk, start)
     rows, t = _knot_times(began, end, _EVEN * time_unit(scene))
     each = RigidState(*[leaf[rows] for leaf in starts])
-    channels = _channels(scene, _walked(scene, each, t - began[rows]))
+    channels = _channels(scene, _states_of_walks(scene, each, t - began[rows]))
     odd = rows % 2 == 1
     swapped = {**channels}
     for field in ("theta", "omega", "normal", "tangential"):
@@ -98,7 +98,7 @@ def _knot_times(began: np.ndarray, end: float, apart: float) -> tuple[np.ndarray
     return np.concatenate(rows), np.concatenate(times)
 
 
-def _walked(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> RigidState:
+def _states_of_walks(scene: RigidScene, starts: RigidState, durations: np.ndarray) -> RigidState:
     found, arrays = [], jtu.tree_map(as_float, scene)
     # No time at all is not simulated.
     shortest = 1e-12 * time_unit(scene)

@@ -88,10 +88,10 @@ def normal_law_like(
     check_choice("name", name, NORMAL_LAWS)
     seed = RistowSchafer(K=K, c=c, n=n)
     law = cast("type[NamedNormalLaw]", NORMAL_LAWS[name])
-    return law.like_seed(seed, _standing(seed, as_float(mass), as_float(g)))
+    return law.like_seed(seed, _standing_of(seed, as_float(mass), as_float(g)))
 
 
-def _standing(law: RistowSchafer, mass: Scalar, g: Scalar) -> Standing:
+def _standing_of(law: RistowSchafer, mass: Scalar, g: Scalar) -> Standing:
     check_positive("mass", mass, "kg")
     check_positive("g", g, "m/s^2")
     return Standing(law, mass, g)

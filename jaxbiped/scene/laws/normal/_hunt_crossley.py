@@ -16,13 +16,14 @@ from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.scene.laws._abstract_laws import (
     depth_in_contact,
-    hertz_energy,
-    hertz_force,
     power,
     pushing,
 )
 from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, Standing
+from jaxbiped.scene.laws.normal._weight_on_law import (
+    AbstractHertzianLaw,
+    Standing,
+)
 
 
 def hunt_crossley(e: Parameter) -> Scalar:
@@ -117,7 +118,7 @@ def _restitution(e: Parameter, *, divides: bool = False) -> Scalar:
     return e
 
 
-class HuntCrossley(AbstractDampedLaw):
+class HuntCrossley(AbstractHertzianLaw):
     """F_N = K δⁿ (1 + hysteresis δ̇) while δ > 0, never below zero (no adhesion).
 
     The literature writes χ/v⁻ for the hysteresis, with a factor χ that depends on the restitution
@@ -183,12 +184,6 @@ class HuntCrossley(AbstractDampedLaw):
     def switches(self, penetration: Scalar, rate: Scalar) -> tuple[Scalar, ...]:
         """The reaction over K δⁿ."""
         return (1.0 + self.hysteresis * rate,)
-
-    def elastic_force(self, penetration: Scalar) -> Scalar:
-        return hertz_force(self.K, self.n, penetration)
-
-    def elastic_energy(self, penetration: Scalar) -> Scalar:
-        return hertz_energy(self.K, self.n, penetration)
 
     @classmethod
     def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:

@@ -16,10 +16,13 @@ from jaxbiped.scene.laws._abstract_laws import (
     pushing,
     smooth_ramp,
 )
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, Standing
+from jaxbiped.scene.laws.normal._weight_on_law import (
+    AbstractHertzianLaw,
+    Standing,
+)
 
 
-class RistowSchafer(AbstractDampedLaw):
+class RistowSchafer(AbstractHertzianLaw):
     """F_N = K δⁿ + c δ δ̇ while δ > 0, never below zero (no adhesion).
 
     Source: the seed paper, section 2.2, after Ristow and Schäfer et al. The reaction leaves zero
@@ -51,12 +54,6 @@ class RistowSchafer(AbstractDampedLaw):
         """The reaction over the penetration: it leaves zero where this does."""
         depth = depth_in_contact(penetration)
         return (self.K * power(depth, self.n - 1.0) + self.c * rate,)
-
-    def elastic_force(self, penetration: Scalar) -> Scalar:
-        return hertz_force(self.K, self.n, penetration)
-
-    def elastic_energy(self, penetration: Scalar) -> Scalar:
-        return hertz_energy(self.K, self.n, penetration)
 
     @classmethod
     def like_seed(cls, seed: Self, standing: Standing) -> Self:

@@ -6,9 +6,13 @@ import jax.numpy as jnp
 
 from jaxbiped._parameter_declaration import parameter
 from jaxbiped._types import Parameter, Scalar
-from jaxbiped.scene.laws._abstract_laws import depth_in_contact, hertz_energy, hertz_force, pushing
+from jaxbiped.scene.laws._abstract_laws import depth_in_contact, pushing
 from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
-from jaxbiped.scene.laws.normal._weight_on_law import AbstractDampedLaw, Standing
+from jaxbiped.scene.laws.normal._weight_on_law import (
+    AbstractDampedLaw,
+    AbstractHertzianLaw,
+    Standing,
+)
 
 
 class KelvinVoigt(AbstractDampedLaw):
@@ -57,7 +61,7 @@ class KelvinVoigt(AbstractDampedLaw):
         return cls.from_weight(**standing.arguments())
 
 
-class KuwabaraKono(AbstractDampedLaw):
+class KuwabaraKono(AbstractHertzianLaw):
     """F_N = K δ^{3/2} + gamma δ^{1/2} δ̇ while δ > 0, never below zero (no adhesion).
 
     Weakly damped, the restitution falls with the approach speed as 1 − e ∝ (v⁻)^{1/5}. The force
@@ -90,19 +94,13 @@ class KuwabaraKono(AbstractDampedLaw):
         """The reaction over √δ; out of contact, its limit at touchdown."""
         return (self.K * jnp.where(penetration > 0.0, penetration, 0.0) + self.gamma * rate,)
 
-    def elastic_force(self, penetration: Scalar) -> Scalar:
-        return hertz_force(self.K, 1.5, penetration)
-
-    def elastic_energy(self, penetration: Scalar) -> Scalar:
-        return hertz_energy(self.K, 1.5, penetration)
-
     @classmethod
     def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:
         """The same penetration under the weight, with the same damping ratio about it."""
         return cls.from_weight(**standing.arguments())
 
 
-class Tsuji(AbstractDampedLaw):
+class Tsuji(AbstractHertzianLaw):
     """F_N = K δ^{3/2} + gamma δ^{1/4} δ̇ while δ > 0, never below zero (no adhesion).
 
     A mass m that drops onto it leaves with a restitution that depends on gamma/√(m K) alone, not
@@ -137,12 +135,6 @@ class Tsuji(AbstractDampedLaw):
         depth = depth_in_contact(penetration)
         held = jnp.where(penetration > 0.0, self.K * depth * _fourth_root(depth), 0.0)
         return (held + self.gamma * rate,)
-
-    def elastic_force(self, penetration: Scalar) -> Scalar:
-        return hertz_force(self.K, 1.5, penetration)
-
-    def elastic_energy(self, penetration: Scalar) -> Scalar:
-        return hertz_energy(self.K, 1.5, penetration)
 
     @classmethod
     def like_seed(cls, seed: RistowSchafer, standing: Standing) -> Self:

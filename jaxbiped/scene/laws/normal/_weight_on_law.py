@@ -3,12 +3,13 @@
 import abc
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 
+import equinox as eqx
 import jax.numpy as jnp
 
 from jaxbiped._checks import check_at_least, check_not_negative, check_positive
 from jaxbiped._types import Parameter, Scalar, as_float
 from jaxbiped.caching._cached_jit import kept_alone
-from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw, hertz_energy, hertz_force
 
 if TYPE_CHECKING:
     from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
@@ -61,6 +62,18 @@ class AbstractDampedLaw(AbstractNormalLaw):
         return cls(K, _coefficient(cls, damper, *given), **n)
 
 
+class AbstractHertzianLaw(AbstractDampedLaw):
+    """A damped law whose elastic part is Hertz's, K δⁿ; its exponent is n, where it has one."""
+
+    K: eqx.AbstractVar[Parameter]
+
+    def elastic_force(self, penetration: Scalar) -> Scalar:
+        return hertz_force(self.K, getattr(self, "n", self.exponent), penetration)
+
+    def elastic_energy(self, penetration: Scalar) -> Scalar:
+        return hertz_energy(self.K, getattr(self, "n", self.exponent), penetration)
+
+
 class Standing(NamedTuple):
     """How a mass stands on the seed's law, computed where it is asked for.
 
@@ -77,12 +90,12 @@ class Standing(NamedTuple):
     @property
     def penetration(self) -> Scalar:
         """How deep it stands [m]."""
-        return _rest(self.mass, self.g, self.law.K, self.law.n)
+        return _rest_penetration(self.mass, self.g, self.law.K, self.law.n)
 
     @property
     def damping_ratio(self) -> Scalar:
         """Of small oscillations about that [–]."""
-        return _damping(self.penetration, self.mass, self.g, self.law.c, self.law.n)
+        return _damping_ratio(self.penetration, self.mass, self.g, self.law.c, self.law.n)
 
     def arguments(self) -> dict[str, Scalar]:
         """Of `from_weight`."""
@@ -124,7 +137,7 @@ def matched_to_weight(
     check_positive("g", g, "m/s^2")
     check_not_negative("damping_ratio", damping_ratio)
     check_at_least("n", n, "1", 1.0)
-    return _matched(mass, penetration, g, damping_ratio, n)
+    return _stiffness_and_damper(mass, penetration, g, damping_ratio, n)
 
 
 @kept_alone
@@ -135,18 +148,18 @@ def _coefficient(
 
 
 @kept_alone
-def _rest(mass: Scalar, g: Scalar, K: Scalar, n: Scalar) -> Scalar:
+def _rest_penetration(mass: Scalar, g: Scalar, K: Scalar, n: Scalar) -> Scalar:
     return (mass * g / K) ** (1.0 / n)
 
 
 @kept_alone
-def _damping(penetration: Scalar, mass: Scalar, g: Scalar, c: Scalar, n: Scalar) -> Scalar:
+def _damping_ratio(penetration: Scalar, mass: Scalar, g: Scalar, c: Scalar, n: Scalar) -> Scalar:
     stiffness = n * mass * g / penetration
     return 0.5 * c * penetration / jnp.sqrt(stiffness * mass)
 
 
 @kept_alone
-def _matched(
+def _stiffness_and_damper(
     mass: Scalar, penetration: Scalar, g: Scalar, damping_ratio: Scalar, n: Scalar
 ) -> tuple[Scalar, Scalar]:
     weight = mass * g
