@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxbiped._checks import check_positive
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._feet import standing_height
-from jaxbiped.dynamics._state import RigidState, State, WalkerState, state_for
+from jaxbiped.dynamics._state import RigidState, State, WalkerState, state_for, whole_state
 from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
@@ -45,18 +45,9 @@ def _scatter(scene: Scene | RigidScene, count: int, spread: float, seed: int) ->
     factors = 1.0 + spread * scatter.at[:, 0].set(0.0)
     theta_1, theta_2 = middle.theta_1 * factors[0], middle.theta_2 * factors[1]
     omega_1, omega_2 = middle.omega_1 * factors[2], middle.omega_2 * factors[3]
+    rolling = RigidState(jnp.zeros_like(theta_1), theta_1, theta_2, omega_1, omega_2)
     if isinstance(scene, RigidScene):
-        return RigidState(jnp.zeros_like(theta_1), theta_1, theta_2, omega_1, omega_2)
+        return rolling
     depth = standing_height(scene, middle.theta_2) - cast("State", middle).hip_z
-    reach = scene.walker.hip_to_foot
-    plain = State(
-        hip_x=jnp.zeros_like(theta_1),
-        hip_z=standing_height(scene, theta_2, depth),
-        theta_1=theta_1,
-        theta_2=theta_2,
-        hip_vx=-(reach * jnp.cos(theta_2) + scene.walker.r) * omega_2,
-        hip_vz=-reach * jnp.sin(theta_2) * omega_2,
-        omega_1=omega_1,
-        omega_2=omega_2,
-    )
-    return state_for(scene, plain)
+    height = standing_height(scene, theta_2, depth)
+    return state_for(scene, whole_state(scene, rolling)._replace(hip_z=height))
