@@ -1,6 +1,5 @@
 """Work and precision: what each way of solving costs, and how far off it ends."""
 
-from jaxbiped.trade._gait_trade import GaitTrade as GaitTrade
 from jaxbiped.trade._reference_solution import Truth as Truth
 from jaxbiped.trade._reference_solution import truth_of as truth_of
 from jaxbiped.trade._study_row import Row as Row
@@ -11,4 +10,5 @@ from jaxbiped.trade._study_row import cost_at as cost_at
 from jaxbiped.trade._study_row import failed_row as failed_row
 from jaxbiped.trade._study_row import row_of as row_of
 from jaxbiped.trade._study_row import work_of as work_of
-from jaxbiped.trade._walk_trade import WalkTrade as WalkTrade
+from jaxbiped.trade._trades import GaitTrade as GaitTrade
+from jaxbiped.trade._trades import WalkTrade as WalkTrade

@@ -1,4 +1,4 @@
-"""Trade of a walk, against equations written a second time."""
+"""Trades of a walk and of a gait, against equations written a second time and finer tolerances."""
 
 import dataclasses
 
@@ -8,7 +8,8 @@ from reference.compliant import START
 from reference.walks import reference_states, walk
 
 import jaxbiped as jb
-from jaxbiped.trade import WalkTrade, Way
+from jaxbiped.trade import GaitTrade, WalkTrade, Way
+from tests.reference import START, reference_states, reference_works
 
 DURATION = 2.0
 LEGS = 0.40
@@ -67,3 +68,28 @@ def test_a_way_that_is_not_allowed_is_a_row(trade, truth):
 
 def test_the_start_is_the_seeds():
     np.testing.assert_array_equal(np.array(jb.seed_state()), START)
+
+
+pytestmark = pytest.mark.slow
+
+
+def test_errors_of_a_rigid_gait_shrink_with_the_tolerance():
+    seed = jb.seed_scene()
+    trade = GaitTrade(jb.RigidScene(walker=seed.walker, ground=seed.ground), repeats=1)
+    assert trade.parameters == ("slope",)
+    truth = trade.truth()
+    assert max(truth.floor.values()) < 1e-9
+    loose, tight = (
+        trade.row(Way("rodas5p", "lanes", f"rtol={r:g}", r), truth) for r in (1e-4, 1e-8)
+    )
+    assert loose.outcome == tight.outcome == "ok"
+    assert loose.attempted < tight.attempted
+    assert set(tight.errors) == {"period", "multiplier", "gradient"}
+    for axis in ("multiplier", "gradient"):
+        assert tight.errors[axis] < 1e-2 * loose.errors[axis]
+
+
+def test_no_gait_no_truth():
+    scene = jb.seed_scene(slope=-0.2)
+    assert GaitTrade(scene).parameters == ("K", "c", "xi")
+    assert GaitTrade(scene).truth() is None
