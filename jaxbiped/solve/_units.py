@@ -4,8 +4,7 @@ So that a walker of any size is solved as exactly as the seed paper's. For that 
 1, exactly, and a tolerance in them is one in SI units.
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -22,16 +21,8 @@ _LENGTH = 0.40
 """Leg length of the seed paper's walker [m]."""
 _GRAVITY = 9.8
 """Gravity in the seed paper [m/s²]."""
-_REDUNDANT = {
-    "m": ("x", "z"),
-    "m/s": ("vx", "vz"),
-    "rad/s": ("cos_rate", "sin_rate"),
-    "": ("cos_half", "sin_half"),
-}
-_SI_UNITS = {name: each.unit for name, each in STATE_QUANTITIES.items()} | {
-    f"{name}_{leg}": unit for unit, names in _REDUNDANT.items() for name in names for leg in (1, 2)
-}
-"""Of every field of a state, those of redundant coordinates included."""
+_Sizes: TypeAlias = dict[tuple[float, float], Any]
+"""Numbers by the powers of length and time in a unit."""
 
 
 class Units(NamedTuple):
@@ -59,8 +50,8 @@ def units_of(args: PyTree, state: PyTree) -> Units:
         return Units(jtu.tree_map(jnp.ones_like, state), np.ones(()))
     length, time = _length_and_time(args)
     one = length / length
-    inverse = {"m": one / length, "m/s": time / length, "rad/s": time, "rad": one, "": one}
-    return Units(_by_field(state, inverse), time)
+    inverse: _Sizes = {(1, 0): one / length, (1, -1): time / length, (0, -1): time, (0, 0): one}
+    return Units(_by_dimension(state, inverse), time)
 
 
 def si_units(units: Units) -> Units:
@@ -96,14 +87,16 @@ def sizes_of(args: PyTree, states: PyTree) -> tuple[float, PyTree]:
     """
     length, gravity = float(args.walker.l), float(args.ground.g)
     time = float(np.sqrt(length / gravity)) if gravity > 0.0 else 1.0
-    sizes = {"m": length, "m/s": length / time, "rad/s": 1.0 / time, "rad": 1.0, "": 1.0}
-    return time, _by_field(states, sizes)
+    sizes: _Sizes = {(1, 0): length, (1, -1): length / time, (0, -1): 1.0 / time, (0, 0): 1.0}
+    return time, _by_dimension(states, sizes)
 
 
-def _by_field(state: PyTree, by_unit: Mapping[str, Any]) -> PyTree:
-    """A state of what goes with the SI unit of each field; None where it has None."""
-    fields = state._asdict().items()
-    return type(state)(**{k: None if x is None else by_unit[_SI_UNITS[k]] for k, x in fields})
+def _by_dimension(state: PyTree, values: _Sizes) -> PyTree:
+    """Of each leaf of a state the value for its powers of length and time; None where it is."""
+    dimensions = dimensions_of(type(state))
+    leaves = state._asdict().items()
+    found = {name: None if leaf is None else values[dimensions[name]] for name, leaf in leaves}
+    return type(state)(**found)
 
 
 def relative_to_scene(args: PyTree, times: Numbers, states: PyTree) -> float:

@@ -56,6 +56,9 @@ def test_a_leaf_of_no_known_unit_is_refused():
 
     with pytest.raises(TypeError, match=r"Odd\.mood is not known"):
         units_of(SEED, Odd())
+    with pytest.raises(ValueError, match="lengths and times alone"):
+        _ = jb.laws.Quantity("force", unit="N").length_and_time
+    assert jb.laws.Quantity("acceleration", unit="m/s^2").length_and_time == (1.0, -2.0)
 
 
 def test_units_have_the_dimensions_of_what_they_measure():
