@@ -112,8 +112,8 @@ def branches():
         yield (
             f"{kind}, {name}",
             {
-                "values": branch.values,
-                "period": branch.period,
+                "values": [each.value for each in branch.points],
+                "periods": [each.period for each in branch.points],
                 "bifurcations": [each.value for each in branch.bifurcations],
             },
         )

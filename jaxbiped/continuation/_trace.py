@@ -97,7 +97,8 @@ def passed_before(curve: Curve, passed: Sequence[BranchPoint], there: CurvePoint
     with np.errstate(invalid="ignore", divide="ignore"):
         shares = np.sum(off * chords, axis=1) / lengths**2
     aside = np.linalg.norm(off - shares[:, None] * chords, axis=1)
-    for k in np.flatnonzero((shares >= 0.0) & (shares <= 1.0) & (aside < _CHORD_ASIDE * lengths)):
+    near = (shares >= 0.0) & (shares <= 1.0) & (aside < _CHORD_ASIDE * lengths)
+    for k in np.flatnonzero(near).tolist():
         # In the plane through the point normal to the chord, which is crossed once, also at a fold.
         t, along = shares[k], chords[k] / lengths[k]
         bend = lengths[k] * ((1.0 - t) * tangents[k] - t * tangents[k + 1])

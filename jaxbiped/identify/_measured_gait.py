@@ -105,9 +105,10 @@ def _as_array(values: npt.ArrayLike) -> npt.ArrayLike:
 
 
 def _check_seconds(name: str, values: npt.ArrayLike) -> None:
-    if holds_somewhere(np.asarray(values) > _LONGEST):
+    seconds = np.asarray(_as_array(values), dtype=float)
+    if holds_somewhere(seconds > _LONGEST):
         raise ArgumentError(
-            f"{name} = {np.max(values):g} s is not allowed: it must be at most {_LONGEST:g} s; "
+            f"{name} = {np.max(seconds):g} s is not allowed: it must be at most {_LONGEST:g} s; "
             "are these milliseconds?"
         )
 

@@ -14,7 +14,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import dimensions_of
 from jaxbiped.scene._scene import AbstractScene, is_compliant
 
 _LENGTH = 0.40

@@ -9,7 +9,6 @@ from reference.walks import reference_states, walk
 
 import jaxbiped as jb
 from jaxbiped.trade import GaitTrade, WalkTrade, Way
-from tests.reference import START, reference_states, reference_works
 
 DURATION = 2.0
 LEGS = 0.40
