@@ -16,7 +16,7 @@ from jaxbiped._types import Scalar
 # Two parts of π/2: the first has 33 bits, so that its product with a quadrant's number is exact.
 _HALF_PI_HIGH = 1.57079632673412561417e00
 _HALF_PI_LOW = 6.07710050650619224932e-11
-_SINE = (
+SINE_SERIES = (
     1.58969099521155010221e-10,
     -2.50507602534068634195e-08,
     2.75573137070700676789e-06,
@@ -24,7 +24,7 @@ _SINE = (
     8.33333333332248946124e-03,
     -1.66666666666666324348e-01,
 )
-_COSINE = (
+COSINE_SERIES = (
     -1.13596475577881948265e-11,
     2.08757232129817482790e-09,
     -2.75573143513906633035e-07,
@@ -45,9 +45,9 @@ def sine_cosine(angle: Scalar) -> tuple[Scalar, Scalar]:
     quadrant = jnp.round(mul(angle, 2.0 / jnp.pi))
     rest = sub(sub(angle, mul(quadrant, _HALF_PI_HIGH)), mul(quadrant, _HALF_PI_LOW))
     square = mul(rest, rest)
-    series = _polynomial(_SINE, square)
+    series = _polynomial(SINE_SERIES, square)
     sine = add(rest, mul(mul(rest, square), series))
-    polynomial = _polynomial(_COSINE, square)
+    polynomial = _polynomial(COSINE_SERIES, square)
     cosine = sub(1.0, sub(mul(0.5, square), mul(mul(square, square), polynomial)))
     number = quadrant.astype(jnp.int32)
     odd = (number & 1) != 0

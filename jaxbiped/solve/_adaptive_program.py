@@ -6,7 +6,6 @@ Rounding differs, and it decides on step sizes after a few steps: the steps are 
 import contextlib
 import functools
 import operator
-from collections.abc import Callable
 from typing import NamedTuple
 
 import diffrax
@@ -28,7 +27,7 @@ from jaxbiped.solve.controllers._first_and_last_step import clip_step, first_ste
 from jaxbiped.solve.controllers._footstep_counter import FootstepLimit
 from jaxbiped.solve.controllers._located_ending import LocatedEnding
 from jaxbiped.solve.controllers._walk_step_size import walk_control, weigh_crossed
-from jaxbiped.solve.controllers._wrapped_control import StepControl
+from jaxbiped.solve.controllers._wrapped_control import StepControl, widened_extremes
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock, step_of
 
 
@@ -188,7 +187,7 @@ class AdaptiveSolve:
             rejected=now.rejected + jnp.where(keep | ended, 0, 1),
             counted=counted,
             last=last,
-            extremes=self._extremes(solve.scene, now, keep, state),
+            extremes=self._widened(solve.scene, now, keep, state),
         )
         attempts = (after.accepted + after.rejected).astype(solve.max_attempts.dtype)
         over = (t >= solve.duration) | (attempts >= solve.max_attempts) | ended | counted
@@ -236,18 +235,13 @@ class AdaptiveSolve:
             solve.scene, now.last, now=(now.t, now.state), due=time, solver=self.solver
         )
 
-    def _extremes(
+    def _widened(
         self, scene: PyTree, now: _Now, keep: Scalar, state: PyTree
     ) -> tuple[PyTree, PyTree] | None:
         if now.extremes is None or self.saved.extremes is None:
             return None
         values = _numbers(self.saved.extremes(scene, state))
-
-        def chosen(combine: Callable[[Scalar, Scalar], Scalar], old: PyTree) -> PyTree:
-            return jtu.tree_map(lambda a, b: jnp.where(keep, combine(a, b), a), old, values)
-
-        low, high = now.extremes
-        return chosen(jnp.minimum, low), chosen(jnp.maximum, high)
+        return widened_extremes(keep, now.extremes, values)
 
     def _controller(self, solve: Solve, probe: PyTree = None) -> StepControl:
         control = walk_control(solve.rtol, solve.atol, solve.units)

@@ -1,7 +1,7 @@
 """Saved outputs of a solve by lanes, and how they are found within a step."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -49,6 +49,13 @@ class LastStep(NamedTuple):
     coefficients: tuple[State, ...]
     foot: Scalar | None = None
     rise: Rise | None = None
+
+    def course(
+        self, solver: AbstractRosenbrock, t: Scalar, state: State
+    ) -> RosenbrockInterpolation:
+        """Its continuous solution, where it ended at this time in this state."""
+        ends: dict[str, Any] = dict(t0=self.t, t1=t, y0=self.state, y1=state)
+        return solver.interpolation_cls(**ends, coefficients=self.coefficients)
 
 
 class Saved(NamedTuple):
@@ -133,9 +140,7 @@ class Saved(NamedTuple):
         if self.steps:
             rows = [value for row in last.coefficients for value in row]
             return last.noted, [t, *state, *rows]
-        dense = solver.interpolation_cls(
-            t0=last.t, t1=t, y0=last.state, y1=state, coefficients=last.coefficients
-        )
+        dense = last.course(solver, t, state)
         if self.section is None:
             return last.noted & (due <= t), [due, *dense.evaluate(due)]
         nothing = [jnp.zeros_like(t)] * (1 + len(state))

@@ -181,9 +181,7 @@ class CompliantLabelling(AbstractLabellingLoop):
 
         first = rises(True)
         arrives = last.noted & (first | rises(False))
-        dense = self.steps.solver.interpolation_cls(
-            t0=last.t, t1=after.t, y0=last.state, y1=after.state, coefficients=last.coefficients
-        )
+        dense = last.course(self.steps.solver, after.t, after.state)
 
         def at(time: Scalar) -> State:
             state = dense.evaluate(time)

@@ -6,21 +6,8 @@ from jaxbiped.compiler.codegen._kernel_target import KernelTarget, flush
 from jaxbiped.compiler.codegen._llvm_function import BYTES, FunctionBuilder, vector
 from jaxbiped.compiler.ir._graph import Kind
 
-_PLAIN = {
-    "fadd",
-    "fsub",
-    "fmul",
-    "fdiv",
-    "add",
-    "sub",
-    "mul",
-    "and",
-    "or",
-    "xor",
-    "shl",
-    "lshr",
-    "ashr",
-}
+_OF_FLOATS = {"fadd", "fsub", "fmul", "fdiv"}
+_OF_WHOLES = {"add", "sub", "mul", "and", "or", "xor", "shl", "lshr", "ashr"}
 _INTRINSICS = {"fabs", "sqrt", "rint", "floor", "ceil", "fma"}
 
 
@@ -43,7 +30,7 @@ def select_instruction(
         target: what it is written for.
     """
     kind, of = kinds[0], vector(kinds[1], width)
-    if op in _PLAIN:
+    if op in _OF_FLOATS or op in _OF_WHOLES:
         return text.assign(f"{op} {of} {operands[0]}, {operands[1]}")
     if op in _INTRINSICS:
         return text.intrinsic(op, kinds, operands, width)

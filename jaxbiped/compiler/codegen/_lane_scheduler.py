@@ -148,24 +148,16 @@ class LaneScheduler:
         if not many:
             return
         t = self.text
-        start, again, after = t.label, t.fresh("copy"), t.fresh("copied")
-        t.line(f"br label %{again}")
-        t.begin(again)
-        k, following = "%" + t.fresh("k"), "%" + t.fresh("k")
-        t.line(f"{k} = phi i64 [ 0, %{start} ], [ {following}, %{again} ]")
-        own_row = t.assign(f"mul i64 {k}, {self.width}")
-        here = t.assign(f"add i64 {own_row}, {lane}")
-        row = t.assign(f"mul i64 {k}, {self.field['count']}")
-        there = t.assign(f"add i64 {row}, {index}")
-        source, target = t.address(own, Kind.F64, here), t.address(array, Kind.F64, there)
-        if not out:
-            source, target = target, source
-        number = t.assign(f"load double, ptr {source}")
-        t.line(f"store double {number}, ptr {target}")
-        t.line(f"{following} = add i64 {k}, 1")
-        more = t.assign(f"icmp slt i64 {following}, {many}")
-        t.line(f"br i1 {more}, label %{again}, label %{after}")
-        t.begin(after)
+        with t.loop(t.fresh("copy"), t.fresh("copied"), many, index="k") as k:
+            own_row = t.assign(f"mul i64 {k}, {self.width}")
+            here = t.assign(f"add i64 {own_row}, {lane}")
+            row = t.assign(f"mul i64 {k}, {self.field['count']}")
+            there = t.assign(f"add i64 {row}, {index}")
+            source, target = t.address(own, Kind.F64, here), t.address(array, Kind.F64, there)
+            if not out:
+                source, target = target, source
+            number = t.assign(f"load double, ptr {source}")
+            t.line(f"store double {number}, ptr {target}")
 
     def _schedule(self, lane: str, place: str) -> None:
         """Looks up a lane's next time, infinity behind the last one."""
@@ -186,23 +178,16 @@ class LaneScheduler:
     def visit_where(self, stem: str, where: str, visit: Callable[[str], None]) -> None:
         """Visits the lanes in which a mask in memory holds."""
         t = self.text
-        start, again, here = t.label, t.fresh(stem), t.fresh(stem)
+        again, here = t.fresh(stem), t.fresh(stem)
         skip, after = t.fresh("skip"), t.fresh("after")
-        t.line(f"br label %{again}")
-        t.begin(again)
-        lane, following = "%" + t.fresh("lane"), "%" + t.fresh("lane")
-        t.line(f"{lane} = phi i64 [ 0, %{start} ], [ {following}, %{skip} ]")
-        bit = t.assign(f"load i8, ptr {t.address(self.bits[where], Kind.BOOL, lane)}")
-        holds = t.assign(f"trunc i8 {bit} to i1")
-        t.line(f"br i1 {holds}, label %{here}, label %{skip}")
-        t.begin(here)
-        visit(lane)
-        t.line(f"br label %{skip}")
-        t.begin(skip)
-        t.line(f"{following} = add i64 {lane}, 1")
-        more = t.assign(f"icmp slt i64 {following}, {self.width}")
-        t.line(f"br i1 {more}, label %{again}, label %{after}")
-        t.begin(after)
+        with t.loop(again, after, self.width, index="lane") as lane:
+            bit = t.assign(f"load i8, ptr {t.address(self.bits[where], Kind.BOOL, lane)}")
+            holds = t.assign(f"trunc i8 {bit} to i1")
+            t.line(f"br i1 {holds}, label %{here}, label %{skip}")
+            t.begin(here)
+            visit(lane)
+            t.line(f"br label %{skip}")
+            t.begin(skip)
 
     def note(self, lane: str) -> None:
         """Appends a lane's record to its simulation's, where there is room."""

@@ -142,26 +142,19 @@ class GraphWriter:
         length, inside, starts, held, ends = head.args
         start, again, after = self.text.label, self.text.fresh("again"), self.text.fresh("done")
         first = [self.use(v, width) for v in starts]
-        self.text.line(f"br label %{again}")
-        self.text.begin(again)
-        counter, following = "%" + self.text.fresh("i"), "%" + self.text.fresh("i")
-        at = len(self.text.lines)
-        names = ["%" + self.text.fresh("h") for _ in held]
-        for value, text in zip(held, names, strict=True):
-            self.name(value, text, width)
-        with self.text.scope():
-            self.write(inside, width)
-            last = [self.use(v, width) for v in ends]
-        end = self.text.label
-        phis = [f"  {counter} = phi i64 [ 0, %{start} ], [ {following}, %{end} ]"]
-        for value, text, a, b in zip(held, names, first, last, strict=True):
-            of = vector(value.kind, width)
-            phis.append(f"  {text} = phi {of} [ {a}, %{start} ], [ {b}, %{end} ]")
-        self.text.lines[at:at] = phis
-        self.text.line(f"{following} = add i64 {counter}, 1")
-        more = self.text.assign(f"icmp slt i64 {following}, {length}")
-        self.text.line(f"br i1 {more}, label %{again}, label %{after}")
-        self.text.begin(after)
+        with self.text.loop(again, after, length):
+            at = len(self.text.lines)
+            names = ["%" + self.text.fresh("h") for _ in held]
+            for value, text in zip(held, names, strict=True):
+                self.name(value, text, width)
+            with self.text.scope():
+                self.write(inside, width)
+                last = [self.use(v, width) for v in ends]
+            phis, end = zip(held, names, first, last, strict=True), self.text.label
+            self.text.lines[at:at] = [
+                f"  {name} = phi {vector(v.kind, width)} [ {a}, %{start} ], [ {b}, %{end} ]"
+                for v, name, a, b in phis
+            ]
         for part, text in zip(_parts_of(head), last, strict=True):
             self.name(part, text, width)
 
@@ -175,12 +168,8 @@ class GraphWriter:
         sources = [self._row(value.args[0].args[0][value.args[1]], padded) for value in rows]
         parts = _parts_of(head)
         targets = self._targets(head, parts, padded)
-        start, again, after = self.text.label, self.text.fresh("each"), self.text.fresh("all")
-        self.text.line(f"br label %{again}")
-        self.text.begin(again)
-        counter, following = "%" + self.text.fresh("i"), "%" + self.text.fresh("i")
-        at = len(self.text.lines)
-        with self.text.scope():
+        again, after = self.text.fresh("each"), self.text.fresh("all")
+        with self.text.loop(again, after, length, step=step) as counter, self.text.scope():
             entry = {
                 stride: self.text.assign(f"mul i64 {counter}, {stride * self.width}")
                 for stride in sorted({1, *(stride for _, stride in sources)})
@@ -190,13 +179,6 @@ class GraphWriter:
                 self.name(value, self.text.load(there, value.kind, lanes), lanes)
             wanted = [(values[k], target) for k, target in targets.items()]
             self._write_entry(inside, wanted, entry[1], lanes)
-        self.text.lines.insert(
-            at, f"  {counter} = phi i64 [ 0, %{start} ], [ {following}, %{self.text.label} ]"
-        )
-        self.text.line(f"{following} = add i64 {counter}, {step}")
-        more = self.text.assign(f"icmp slt i64 {following}, {length}")
-        self.text.line(f"br i1 {more}, label %{again}, label %{after}")
-        self.text.begin(after)
         for k, target in targets.items():
             for j, part in enumerate(parts[k * length : (k + 1) * length]):
                 self.homes[id(part)] = target._replace(offset=target.offset + j)

@@ -70,6 +70,27 @@ class FunctionBuilder:
         yield
         self._scopes.pop()
 
+    @contextmanager
+    def loop(
+        self, again: str, after: str, length: int | str, *, index: str = "i", step: int = 1
+    ) -> Iterator[str]:
+        """What is written within runs until its number, which it gives, is `length`.
+
+        `again` and `after` are the labels of the loop and of what follows it.
+        """
+        start = self.label
+        self.line(f"br label %{again}")
+        self.begin(again)
+        counter, following = "%" + self.fresh(index), "%" + self.fresh(index)
+        at = len(self.lines)
+        yield counter
+        phi = f"phi i64 [ 0, %{start} ], [ {following}, %{self.label} ]"
+        self.lines.insert(at, f"  {counter} = {phi}")
+        self.line(f"{following} = add i64 {counter}, {step}")
+        more = self.assign(f"icmp slt i64 {following}, {length}")
+        self.line(f"br i1 {more}, label %{again}, label %{after}")
+        self.begin(after)
+
     def room(self, kind: Kind, count: int) -> str:
         """Memory of the function for a number of numbers."""
         name = "%" + self.fresh("m")

@@ -8,23 +8,6 @@ import numpy as np
 
 from jaxbiped.compiler.ir._powers import whole_power
 
-__all__ = [
-    "divide_whole",
-    "dynamic_slice",
-    "eigensystem_of",
-    "factors_of",
-    "gather",
-    "padded",
-    "power_of",
-    "remainder",
-    "replaced",
-    "scatter",
-    "sorted_by",
-    "spread",
-    "stacked",
-    "triangular",
-]
-
 
 def spread(value: Any, shape: tuple[int, ...]) -> np.ndarray:
     """An array of this shape with a value that NumPy spreads over it."""

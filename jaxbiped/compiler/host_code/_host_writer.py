@@ -7,6 +7,7 @@ turn of a loop before the loop, and equal operations once.
 
 import dataclasses
 from collections.abc import Callable, Hashable, Sequence
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ _OF_NUMPY = (
     "maximum minimum multiply nextafter rint sign sin sinh sqrt tan tanh where"
 )
 NAMES: dict[str, Any] = {name: getattr(np, name) for name in _OF_NUMPY.split()} | {
-    name: getattr(_arrays, name) for name in _arrays.__all__
+    name: each for name, each in vars(_arrays).items() if isinstance(each, FunctionType)
 }
 """What a text may use beside its own constants."""
 

@@ -13,38 +13,25 @@ from jaxbiped.compiler.host_code._host_writer import (
 )
 from jaxbiped.compiler.host_code._moves import reshaped, transposed
 
-_ENTRYWISE = {
+_ELEMENTARY = ("sqrt", "exp", "log", "log1p", "log2", "expm1")
+_CIRCULAR = ("sin", "cos", "tan", "sinh", "cosh", "tanh")
+_ROUNDING = ("abs", "sign", "floor", "ceil", "conj")
+_ENTRYWISE = {name: f"{name}({{0}})" for name in (*_ELEMENTARY, *_CIRCULAR, *_ROUNDING)} | {
     "add": "({0} + {1})",
     "add_any": "({0} + {1})",
     "sub": "({0} - {1})",
     "mul": "({0} * {1})",
     "neg": "(-{0})",
-    "abs": "abs({0})",
-    "sign": "sign({0})",
     "max": "maximum({0}, {1})",
     "min": "minimum({0}, {1})",
     "pow": "({0} ** {1})",
     "square": "({0} * {0})",
-    "sqrt": "sqrt({0})",
     "rsqrt": "(1.0 / sqrt({0}))",
-    "exp": "exp({0})",
-    "log": "log({0})",
-    "log1p": "log1p({0})",
-    "log2": "log2({0})",
     "one_minus_square": "((1.0 - {0}) * (1.0 + {0}))",
-    "expm1": "expm1({0})",
-    "sin": "sin({0})",
-    "cos": "cos({0})",
-    "tan": "tan({0})",
     "asin": "arcsin({0})",
     "acos": "arccos({0})",
     "atan": "arctan({0})",
     "atan2": "arctan2({0}, {1})",
-    "sinh": "sinh({0})",
-    "cosh": "cosh({0})",
-    "tanh": "tanh({0})",
-    "floor": "floor({0})",
-    "ceil": "ceil({0})",
     "nextafter": "nextafter({0}, {1})",
     "eq": "({0} == {1})",
     "ne": "({0} != {1})",
@@ -59,7 +46,6 @@ _ENTRYWISE = {
     "is_finite": "isfinite({0})",
     "real": "({0}.real)",
     "imag": "({0}.imag)",
-    "conj": "conj({0})",
     "clamp": "minimum(maximum({1}, {0}), {2})",
 }
 _SAME = ("stop_gradient", "copy", "copy_p", "optimization_barrier")

@@ -7,6 +7,7 @@ the errors in units in the last place.
 import math
 from collections.abc import Callable, Sequence
 
+from jaxbiped._circular import COSINE_SERIES, SINE_SERIES
 from jaxbiped.compiler.ir._graph import Block, Kind, Value
 
 
@@ -177,23 +178,6 @@ def logarithm(m: Arithmetic, x: Value) -> Value:
 HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591833e-33)
 """π/2 in three parts."""
 LARGE_ANGLE = 2.0**20
-_SINE = (
-    1.58969099521155010221e-10,
-    -2.50507602534068634195e-08,
-    2.75573137070700676789e-06,
-    -1.98412698298579493134e-04,
-    8.33333333332248946124e-03,
-    -1.66666666666666324348e-01,
-)
-_COSINE = (
-    -1.13596475577881948265e-11,
-    2.08757232129817482790e-09,
-    -2.75573143513906633035e-07,
-    2.48015872894767294178e-05,
-    -1.38888888888741095749e-03,
-    4.16666666666666019037e-02,
-)
-"""Minimax coefficients on [−π/4, π/4] (FreeBSD's msun, k_sin.c and k_cos.c)."""
 
 
 def _quarter_turns(m: Arithmetic, x: Value) -> tuple[Value, Value, Value]:
@@ -210,11 +194,11 @@ def _quarter_turns(m: Arithmetic, x: Value) -> tuple[Value, Value, Value]:
 def within_quarter(m: Arithmetic, rest: Value, low: Value) -> tuple[Value, Value]:
     """Sine and cosine of `rest` + `low`, at most π/4 and a little."""
     z = m.mul(rest, rest)
-    cubed = m.mul(m.mul(rest, z), m.series(z, _SINE))
+    cubed = m.mul(m.mul(rest, z), m.series(z, SINE_SERIES))
     half = m.mul(z, 0.5)
     near = m.sub(1.0, half)
     lost = m.sub(m.sub(1.0, near), half)
-    curved = m.fma(m.mul(z, z), m.series(z, _COSINE), lost)
+    curved = m.fma(m.mul(z, z), m.series(z, COSINE_SERIES), lost)
     cosine = m.add(near, m.fma(m.neg(rest), low, curved))
     return m.add(rest, m.fma(low, near, cubed)), cosine
 

@@ -237,10 +237,16 @@ def _exponential(block: Block, a: Value, **_: object) -> Value:
     return _elementary(elementary.exponential)(block, a)
 
 
+_PASSED_ON = ("stop_gradient", "copy", "copy_p", "optimization_barrier", "reduce_precision")
+_OVER_LANES = ("unvmap_any", "unvmap_all", "unvmap_max")
+"""Conditions over all lanes of a batch: here each is one over this lane."""
+
+
 def _same(block: Block, a: Value, **_: object) -> Value:
     return a
 
 
+_SAME: dict[str, Rule] = dict.fromkeys((*_PASSED_ON, *_OVER_LANES), _same)
 ELEMENTWISE: dict[str, Rule] = {
     "add": _arithmetic("fadd", "add"),
     "add_any": _arithmetic("fadd", "add"),
@@ -281,13 +287,5 @@ ELEMENTWISE: dict[str, Rule] = {
     "select_n": _select,
     "clamp": _clamp,
     "convert_element_type": _convert,
-    "stop_gradient": _same,
-    "copy": _same,
-    "copy_p": _same,
-    "optimization_barrier": _same,
-    "reduce_precision": _same,
-    "unvmap_any": _same,
-    "unvmap_all": _same,
-    "unvmap_max": _same,
+    **_SAME,
 }
-"""A condition over all lanes of a batch is here one over this lane."""

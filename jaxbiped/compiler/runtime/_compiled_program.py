@@ -4,14 +4,13 @@ import contextlib
 import pickle
 import threading
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped.compiler.runtime._buffer_pool import BufferPool
 from jaxbiped.compiler.runtime._host_cpu import default_threads, run_in_threads
 from jaxbiped.compiler.runtime._kernel import Kernel
 from jaxbiped.compiler.runtime._processor import (
@@ -163,7 +162,7 @@ class CompiledProgram:
         schedule: np.ndarray | None = None,
         stream: Sequence[np.ndarray] | None = None,
         room: int = 0,
-        memory: BufferPool | None = None,
+        memory: Callable[[tuple[int, ...]], np.ndarray] = np.zeros,
         threads: int | None = None,
         width: int | None = None,
         quick: bool = False,
@@ -176,7 +175,7 @@ class CompiledProgram:
             stream: rows for each simulation, n arrays (rows, numbers), if the program reads any;
                 from the last one on where it reads `backwards`.
             room: records that each simulation has room for.
-            memory: where the records lie; beyond them there is anything.
+            memory: makes the array for the records, beyond which there is what it holds.
             threads: how many to use; the environment's or the machine's choice unless given.
             width: simulations in one vector; the results do not depend on it.
             quick: whether one thread's work is so short that nobody could interrupt it.
@@ -191,7 +190,7 @@ class CompiledProgram:
         times = np.ascontiguousarray([] if schedule is None else schedule, dtype=np.float64)
         streams = input_streams_of(stream, count, signature.row, backwards=signature.backwards)
         shape = (count, room, signature.recorded)
-        records = np.zeros(shape) if memory is None else memory.array(shape)
+        records = memory(shape)
         if schedule is not None:
             records[:] = np.nan
         record_counts = np.zeros(count, dtype=np.int64)

@@ -4,7 +4,7 @@ diffrax looks for tolerances and norm on the controller it is given, whatever th
 """
 
 import abc
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self
 
 import equinox as eqx
@@ -159,15 +159,23 @@ class Extremes(AbstractWrappedControl):
 
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, and looks."""
-        inner, lowest, highest = attempt.memory
+        inner, *extremes = attempt.memory
         adapted = attempt.by(self.controller, memory=inner)
         value = self.function(attempt.args, attempt.y1)
+        wider = widened_extremes(adapted.keep, extremes, value)
+        return adapted._replace(memory=(adapted.memory, *wider))
 
-        def kept(choose: Callable[[Scalar, Scalar], Scalar], old: PyTree) -> PyTree:
-            return jtu.tree_map(lambda a, b: jnp.where(adapted.keep, choose(a, b), a), old, value)
 
-        extremes = kept(jnp.minimum, lowest), kept(jnp.maximum, highest)
-        return adapted._replace(memory=(adapted.memory, *extremes))
+def widened_extremes(
+    keep: Scalar, extremes: Sequence[PyTree], values: PyTree
+) -> tuple[PyTree, PyTree]:
+    """Least and largest values with those at the end of a step, where that is kept."""
+
+    def chosen(choose: Callable[[Scalar, Scalar], Scalar], old: PyTree) -> PyTree:
+        return jtu.tree_map(lambda a, b: jnp.where(keep, choose(a, b), a), old, values)
+
+    lowest, highest = extremes
+    return chosen(jnp.minimum, lowest), chosen(jnp.maximum, highest)
 
 
 class GivenFirstStep(AbstractWrappedControl):

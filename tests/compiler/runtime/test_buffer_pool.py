@@ -6,7 +6,7 @@ import gc
 import numpy as np
 import pytest
 
-from jaxbiped.compiler.runtime._buffer_pool import BufferPool
+from jaxbiped.compiler.runtime._record_cache import BufferPool
 
 
 def _address(array):
