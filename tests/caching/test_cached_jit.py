@@ -146,7 +146,7 @@ def test_its_shape_is_known_before_and_after(cache):
 
 WALK = """
 import jaxbiped as jb
-from jaxbiped import _cached_jit, _compiled_store
+from jaxbiped.caching import _cached_jit, _compiled_store
 from jaxbiped.compiler.runtime import _kernel
 import sys
 if sys.argv[1] == "loads":
