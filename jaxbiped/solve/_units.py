@@ -4,7 +4,7 @@ So that a walker of any size is solved as exactly as the seed paper's. For that 
 1, exactly, and a tolerance in them is one in SI units.
 """
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -13,16 +13,16 @@ import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.dynamics._formulation import state_type
-from jaxbiped.scene._abstract_scene import AbstractScene, is_compliant
+from jaxbiped.dynamics._state import state_type
+from jaxbiped.dynamics._state_quantities import dimensions_of
+from jaxbiped.scene._scene import AbstractScene, is_compliant
 
 _LENGTH = 0.40
 """Leg length of the seed paper's walker [m]."""
 _GRAVITY = 9.8
 """Gravity in the seed paper [m/s²]."""
-_LENGTHS = ("hip_x", "hip_z", "x_1", "z_1", "x_2", "z_2")
-_SPEEDS = ("hip_vx", "hip_vz", "vx_1", "vz_1", "vx_2", "vz_2")
-_RATES = ("omega_1", "omega_2", "cos_rate_1", "sin_rate_1", "cos_rate_2", "sin_rate_2")
+_Sizes: TypeAlias = dict[tuple[float, float], Any]
+"""Numbers by the powers of length and time in a unit."""
 
 
 class Units(NamedTuple):
@@ -50,13 +50,8 @@ def units_of(args: PyTree, state: PyTree) -> Units:
         return Units(jtu.tree_map(jnp.ones_like, state), np.ones(()))
     length, time = _length_and_time(args)
     one = length / length
-    by_name = dict.fromkeys(_LENGTHS, one / length)
-    by_name |= dict.fromkeys(_SPEEDS, time / length) | dict.fromkeys(_RATES, time)
-    inverse = {
-        name: None if leaf is None else by_name.get(name, one)
-        for name, leaf in state._asdict().items()
-    }
-    return Units(type(state)(**inverse), time)
+    inverse: _Sizes = {(1, 0): one / length, (1, -1): time / length, (0, -1): time, (0, 0): one}
+    return Units(_by_dimension(state, inverse), time)
 
 
 def si_units(units: Units) -> Units:
@@ -92,13 +87,16 @@ def sizes_of(args: PyTree, states: PyTree) -> tuple[float, PyTree]:
     """
     length, gravity = float(args.walker.l), float(args.ground.g)
     time = float(np.sqrt(length / gravity)) if gravity > 0.0 else 1.0
-    by_name = dict.fromkeys(_LENGTHS, length) | dict.fromkeys(_SPEEDS, length / time)
-    by_name |= dict.fromkeys(_RATES, 1.0 / time)
-    sizes = {
-        name: None if leaf is None else by_name.get(name, 1.0)
-        for name, leaf in states._asdict().items()
-    }
-    return time, type(states)(**sizes)
+    sizes: _Sizes = {(1, 0): length, (1, -1): length / time, (0, -1): 1.0 / time, (0, 0): 1.0}
+    return time, _by_dimension(states, sizes)
+
+
+def _by_dimension(state: PyTree, values: _Sizes) -> PyTree:
+    """Of each leaf of a state the value for its powers of length and time; None where it is."""
+    dimensions = dimensions_of(type(state))
+    leaves = state._asdict().items()
+    found = {name: None if leaf is None else values[dimensions[name]] for name, leaf in leaves}
+    return type(state)(**found)
 
 
 def relative_to_scene(args: PyTree, times: Numbers, states: PyTree) -> float:

@@ -13,7 +13,7 @@ from typing import NamedTuple, Optional, TypeAlias
 
 import numpy as np
 
-from jaxbiped._caches import half_of_cache_bytes, register_bytes
+from jaxbiped.caching._caches import half_of_cache_bytes, register_bytes
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._host_cpu import default_threads
 
