@@ -6,7 +6,7 @@ import io
 import os
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any
 
 import tyro
 from tyro.conf import subcommand
@@ -15,19 +15,21 @@ from jaxbiped._checks import ArgumentError, ResourceError
 from jaxbiped._environment import check_environment
 from jaxbiped._files import user_path
 from jaxbiped._progress import tell_stages
+from jaxbiped.cli._basin import Basin
+from jaxbiped.cli._cache import Cache
+from jaxbiped.cli._constraints import Constraints
+from jaxbiped.cli._continue import ContinueGait
+from jaxbiped.cli._doctor import Doctor
+from jaxbiped.cli._fit import Fit
+from jaxbiped.cli._gait import FindGait
+from jaxbiped.cli._models import Models
+from jaxbiped.cli._optimise import Optimise
+from jaxbiped.cli._options import Command
 from jaxbiped.cli._refusal import one_sentence
 from jaxbiped.cli._report import Report as Report
-from jaxbiped.cli.commands._basin import Basin
-from jaxbiped.cli.commands._cache import Cache
-from jaxbiped.cli.commands._constraints import Constraints
-from jaxbiped.cli.commands._continue import ContinueGait
-from jaxbiped.cli.commands._doctor import Doctor
-from jaxbiped.cli.commands._fit import Fit
-from jaxbiped.cli.commands._gait import FindGait
-from jaxbiped.cli.commands._models import Models
-from jaxbiped.cli.commands._optimise import Optimise
-from jaxbiped.cli.commands._trade import Trade
-from jaxbiped.cli.commands._walk import Walk
+from jaxbiped.cli._trade import Trade
+from jaxbiped.cli._walk import Walk
+from jaxbiped.cli.commands._extremes import Extremes
 
 _Command = (
     Annotated[Walk, subcommand("walk")]
@@ -49,16 +51,6 @@ _MOVED = {
     "experiments/extremes.py in jaxbiped's repository."
 }
 """Commands of the last release, and where what they did is now."""
-
-
-class _Runnable(Protocol):
-    """A command with its options."""
-
-    def check(self) -> None:
-        """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-
-    def run(self) -> int:
-        """Runs it; returns the exit code."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -129,7 +121,7 @@ def _with_home(options: Any) -> Any:
     return dataclasses.replace(options, **changed) if changed else options
 
 
-def _parse(arguments: list[str]) -> _Runnable | None:
+def _parse(arguments: list[str]) -> Command | Extremes | None:
     """The command; exits with 2 and one sentence where there is none."""
     refusal = io.StringIO()
     try:

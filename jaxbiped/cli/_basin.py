@@ -5,97 +5,138 @@ import math
 import time
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-
+import jaxbiped as jb
+from jaxbiped import _clock
 from jaxbiped._progress import stage
-from jaxbiped._types import JsonObject
-from jaxbiped.basins._fractions import fractions as fractions_of
-from jaxbiped.basins._label_errors import LabelErrors, label_errors
-from jaxbiped.basins._labels import Doubt, label_names
-from jaxbiped.caching import _import_time
-from jaxbiped.cli._report import Report, table
-from jaxbiped.cli.commands._basin import Basin
-from jaxbiped.dynamics._state import RigidState, State
-from jaxbiped.scene._parameter_access import parameter_values
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.solve._accuracy import accuracy_told
-from jaxbiped.sweep._labelling import Labelling
-from jaxbiped.sweep._labelling_preparation import labelling
-from jaxbiped.sweep._labelling_settings import effort_of
-from jaxbiped.sweep._store_files import check_store
-from jaxbiped.sweep._sweep import sweep
-from jaxbiped.sweep.starts._coordinates import COORDINATES, coordinate_quantities
-from jaxbiped.sweep.starts._starts import AbstractStarts, GivenStarts
+from jaxbiped.cli._basin_starts import StartsOptions
+from jaxbiped.cli._options import (
+    AnyAccuracy,
+    Command,
+    Count,
+    Engine,
+    Options,
+    OutputOptions,
+    make_folder,
+)
+from jaxbiped.cli._report import Report, columns
+from jaxbiped.cli._scene_options import SceneOptions, minimal
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    import numpy as np
     import xarray
 
-_MOST_ROWS = 64
+    from jaxbiped._types import JsonObject
+    from jaxbiped.sweep.starts._starts import AbstractStarts
+
+_GAIT = {
+    "gait": "{0[name]}",
+    "period s": "{0[duration_s]:.6f}",
+    "length m": "{0[step_length_m]:.6f}",
+    "largest multiplier": "{0[largest]:.5f}",
+    "radius": "{0[radius]:.3g}",
+}
+_REDUNDANT = (
+    'formulation = "redundant" is not allowed for a basin: starts are labelled in minimal '
+    "coordinates."
+)
 
 
-def run(options: Basin) -> int:
-    """Runs the command; returns the exit code."""
-    scene = options.scene.scene()
-    assert not isinstance(scene, RedundantScene)
-    starts = options.starts.chosen(scene)
-    how: dict[str, Any] = dict(
-        footsteps=options.sweep.footsteps,
-        accuracy=accuracy_told(options.sweep.accuracy),
-        engine=options.sweep.engine,
-    )
-    effort = effort_of(scene, **how)
-    options.output.check()
-    if options.sweep.store is not None:
-        check_store(options.sweep.store)
-    executor, workers = options.sweep.executor()
-    with stage("finding the gaits that starts are labelled by"):
-        known = labelling(scene, parameters=starts.parameters, **how)
-    began = time.perf_counter()
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # the report says it
-            found = sweep(
-                known,
-                starts,
-                store=options.sweep.store,
-                any_version=options.sweep.any_version,
-                chunk=options.sweep.chunk,
-                executor=executor,
-                workers=workers,
-                progress=True,
-            )
-    finally:
-        if executor is not None:
-            executor.shutdown()
-    seconds = time.perf_counter() - began
-    numbers = basin_numbers(found, seconds) | {"engine": effort.engine}
-    if isinstance(starts, GivenStarts):
-        numbers["labels"] = _names(found).tolist()
-    report = Report(options.output.json)
-    _print(report, numbers)
-    if options.output.out is not None:
-        with stage("drawing the basin"):
-            paths = _write_results(found, known, starts, options.output.out)
-        for path in paths:
-            report.say(f"wrote {path}")
-    numbers["wall_s"] = time.perf_counter() - _import_time.IMPORT_BEGAN
-    report.finish(numbers)
-    return 0
+class SweepOptions(Options, of=("labelling", "sweep")):
+    """How starts are followed, and where the results go."""
+
+    footsteps: Count
+    """After which a start that is not certain yet is unresolved."""
+    accuracy: AnyAccuracy
+    """How accurately to solve: draft, balanced or tight; or the share of the labels that may be
+    wrong, such as 1e-4."""
+    engine: Engine
+    store: Path | None
+    """Zarr store for the results; a run that was killed continues there."""
+    any_version: bool
+    """Continue a store that another version or revision of jaxbiped wrote."""
+    chunk: Count
+    workers: Count = 1
+    """Processes of this machine that share the work, each with its share of the cores."""
+    scheduler: str | None = None
+    """Address of a dask scheduler whose workers do the work."""
+
+    def executor(self) -> "tuple[Executor | None, int]":
+        """What runs the chunks, and how many at once; raises `ArgumentError`."""
+        if self.scheduler is not None:
+            return jb.cluster_executor(self.scheduler)
+        return (None if self.workers == 1 else jb.local_executor(self.workers)), self.workers
 
 
-def basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
+class Basin(Command):
+    """Label many starts: which walk on and in which gait, and how the others end."""
+
+    scene: Annotated[SceneOptions, minimal(_REDUNDANT)]
+    starts: StartsOptions
+    sweep: SweepOptions
+    output: OutputOptions
+
+    def run(self) -> int:
+        """Runs the command; returns the exit code."""
+        from jaxbiped.solve._accuracy import accuracy_told
+        from jaxbiped.sweep._effort import effort_of
+        from jaxbiped.sweep._zarr_store import check_store
+
+        scene: Any = self.scene.scene()
+        starts = self.starts.chosen(scene)
+        how = self.sweep.arguments("labelling")
+        how["accuracy"] = accuracy_told(self.sweep.accuracy)
+        effort = effort_of(scene, **how)
+        make_folder(self.output.out)
+        if self.sweep.store is not None:
+            check_store(self.sweep.store)
+        executor, workers = self.sweep.executor()
+        with stage("finding the gaits that starts are labelled by"):
+            known = jb.labelling(scene, parameters=starts.parameters, **how)
+        began = time.perf_counter()
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)  # the report says it
+                found = jb.sweep(
+                    known,
+                    starts,
+                    executor=executor,
+                    progress=True,
+                    **self.sweep.arguments("sweep") | {"workers": workers},
+                )
+        finally:
+            if executor is not None:
+                executor.shutdown()
+        seconds = time.perf_counter() - began
+        numbers = _basin_numbers(found, seconds) | {"engine": effort.engine}
+        if isinstance(starts, jb.starts.GivenStarts):
+            numbers["labels"] = _label_names(found)
+        report = Report(self.output.json)
+        _print(report, numbers)
+        if self.output.out is not None:
+            with stage("drawing the basin"):
+                paths = _write_results(found, known, starts, self.output.out)
+            report.wrote(paths)
+        numbers["wall_s"] = time.perf_counter() - _clock.IMPORT_BEGAN
+        report.finish(numbers)
+        return 0
+
+
+def _basin_numbers(found: "xarray.Dataset", seconds: float) -> "JsonObject":
     """What is known of a basin in SI units, ready for JSON."""
-    doubt = found.doubt.values == int(Doubt.REMAINS) if "doubt" in found else None
-    fractions = fractions_of(_names(found), doubt=doubt)
+    remains = int(jb.basins.Doubt.REMAINS)
+    doubt = found.doubt.values == remains if "doubt" in found else None
+    fractions = jb.basins.fractions(_label_names(found), doubt=doubt)
     fresh = int(found.attrs["labelled_in_this_run"])
     gaits = [
         gait | {"parameters": row["parameters"]}
         for row in json.loads(found.attrs["gaits"])
         for gait in row["gaits"]
     ]
-    return {
+    numbers = {
         "fractions": {name: [f.estimate, f.low, f.high] for name, f in fractions.items()},
         "counts": {name: f.count for name, f in fractions.items()},
         "starts": int(found.label.size),
@@ -104,35 +145,36 @@ def basin_numbers(found: "xarray.Dataset", seconds: float) -> JsonObject:
         "mean_footsteps": float(found.footsteps.mean()),
         "solver_steps": int(found.attempted.sum()),
         "gaits": gaits,
-    } | ({"label_errors": label_errors(found).numbers()} if "doubt" in found else {})
+    }
+    if doubt is not None:
+        numbers["label_errors"] = jb.basins.label_errors(found).numbers()
+    return numbers
 
 
-def _names(found: "xarray.Dataset") -> np.ndarray:
-    return label_names(found.label.values, found.cycle_footsteps.values)
+def _label_names(found: "xarray.Dataset") -> "np.ndarray":
+    return jb.basins.label_names(found.label.values, found.cycle_footsteps.values)
 
 
-def _print(report: Report, numbers: JsonObject) -> None:
+def _print(report: Report, numbers: "JsonObject") -> None:
+    layout = {
+        "label": "{0[0]}",
+        "starts": "{0[1]}",
+        "%": "{0[2]:.2f}",
+        "from": "{0[3]:.2f}",
+        "to": "{0[4]:.2f}",
+    }
     rows = [
-        (name, str(numbers["counts"][name]), *(f"{100 * value:.2f}" for value in values))
+        (name, numbers["counts"][name], *(100.0 * value for value in values))
         for name, values in numbers["fractions"].items()
     ]
-    report.say(table(("label", "starts", "%", "from", "to"), rows, most=_MOST_ROWS))
     told = " and labels in doubt" if "label_errors" in numbers else ""
-    report.say(f"from, to: 95 % interval by Wilson{told}")
-    report.say()
-    head = ("gait", "period s", "length m", "largest multiplier", "radius")
-    rows = [
-        (
-            f"period-{gait['cycle_footsteps']}" + _at(gait["parameters"]),
-            f"{gait['duration_s']:.6f}",
-            f"{gait['step_length_m']:.6f}",
-            f"{math.hypot(*gait['multipliers'][0]):.5f}",
-            f"{gait['radius']:.3g}",
-        )
-        for gait in numbers["gaits"]
-    ]
-    report.say(table(head, rows, most=_MOST_ROWS) if rows else "no stable gait is known")
-    report.say()
+    report.say(columns(layout, rows), f"from, to: 95 % interval by Wilson{told}", "")
+    gaits = []
+    for gait in numbers["gaits"]:
+        at = "".join(f", {name} {value:.4g}" for name, value in gait["parameters"].items())
+        name, largest = f"period-{gait['cycle_footsteps']}{at}", math.hypot(*gait["multipliers"][0])
+        gaits.append(gait | {"name": name, "largest": largest})
+    report.say(columns(_GAIT, gaits) if gaits else "no stable gait is known", "")
     report.say(
         f"{numbers['starts']} starts, {numbers['labelled_in_this_run']} of them labelled in this "
         f"run: {numbers['starts_per_s']:.0f} starts/s; {numbers['mean_footsteps']:.1f} footsteps "
@@ -140,26 +182,19 @@ def _print(report: Report, numbers: JsonObject) -> None:
         f"engine {numbers['engine']}"
     )
     if "label_errors" in numbers:
-        report.say(LabelErrors(**numbers["label_errors"]).sentence())
-
-
-def _at(parameters: dict[str, float]) -> str:
-    return "".join(f", {name} {value:.4g}" for name, value in parameters.items())
+        report.say(jb.basins.LabelErrors(**numbers["label_errors"]).sentence())
 
 
 def _write_results(
-    found: "xarray.Dataset", known: Labelling, starts: AbstractStarts, out: Path
+    found: "xarray.Dataset", known: "jb.Labelling", starts: "AbstractStarts", out: Path
 ) -> list[Path]:
     """Writes the results, and the picture where there are two axes; returns the paths."""
     paths = [out / "basin.nc"]
     found.to_netcdf(paths[0])
-    names = list(starts.axes)
-    if len(names) == 2 and min(starts.shape) > 1:
-        from jaxbiped import plot
-
-        y, x = names
-        quantities = coordinate_quantities(known.scene)
-        figure = plot.basin(
+    if len(starts.axes) == 2 and min(starts.shape) > 1:
+        y, x = starts.axes
+        quantities = jb.starts.coordinate_quantities(known.scene)
+        figure = jb.plot.basin(
             found.label.values,
             found[x].values,
             found[y].values,
@@ -172,16 +207,13 @@ def _write_results(
     return paths
 
 
-def _mark(known: Labelling, x: str, y: str) -> tuple[float, float] | None:
+def _mark(known: "jb.Labelling", x: str, y: str) -> tuple[float, float] | None:
     """Where the gait of the scene itself is in these coordinates, if it has one."""
+    from jaxbiped.sweep.starts._coordinates import COORDINATES
+
     gaits = [gait for row in known.family.rows for gait in row]
     if known.family.names or not gaits:
         return None
-    place = [_value(known.scene, gaits[0].state, name) for name in (x, y)]
-    return place[0], place[1]
-
-
-def _value(scene: Scene | RigidScene, state: State | RigidState, name: str) -> float:
-    if name in COORDINATES:
-        return float(getattr(state, COORDINATES[name]))
-    return float(parameter_values(scene)[name])
+    values: dict[str, Any] = dict(jb.parameter_values(known.scene))
+    values |= {name: getattr(gaits[0].state, leaf, None) for name, leaf in COORDINATES.items()}
+    return float(values[x]), float(values[y])

@@ -2,36 +2,78 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import jax
-import numpy as np
-
-from jaxbiped._ending import Ending
+import jaxbiped as jb
+from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
-from jaxbiped._types import as_float
-from jaxbiped.cli._integrator import Integrator
-from jaxbiped.compiler import default_threads
-from jaxbiped.constraints._constraint_methods import method_named
-from jaxbiped.dynamics._redundant_motion import violation
-from jaxbiped.dynamics._redundant_state import minimal_state
-from jaxbiped.dynamics._state import WalkerState
-from jaxbiped.scene._scene import RedundantScene, Scene
-from jaxbiped.simulate._simulation import Simulation
-from jaxbiped.solve._solvers import solver_named
-from jaxbiped.solve._trajectory import Trajectory
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.cli._declarations import names
+
+if TYPE_CHECKING:
+    import numpy as np
 
 ASTRAY = 0.05
 """Error of the state (SI units) from which a run that came to its end has still failed."""
+_EXPLICIT = ("bosh3", "tsit5", "dopri5", "dopri8", "euler", "runge2")
+"""Solvers whose steps solve no equations: their programs are small, quickly compiled."""
 _TRUTH = 1e-10
 _MOST_STEPS = 1 << 25
 _MOMENT = 1e-6
 """Share of the duration that is simulated to compile a program."""
 _LONG = 1.0
 """Time of runs after which none is repeated [s]."""
+
+
+class Integrator(NamedTuple):
+    """How to integrate: a solver's name, and its tolerance or its step.
+
+    Attributes:
+        solver: one of `SOLVERS`.
+        rtol: relative tolerance; None for steps of one size.
+        dt: that size [s]; None under error control.
+    """
+
+    solver: str
+    rtol: float | None = None
+    dt: float | None = None
+
+    @staticmethod
+    def read(text: str) -> "Integrator":
+        """From `rodas4:1e-6` (a tolerance) or `euler:dt=1e-6` (a step [s]).
+
+        Raises:
+            ArgumentError: anything else.
+        """
+        solvers = names("solvers.SOLVERS")
+        name, _, number = text.partition(":")
+        fixed = number.startswith("dt=")
+        try:
+            value = float(number.removeprefix("dt="))
+        except ValueError:
+            value = -1.0
+        if name not in solvers or not value > 0.0:
+            raise ArgumentError(
+                f"integrator = {text!r} is not allowed: write SOLVER:TOLERANCE or SOLVER:dt=STEP, "
+                f"the solver one of {', '.join(solvers)}."
+            )
+        return Integrator(name, dt=value) if fixed else Integrator(name, rtol=value)
+
+    @property
+    def by_lanes(self) -> bool:
+        """Whether lanes have it: their programs are made in a seventh of the time of XLA's."""
+        import jax
+
+        solver = jb.solvers.SOLVERS[self.solver]()
+        able = self.dt is None and isinstance(solver, jb.solvers.AbstractRosenbrock)
+        return able and jax.default_backend() == "cpu"
+
+    @property
+    def work(self) -> int:
+        """About how much a run is, most of it compiling, in units of a timing."""
+        if self.by_lanes:
+            return 2
+        return 3 if self.solver in _EXPLICIT else 12
 
 
 class ConstraintRun(NamedTuple):
@@ -65,8 +107,8 @@ class ConstraintRun(NamedTuple):
 
 
 def compare_constraints(
-    scene: Scene,
-    state: WalkerState,
+    scene: "jb.Scene",
+    state: Any,
     *,
     duration: float,
     integrators: Sequence[Integrator],
@@ -87,16 +129,23 @@ def compare_constraints(
         integrators: how to integrate.
         methods: some of `CONSTRAINT_METHODS`.
         repeats: runs of which the fastest counts; none is repeated once they took a second.
-        advance: is told of work that is done, `work_of` an integrator for each run.
+        advance: is told of work that is done, `work` of an integrator for each run.
 
     Yields:
         A `ConstraintRun` for every pair of method and integrator as it is done, the integrators
         with the quickest programs first, the methods of each together.
     """
+    from concurrent.futures import ThreadPoolExecutor
+
+    from jaxbiped.compiler import default_threads
+
     with stage("simulating the minimal formulation to compare with"):
         truth = final_truth(scene, state, duration)
-    scenes = {name: RedundantScene(scene, method_named(name)) for name in methods}
-    quick_first = sorted(integrators, key=work_of)
+    scenes = {
+        name: jb.RedundantScene(scene, jb.constraints.CONSTRAINT_METHODS[name]())
+        for name in methods
+    }
+    quick_first = sorted(integrators, key=lambda each: each.work)
     every = [(name, integrator) for integrator in quick_first for name in methods]
     threads = default_threads()
     with ThreadPoolExecutor(threads) as pool:
@@ -108,39 +157,31 @@ def compare_constraints(
             ]
             for (_, integrator), future in zip(some, futures, strict=True):
                 future.result()
-                advance(work_of(integrator) - 1)
+                advance(integrator.work - 1)
             for (name, integrator), future in zip(some, futures, strict=True):
                 yield _run(name, scenes[name], integrator, future.result(), truth, repeats)
                 advance(1)
 
 
-def work_of(integrator: Integrator) -> int:
-    """About how much work one of its runs is, most of it compiling, in units of a timing."""
-    if by_lanes(integrator):
-        return 2
-    return 3 if integrator.explicit else 12
-
-
-def by_lanes(integrator: Integrator) -> bool:
-    """Whether lanes have it: their programs are made in a seventh of the time of XLA's."""
-    solver = solver_named(integrator.solver)
-    able = integrator.dt is None and isinstance(solver, AbstractRosenbrock)
-    return able and jax.default_backend() == "cpu"
-
-
-def final_truth(scene: Scene, state: WalkerState, duration: float) -> np.ndarray:
+def final_truth(scene: "jb.Scene", state: Any, duration: float) -> "np.ndarray":
     """The minimal formulation's state after a time, at a tolerance of 1e-10; (8,) or (10,)."""
-    request = Simulation.prepare(
+    import numpy as np
+
+    request = jb.Simulation.prepare(
         scene, state, duration=duration, rtol=_TRUTH, save="end", max_solver_steps=_MOST_STEPS
     )
     return np.array(request().final)
 
 
 def _compiled(
-    scene: RedundantScene, state: WalkerState, duration: float, integrator: Integrator
-) -> Simulation:
+    scene: "jb.RedundantScene", state: Any, duration: float, integrator: Integrator
+) -> "jb.Simulation":
     """The request, whose program is compiled: another duration, tolerance or step runs the same."""
-    request = Simulation.prepare(
+    import jax
+
+    from jaxbiped._types import as_float
+
+    request = jb.Simulation.prepare(
         scene,
         state,
         duration=duration,
@@ -148,10 +189,10 @@ def _compiled(
         rtol=integrator.rtol,
         dt=integrator.dt,
         save="end",
-        extremes=violation,
+        extremes=jb.dynamics.violation,
         watch=(),  # stops for nothing but a failure
         max_solver_steps=_MOST_STEPS,
-        engine="lanes" if by_lanes(integrator) else "xla",
+        engine="lanes" if integrator.by_lanes else "xla",
     )
     # XLA takes over where the scene holds an operation that lanes lack.
     request = replace(request, replaceable=True)
@@ -162,23 +203,24 @@ def _compiled(
 
 def _run(
     name: str,
-    scene: RedundantScene,
+    scene: "jb.RedundantScene",
     integrator: Integrator,
-    request: Simulation,
-    truth: np.ndarray,
+    request: "jb.Simulation",
+    truth: "np.ndarray",
     repeats: int,
 ) -> ConstraintRun:
+    import numpy as np
+
     found, seconds = time_run(request, repeats)
-    final = np.array(minimal_state(scene, found.final))
+    final = np.array(jb.dynamics.minimal_state(scene, found.final))
     error = float(np.max(np.abs(final - truth)))
-    outcome = found.outcome
-    stood = outcome == Ending.WALKING and error < ASTRAY
+    failed = found.outcome == jb.Ending.WALKING and not error < ASTRAY
     return ConstraintRun(
         method=name,
         integrator=integrator.solver,
         rtol_or_dt=float(integrator.dt if integrator.rtol is None else integrator.rtol),  # type: ignore[arg-type]
         fixed=integrator.dt is not None,
-        ending=str(outcome) if stood or outcome != Ending.WALKING else "failed",
+        ending="failed" if failed else str(found.outcome),
         max_violation_m=float(found.highest.position),
         max_violation_rate=float(found.highest.rate),
         state_error=error,
@@ -188,8 +230,10 @@ def _run(
     )
 
 
-def time_run(request: Simulation, repeats: int) -> tuple[Trajectory, float]:
+def time_run(request: Callable[[], Any], repeats: int) -> tuple[Any, float]:
     """What a compiled request gives, and the time of its fastest run [s]."""
+    import jax
+
     seconds: list[float] = []
     while not seconds or (len(seconds) < repeats and sum(seconds) < _LONG):
         begin = time.perf_counter()

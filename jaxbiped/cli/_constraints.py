@@ -1,111 +1,112 @@
 """`jaxbiped constraints`: the constraint methods compared on the seed's walk."""
 
-import math
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from tqdm import tqdm
-
-from jaxbiped._types import JsonObject
-from jaxbiped.cli._constraint_comparison import ConstraintRun, compare_constraints, work_of
-from jaxbiped.cli._integrator import Integrator
+import jaxbiped as jb
+from jaxbiped.cli._constraint_comparison import ConstraintRun, Integrator, compare_constraints
+from jaxbiped.cli._declarations import names
+from jaxbiped.cli._options import Check, Command, Count, Numbers, make_folder, one_of, positive
 from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._walk_options import OutputOptions
-from jaxbiped.cli.commands._constraints import Constraints
-from jaxbiped.scene._scene import Scene
+from jaxbiped.cli._scene_options import SceneOptions, StartOptions, compliant_and_minimal
 
-_HEAD = (
-    "method",
-    "integrator",
-    "by",
-    "ending",
-    "max |Phi| m",
-    "rate m/s",
-    "error",
-    "steps",
-    "run s",
-    "to standard",
-)
-_WIDTHS = (9, 10, 10, 13, 11, 8, 7, 7, 6, 11)
-"""Of the columns: a row is printed before the others are known."""
+if TYPE_CHECKING:
+    from jaxbiped._types import JsonObject
+
+_COLUMNS = {
+    "method": 9,
+    "integrator": 10,
+    "by": 10,
+    "ending": 13,
+    "max |Phi| m": 11,
+    "rate m/s": 8,
+    "error": 7,
+    "steps": 7,
+    "run s": 6,
+    "to standard": 11,
+}
+"""Heads and widths: a row is printed before the others are known."""
 _BAR = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
 
-def run(options: Constraints) -> int:
-    """Runs the command; returns the exit code, 1 where Ctrl-C ended it."""
-    scene = options.scene.scene()
-    assert isinstance(scene, Scene)
-    integrators = [Integrator.read(text) for text in options.integrators]
-    OutputOptions(out=options.out, json=options.json).check()
-    report, runs = Report(options.json), list[ConstraintRun]()
-    many = len(integrators) * len(options.methods)
-    work = len(options.methods) * sum(map(work_of, integrators))
-    complete = False
-    with tqdm(total=work, smoothing=0.0, bar_format=_BAR, desc=f"0/{many} runs") as bar:
-        try:
-            found = compare_constraints(
-                scene,
-                options.start.state(scene),
-                duration=options.duration,
-                integrators=integrators,
-                methods=options.methods,
-                repeats=options.repeats,
-                advance=bar.update,
-            )
-            for line in _lines(found, runs):
-                with bar.external_write_mode(file=sys.stdout):
-                    report.say(line)
-                bar.set_description_str(f"{len(runs)}/{many} runs")
-            complete = True
-        except KeyboardInterrupt:
-            pass
-    if not complete:
-        report.say(f"stopped by Ctrl-C after {len(runs)} of {many} runs")
-    report.say(
-        f"{options.duration:g} s from the start; errors against the minimal formulation at 1e-10"
-        f"{_engines(runs)}"
-    )
-    numbers = run_numbers(runs)
-    if options.out is not None and runs:
-        report.say(f"wrote {write_picture(numbers, options.out)}")
-    report.finish({"duration_s": options.duration, "complete": complete, "runs": numbers})
-    return 0 if complete else 1
+class Constraints(Command):
+    """Compare the seven ways to hold the hip together: violation, error against the minimal
+    formulation, and time."""
 
+    scene: Annotated[SceneOptions, compliant_and_minimal("compared")]
+    start: StartOptions
+    methods: Annotated[
+        tuple[str, ...], one_of("constraints.CONSTRAINT_METHODS")._replace(each=True)
+    ] = names("constraints.CONSTRAINT_METHODS")
+    """Names of the methods to compare."""
+    integrators: Annotated[
+        tuple[str, ...], Check(lambda _, text: Integrator.read(text), each=True)
+    ] = ("rodas4:1e-6", "euler:dt=1e-6", "runge2:dt=1e-6")
+    """Each SOLVER:TOLERANCE, or SOLVER:dt=STEP for steps of one size [s]."""
+    duration: Annotated[float, positive("s")] = 0.5
+    """Simulated time [s]."""
+    repeats: Count = 3
+    """Runs of which the fastest counts; none is repeated once they took a second."""
+    out: Path | None = None
+    """Folder for the picture."""
+    json: Numbers = None
 
-def write_picture(runs: list[JsonObject], out: Path) -> Path:
-    """Writes the comparison as a picture; returns its path."""
-    from jaxbiped import plot
+    def run(self) -> int:
+        """Runs the command; returns the exit code, 1 where Ctrl-C ended it."""
+        from tqdm import tqdm
 
-    path = out / "constraints.png"
-    plot.constraint_runs(runs).savefig(path)
-    return path
-
-
-def run_numbers(runs: list[ConstraintRun]) -> list[JsonObject]:
-    """Runs ready for JSON: None for what is not a finite number."""
-    return [
-        {
-            key: None if isinstance(value, float) and not math.isfinite(value) else value
-            for key, value in run._asdict().items()
-        }
-        for run in runs
-    ]
+        scene = self.scene.scene()
+        assert isinstance(scene, jb.Scene)
+        integrators = [Integrator.read(text) for text in self.integrators]
+        make_folder(self.out)
+        report, runs = Report(self.json), list[ConstraintRun]()
+        many = len(integrators) * len(self.methods)
+        work = len(self.methods) * sum(each.work for each in integrators)
+        complete = False
+        with tqdm(total=work, smoothing=0.0, bar_format=_BAR, desc=f"0/{many} runs") as bar:
+            try:
+                found = compare_constraints(
+                    scene,
+                    self.start.state(scene),
+                    duration=self.duration,
+                    integrators=integrators,
+                    methods=self.methods,
+                    repeats=self.repeats,
+                    advance=bar.update,
+                )
+                for line in _lines(found, runs):
+                    with bar.external_write_mode(file=sys.stdout):
+                        report.say(line)
+                    bar.set_description_str(f"{len(runs)}/{many} runs")
+                complete = True
+            except KeyboardInterrupt:
+                pass
+        if not complete:
+            report.say(f"stopped by Ctrl-C after {len(runs)} of {many} runs")
+        # Times by one engine are not those by the other.
+        engines = {run.integrator: f"; {run.integrator} by {run.engine}" for run in runs}
+        report.say(
+            f"{self.duration:g} s from the start; errors against the minimal formulation at 1e-10"
+            + "".join(engines.values())
+        )
+        numbers: list[JsonObject] = [run._asdict() for run in runs]
+        if self.out is not None and runs:
+            path = self.out / "constraints.png"
+            jb.plot.constraint_runs(numbers).savefig(path)
+            report.wrote([path])
+        report.finish({"duration_s": self.duration, "complete": complete, "runs": numbers})
+        return 0 if complete else 1
 
 
 def _lines(found: Iterator[ConstraintRun], runs: list[ConstraintRun]) -> Iterator[str]:
     """The table line by line, each as its run is done, which is kept in `runs`."""
+    head = [word.rjust(width) for word, width in _COLUMNS.items()]
     for run in found:
-        first = not runs
         runs.append(run)
-        lines = _padded(_row(run, _usual(run, runs))).splitlines()
-        yield "\n".join(lines if first else lines[1:])
-
-
-def _engines(runs: Sequence[ConstraintRun]) -> str:
-    """Which engine ran what: times by one are not those by the other."""
-    used = {run.integrator: run.engine for run in runs}
-    return "".join(f"; {integrator} by {engine}" for integrator, engine in used.items())
+        lines = table(head, [_row(run, _usual(run, runs))], most=1).splitlines()
+        yield "\n".join(lines if len(runs) == 1 else lines[1:])
 
 
 def _usual(run: ConstraintRun, runs: Sequence[ConstraintRun]) -> float | None:
@@ -127,9 +128,3 @@ def _row(run: ConstraintRun, usual: float | None) -> tuple[str, ...]:
         f"{run.wall_s_run:.3f}",
         "" if usual is None else f"{run.wall_s_run / usual:.2f}",
     )
-
-
-def _padded(row: tuple[str, ...]) -> str:
-    """Head and row, in columns as wide as those of every other row."""
-    head = [word.rjust(width) for word, width in zip(_HEAD, _WIDTHS, strict=True)]
-    return table(head, [row], most=1)

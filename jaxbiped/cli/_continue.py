@@ -3,71 +3,103 @@
 import math
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from jaxbiped._types import JsonObject
-from jaxbiped.caching import _import_time
-from jaxbiped.cli._report import Report, table
-from jaxbiped.cli.commands._continue import ContinueGait
-from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
-from jaxbiped.continuation._branch import Branch
-from jaxbiped.continuation._branch_point import BranchPoint
-from jaxbiped.continuation._continue_gait import continue_gait
+from tyro.conf import arg
+
+import jaxbiped as jb
+from jaxbiped import _clock
+from jaxbiped._checks import check_finite
+from jaxbiped.cli._options import (
+    Check,
+    Command,
+    Count,
+    CycleFootsteps,
+    Engine,
+    GaitAccuracy,
+    OutputOptions,
+    make_folder,
+    positive,
+)
+from jaxbiped.cli._report import Report, columns, table
+from jaxbiped.cli._scene_options import SceneOptions, StartOptions
+
+if TYPE_CHECKING:
+    from jaxbiped._types import JsonObject
 
 _MOST_ROWS = 24
 _STABLE = {True: "yes", False: "no", None: "undecided"}
 
 
-def run(options: ContinueGait) -> int:
-    """Runs the command; returns the exit code."""
-    imported = time.perf_counter()
-    scene = options.scene.scene()
-    state = options.start.state(scene) if options.start.given else None
-    options.output.check()
-    branch = continue_gait(
-        scene,  # type: ignore[arg-type]
-        options.along,
-        bounds=(options.first, options.last),
-        guess=state,
-        footsteps=options.footsteps,
-        log=options.log,
-        largest_step=options.largest_step,
-        max_points=options.max_points,
-        accuracy=options.accuracy,
-        engine=options.engine,
-        progress=True,
-    )
-    wall = {
-        "import": imported - _import_time.IMPORT_BEGAN,
-        "total": time.perf_counter() - _import_time.IMPORT_BEGAN,
-    }
-    report = Report(options.output.json)
-    if len(branch):
-        _print(report, branch, wall)
-    else:
-        report.say(branch.stops[0].cause)
-    if len(branch) and options.output.out is not None:
-        for path in write_results(branch, options.output.out):
-            report.say(f"wrote {path}")
-    report.finish(branch_numbers(branch) | {"wall_s": wall})
-    return 0 if len(branch) else 1
+class ContinueGait(Command, of=("continue_gait",)):
+    """Follow the periodic gait along a parameter; print its stability and its bifurcations."""
+
+    scene: SceneOptions
+    start: StartOptions
+    output: OutputOptions
+    along: str = "slope"
+    """The parameter, by its name."""
+    first: Annotated[float, arg(name="from"), Check(check_finite)] = 0.005
+    """Beginning of its range (SI units)."""
+    last: Annotated[float, arg(name="to"), Check(check_finite)] = 0.1
+    """End of its range."""
+    footsteps: CycleFootsteps
+    log: bool | None
+    largest_step: Annotated[float, positive()]
+    max_points: Count
+    accuracy: GaitAccuracy
+    engine: Engine
+
+    def run(self) -> int:
+        """Runs the command; returns the exit code."""
+        imported = time.perf_counter()
+        scene = self.scene.scene()
+        state = self.start.state(scene) if self.start.given else None
+        make_folder(self.output.out)
+        branch = jb.continue_gait(
+            scene,  # type: ignore[arg-type]
+            self.along,
+            bounds=(self.first, self.last),
+            guess=state,
+            progress=True,
+            **self.arguments("continue_gait"),
+        )
+        wall = {
+            "import": imported - _clock.IMPORT_BEGAN,
+            "total": time.perf_counter() - _clock.IMPORT_BEGAN,
+        }
+        report = Report(self.output.json)
+        if len(branch):
+            _print(report, branch, wall)
+        else:
+            report.say(branch.stops[0].cause)
+        if len(branch) and self.output.out is not None:
+            report.wrote(write_results(branch, self.output.out))
+        report.finish(branch_numbers(branch) | {"wall_s": wall})
+        return 0 if len(branch) else 1
 
 
-def branch_numbers(branch: Branch) -> JsonObject:
-    """What is known of a branch in SI units, ready for JSON."""
+def branch_numbers(branch: "jb.continuation.Branch") -> "JsonObject":
+    """What is known of a branch in SI units, for `strict_json`."""
     return {
         "along": branch.along,
         "unit": branch.unit,
         "footsteps": branch.footsteps,
-        "points": [_point(branch.along, each) for each in branch.points],
-        "bifurcations": [
+        "points": [
             {
-                "kind": str(each.kind),
+                branch.along: each.value,
                 "value": each.value,
-                "multiplier": [each.multiplier.real, each.multiplier.imag],
-                "error": each.error,
-                "value_error": None if math.isnan(each.value_error) else each.value_error,
-                "beyond": None if math.isnan(each.beyond) else each.beyond,
+                "period_s": each.period,
+                "step_length_m": each.step_length,
+                "multipliers": each.multipliers,
+                "multiplier_errors": each.multiplier_errors,
+                "stable": each.stable,
             }
+            for each in branch.points
+        ],
+        "bifurcations": [
+            {name: x for name, x in each._asdict().items() if name != "point"}
+            | {"kind": str(each.kind), "value": each.value}
             for each in branch.bifurcations
         ],
         "ends": [
@@ -82,74 +114,47 @@ def branch_numbers(branch: Branch) -> JsonObject:
     }
 
 
-def _point(along: str, each: BranchPoint) -> JsonObject:
-    return {
-        along: each.value,
-        "value": each.value,
-        "period_s": each.period,
-        "step_length_m": each.step_length,
-        "multipliers": [[value.real, value.imag] for value in each.multipliers.tolist()],
-        "multiplier_errors": each.multiplier_errors.tolist(),
-        "stable": each.stable,
-    }
-
-
-def write_results(branch: Branch, out: Path) -> list[Path]:
+def write_results(branch: "jb.continuation.Branch", out: Path) -> list[Path]:
     """Writes the figures and the dataset of a branch; returns their paths."""
-    from jaxbiped import plot
-
-    figures = {
-        "branch.png": plot.branch(branch, "step_length"),
-        "spectral_radius.png": plot.branch(branch, "spectral_radius"),
-    }
-    for name, figure in figures.items():
-        figure.savefig(out / name)
+    paths = []
+    for name, measure in (("branch", "step_length"), ("spectral_radius", "spectral_radius")):
+        paths.append(out / f"{name}.png")
+        jb.plot.branch(branch, measure).savefig(paths[-1])
     branch.dataset().to_netcdf(out / "branch.nc")
-    return [*(out / name for name in figures), out / "branch.nc"]
+    return [*paths, out / "branch.nc"]
 
 
-def _print(report: Report, branch: Branch, wall: dict[str, float]) -> None:
-    head = (_with_unit(branch), "period s", "length m", "radius", "stable")
-    rows = [
-        (
-            f"{each.value:.8g}",
-            f"{each.period:.6f}",
-            f"{each.step_length:.6f}",
-            f"{abs(each.multipliers[0]):.6f}",
-            _STABLE[each.stable],
-        )
-        for each in branch.points
-    ]
-    report.say(table(head, rows, most=_MOST_ROWS))
-    report.say()
+def _print(report: Report, branch: "jb.continuation.Branch", wall: dict[str, float]) -> None:
+    along = f"{branch.along} {branch.unit}".strip()
+    layout = {
+        along: "{0[0].value:.8g}",
+        "period s": "{0[0].period:.6f}",
+        "length m": "{0[0].step_length:.6f}",
+        "radius": "{0[1]:.6f}",
+        "stable": "{0[2]}",
+    }
+    rows = [(each, abs(each.multipliers[0]), _STABLE[each.stable]) for each in branch.points]
+    report.say(columns(layout, rows, most=_MOST_ROWS), "")
     if branch.bifurcations:
-        report.say(_event_table(branch, branch.bifurcations))
+        head = ("bifurcation", along, "error", "multiplier", "error")
+        events = [
+            (
+                str(each.kind),
+                f"{each.value:.10g}",
+                "–" if math.isnan(each.value_error) else f"{each.value_error:.1e}",
+                _multiplier(each),
+                f"{each.error:.1e}",
+            )
+            for each in branch.bifurcations
+        ]
+        report.say(table(head, events, most=_MOST_ROWS))
     for where, stop in zip(("first", "last"), branch.stops, strict=True):
         report.say(f"{where} end at {branch.along} = {stop.value:.8g}: {stop.end} ({stop.cause})")
     report.say(f"{len(branch)} gaits; import {wall['import']:.1f} s, total {wall['total']:.1f} s")
 
 
-def _event_table(branch: Branch, events: tuple[BifurcationPoint, ...]) -> str:
-    head = ("bifurcation", _with_unit(branch), "error", "multiplier", "error")
-    rows = [
-        (
-            str(each.kind),
-            f"{each.value:.10g}",
-            "–" if math.isnan(each.value_error) else f"{each.value_error:.1e}",
-            _complex(each),
-            f"{each.error:.1e}",
-        )
-        for each in events
-    ]
-    return table(head, rows, most=_MOST_ROWS)
-
-
-def _complex(event: BifurcationPoint) -> str:
+def _multiplier(event: "jb.continuation.BifurcationPoint") -> str:
     value = event.multiplier
-    if event.kind is BranchEvent.LIMIT or value.imag != 0.0:
+    if event.kind is jb.continuation.BranchEvent.LIMIT or value.imag != 0.0:
         return f"{value.real:.6f} {value.imag:+.6f} i"
     return f"{value.real:.9f}"
-
-
-def _with_unit(branch: Branch) -> str:
-    return f"{branch.along} {branch.unit}".strip()

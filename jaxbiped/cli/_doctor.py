@@ -1,17 +1,13 @@
-"""Examination of an installation: versions, hardware, caches, and a self-test."""
+"""`jaxbiped doctor`: what is installed and whether it computes rightly, for reports of bugs."""
 
-import platform
 import time
 from collections.abc import Mapping
-from importlib.metadata import PackageNotFoundError, version
+from typing import Any, NamedTuple
 
-import jax
-
-from jaxbiped.caching._disk_cache import cache_folder, disk_use
-from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._self_test import Truth, self_test
-from jaxbiped.cli.commands._doctor import Doctor
-from jaxbiped.compiler import default_threads, host
+import jaxbiped as jb
+from jaxbiped._disk_cache import cache_folder, disk_use
+from jaxbiped.cli._options import Command, JsonPath
+from jaxbiped.cli._report import Report, columns
 
 PACKAGES = (
     "jaxbiped", "jax", "jaxlib", "diffrax", "equinox", "optimistix", "lineax", "llvmlite",
@@ -24,44 +20,70 @@ BAD = {
     }
 }
 """Versions with which results are wrong, and why."""
-_NONE = "not installed"
+_TRUTH = {
+    "self-test": "{0.name}",
+    "truth": "{0.known:.12f}",
+    "found": "{0.found:.12f}",
+    "": "{0.verdict}",
+}
+_FALL = 0.3
+"""How long a walker falls freely [s]."""
+_PUBLISHED = (0.200310900544287, -0.199832473004977)
+"""Stance angle and rate of the simplest walker's long gait at a slope of 0.009, after Garcia,
+Chatterjee, Ruina and Coleman, Journal of Biomechanical Engineering 120 (1998) 281."""
 
 
-def examine(command: Doctor) -> int:
-    """Prints what is installed and tests it; returns 1 where something is wrong."""
-    report, versions = Report(command.json), _versions()
-    report.say(table(("package", "version"), list(versions.items()), most=len(versions)))
-    wrong = complaints(versions)
-    report.say(f"Python {platform.python_version()} on {platform.system()} {platform.machine()}")
-    width, threads = host().width, default_threads()
-    report.say(f"vectors of {width} numbers, {threads} threads, JAX on {jax.default_backend()}")
-    folder, use = cache_folder(), disk_use()
-    size = sum(each.size for each in use.values())
-    report.say(f"programs on disk: {size / 2**20:.1f} MiB in {folder or 'no folder'}")
-    began = time.perf_counter()
-    truths, failure = _tested()
-    seconds = time.perf_counter() - began
-    wrong += [f"{each.name} is off by {abs(each.found - each.known):.0e}" for each in truths
-              if not each.holds]  # fmt: skip
-    wrong += [failure] if failure else []
-    rows = [(each.name, f"{each.known:.12f}", f"{each.found:.12f}", _word(each)) for each in truths]
-    report.say(table(("self-test", "truth", "found", ""), rows, most=len(rows)))
-    report.say(f"tested in {seconds:.1f} s: {'; '.join(wrong) if wrong else 'nothing is wrong'}")
-    report.finish(
-        {
-            "python": platform.python_version(),
-            "system": f"{platform.system()} {platform.machine()}",
-            "versions": versions,
-            "vector_width": width,
-            "threads": threads,
-            "backend": jax.default_backend(),
-            "cache_bytes": size,
-            "self_test": [each._asdict() | {"holds": each.holds} for each in truths],
-            "seconds": seconds,
-            "wrong": wrong,
-        }
-    )
-    return 1 if wrong else 0
+class Doctor(Command):
+    """Show versions, vectors, threads and caches, and test this machine's answers."""
+
+    json: JsonPath = None
+    """File for the same in JSON; - prints only that."""
+
+    def run(self) -> int:
+        """Prints what is installed and tests it; returns 1 where something is wrong."""
+        import platform
+
+        import jax
+
+        from jaxbiped.compiler import default_threads, host
+
+        system = f"{platform.system()} {platform.machine()}"
+        report, versions, size = Report(self.json), _versions(), 0
+        for each in disk_use().values():
+            size += each.size
+        report.say(
+            columns({"package": "{0[0]}", "version": "{0[1]}"}, versions.items()),
+            f"Python {platform.python_version()} on {system}",
+            f"vectors of {host().width} numbers, {default_threads()} threads, JAX on "
+            f"{jax.default_backend()}",
+            f"programs on disk: {size / 2**20:.1f} MiB in {cache_folder() or 'no folder'}",
+        )
+        wrong, truths = complaints(versions), tuple[Truth, ...]()
+        began = time.perf_counter()
+        try:
+            truths = self_test()
+        except Exception as error:  # whatever is broken is what the report is for
+            wrong.append(f"the self-test ended with {type(error).__name__}: {error}")
+        seconds = time.perf_counter() - began
+        off = (each for each in truths if not each.holds)
+        wrong += [f"{each.name} is off by {abs(each.found - each.known):.0e}" for each in off]
+        told = "; ".join(wrong) or "nothing is wrong"
+        report.say(columns(_TRUTH, truths), f"tested in {seconds:.1f} s: {told}")
+        report.finish(
+            {
+                "python": platform.python_version(),
+                "system": system,
+                "versions": versions,
+                "vector_width": host().width,
+                "threads": default_threads(),
+                "backend": jax.default_backend(),
+                "cache_bytes": size,
+                "self_test": [each._asdict() | {"holds": each.holds} for each in truths],
+                "seconds": seconds,
+                "wrong": wrong,
+            }
+        )
+        return 1 if wrong else 0
 
 
 def complaints(versions: Mapping[str, str]) -> list[str]:
@@ -74,22 +96,85 @@ def complaints(versions: Mapping[str, str]) -> list[str]:
 
 
 def _versions() -> dict[str, str]:
+    from importlib.metadata import PackageNotFoundError, version
+
     found = {}
     for name in PACKAGES:
         try:
             found[name] = version(name)
         except PackageNotFoundError:
-            found[name] = _NONE
+            found[name] = "not installed"
     return found
 
 
-def _tested() -> tuple[tuple[Truth, ...], str]:
-    """The self-test, and a sentence where it did not come to its end."""
-    try:
-        return self_test(), ""
-    except Exception as error:  # whatever is broken is what the report is for
-        return (), f"the self-test ended with {type(error).__name__}: {error}"
+class Truth(NamedTuple):
+    """One number that is known, and what this machine says.
+
+    Attributes:
+        name: what it is.
+        known, found: the truth, and this machine's answer (SI units).
+        allowed: by how much they may differ.
+    """
+
+    name: str
+    known: float
+    found: float
+    allowed: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the machine is right."""
+        return abs(self.found - self.known) <= self.allowed
+
+    @property
+    def verdict(self) -> str:
+        """The same in a word."""
+        return "holds" if self.holds else "wrong"
 
 
-def _word(truth: Truth) -> str:
-    return "holds" if truth.holds else "wrong"
+def self_test() -> tuple[Truth, ...]:
+    """Free fall and its derivative by lanes, and a published gait of rigid feet."""
+    height, derivative = _fall()
+    return (
+        Truth("height after free fall [m]", 2.0 - 0.5 * 9.8 * _FALL**2, height, 1e-9),
+        Truth("its derivative with respect to g [s²]", -0.5 * _FALL**2, derivative, 1e-9),
+        Truth("simplest walker's angle after a footstep [rad]", _PUBLISHED[0], _footstep(), 1e-7),
+    )
+
+
+def _fall() -> tuple[float, float]:
+    """Of a walker that is let go 2 m above level ground: height of its hip, and by gravity."""
+    from jaxbiped._cached_jit import cached_jit
+    from jaxbiped._types import as_float
+
+    scene = jb.with_parameters(jb.seed_scene(), {"slope": 0.0})
+    start = jb.State(*map(as_float, (0.0, 2.0, 0.1, -0.1, 0.0, 0.0, 0.0, 0.0)))
+    found, slope = cached_jit(_height_and_slope)(scene, start, as_float(9.8))
+    return float(found), float(slope)
+
+
+def _height_and_slope(scene: "jb.Scene", start: "jb.State", g: Any) -> Any:
+    import jax
+    import jax.numpy as jnp
+
+    def height(g: Any) -> Any:
+        moved = jb.with_parameters(scene, {"g": g})
+        return jb.simulate(moved, start, duration=_FALL, save="end", engine="lanes").final.hip_z
+
+    return jax.jvp(height, (g,), (jnp.ones_like(g),))
+
+
+def _footstep() -> float:
+    """Angle of the next stance leg, in its own direction."""
+    import numpy as np
+
+    from jaxbiped._types import as_float
+
+    theta, rate = _PUBLISHED
+    # Legs without mass: their own, at the feet, is far below rounding.
+    walker = jb.Walker(m=1e-13, J=0.0, l=1.0, d=1.0, r=0.0, hip_mass=1.0)
+    scene = jb.RigidScene(walker=walker, ground=jb.Ground(slope=0.009, g=1.0))
+    swing = rate - rate * (1.0 - np.cos(2.0 * theta))
+    start = jb.dynamics.RigidState(*map(as_float, (0.0, -theta, theta, swing, rate)))
+    end = jb.rigid_walk(scene, start, footsteps=1)
+    return max(float(end.final.theta_1), float(end.final.theta_2))

@@ -3,95 +3,130 @@
 import dataclasses
 import math
 import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-
+import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice
-from jaxbiped._types import JsonObject
-from jaxbiped.cli._gait import finite, parts
-from jaxbiped.cli._report import Report, table
-from jaxbiped.cli.commands._optimise import Optimise
-from jaxbiped.continuation._nearest_bifurcation import (
-    NearestBifurcation,
-    farthest_allowed,
-    range_of,
+from jaxbiped.cli._options import (
+    Command,
+    Count,
+    Engine,
+    GaitAccuracy,
+    NotNegative,
+    Numbers,
+    one_of,
 )
-from jaxbiped.optimise._certificate import Certificate, certify
-from jaxbiped.optimise._objectives import OBJECTIVES
-from jaxbiped.optimise._optimise_gait import optimise_gait
-from jaxbiped.optimise._optimum import Optimum
-from jaxbiped.optimise._runs import Outcome
-from jaxbiped.scene._parameter_access import parameter_names, parameter_quantities, parameter_values
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.cli._report import Report, columns
+from jaxbiped.cli._scene_options import SceneOptions, minimal
+
+if TYPE_CHECKING:
+    from jaxbiped._types import JsonObject
+    from jaxbiped.continuation._nearest_bifurcation import NearestBifurcation
+    from jaxbiped.optimise._certificate import Certificate
+    from jaxbiped.optimise._optimum import Optimum
 
 _USUAL_RANGE = 2.0
 """Factor to both sides of a parameter's own value that it varies by unless bounds are given."""
-_MOST_ROWS = 64
+_STABLE = {True: "stable", False: "NOT STABLE", None: "undecided within the error"}
+_REDUNDANT = (
+    "formulation = redundant is not allowed here: how the hip is held makes no difference to a "
+    "gait; choose minimal."
+)
 
 
-def run(options: Optimise) -> int:
-    """Runs the command; returns the exit code."""
-    scene = options.scene.scene()
-    assert not isinstance(scene, RedundantScene)
-    along = [n.strip() for n in options.bifurcations.split(",") if n.strip() not in ("", "none")]
-    for name in along:
-        check_choice("bifurcations", name, parameter_names(scene))
-        range_of(scene, name)
-    found = optimise_gait(
-        scene,
-        vary=_bounds(scene, options.vary),
-        maximise=options.maximise,
-        minimise=options.minimise,
-        subject_to=options.subject_to or None,
-        optimiser=options.optimiser,
-        iterations=options.iterations,
-        restarts=options.restarts,
-        seed=options.seed,
-        accuracy=options.accuracy,
-        engine=options.engine,
-        progress=sys.stderr.isatty(),
-        store=options.store,
-    )
-    certificate = certify(
-        found,
-        starts=options.basin,
-        footsteps=options.footsteps,
-        fatal_push=options.fatal_push,
-        bifurcations_along=along,
-        other_engine=options.other_engine,
-        progress=sys.stderr.isatty(),
-    )
-    goal = options.minimise if options.maximise is None else options.maximise
-    sense = "minimise" if options.maximise is None else "maximise"
-    assert goal is not None
-    numbers = optimum_numbers(found, certificate, goal, sense)
-    report = Report(options.json)
-    _print(report, scene, found, certificate, goal)
-    report.finish(numbers)
-    ended = (Outcome.CONVERGED, Outcome.CORNER, Outcome.BEYOND_RANGE)
-    return 0 if found.outcome in ended else 1
+class Optimise(Command, of=("optimise.certify", "optimise_gait")):
+    """Find the parameters within bounds whose periodic gait is best, and certify it."""
+
+    vary: str
+    """Parameters that vary, d,r,J (half to double their values) or with bounds d=0.05:0.2,r,J."""
+    scene: Annotated[SceneOptions, minimal(_REDUNDANT)]
+    maximise: str | None = None
+    """Measure of the gait to maximise, such as speed."""
+    minimise: str | None = None
+    """Or to minimise, such as spectral_radius."""
+    subject_to: tuple[str, ...] = ()
+    """What must hold, such as "spectral_radius<0.4" "step_length>0.2"."""
+    optimiser: Annotated[str, one_of("optimise.OPTIMISERS")]
+    """trust-region, slsqp, trust-constr, or without requirements optax."""
+    iterations: Count
+    """Most iterations of a run."""
+    restarts: NotNegative
+    """Further runs, from the best of scattered designs."""
+    seed: int
+    """Seed of these designs."""
+    accuracy: GaitAccuracy
+    engine: Engine
+    basin: NotNegative = 1024
+    """Starts about the gait that are labelled for the certificate's basin; 0 for none."""
+    footsteps: NotNegative
+    """Footsteps of the certificate's walk from a pushed start; 0 for none."""
+    bifurcations: str = "slope"
+    """Parameters in which the certificate seeks the nearest bifurcation: slope,d; or none."""
+    fatal_push: bool
+    other_engine: bool
+    store: Path | None
+    json: Numbers = None
+
+    def run(self) -> int:
+        """Runs the command; returns the exit code."""
+        from jaxbiped.continuation._nearest_bifurcation import range_of
+
+        scene = self.scene.scene()
+        assert not isinstance(scene, jb.RedundantScene)
+        names = [name.strip() for name in self.bifurcations.split(",")]
+        along = [name for name in names if name not in ("", "none")]
+        for name in along:
+            check_choice("bifurcations", name, jb.parameter_names(scene))
+            range_of(scene, name)
+        how = self.arguments("optimise_gait")
+        del how["footsteps"]  # of the certificate's walk
+        how |= {"vary": _bounds(scene, self.vary), "subject_to": self.subject_to or None}
+        found = jb.optimise_gait(scene, progress=sys.stderr.isatty(), **how)
+        certificate = jb.optimise.certify(
+            found,
+            starts=self.basin,
+            footsteps=self.footsteps,
+            fatal_push=self.fatal_push,
+            bifurcations_along=along,
+            other_engine=self.other_engine,
+            progress=sys.stderr.isatty(),
+        )
+        sense = "minimise" if self.maximise is None else "maximise"
+        goal = getattr(self, sense)
+        numbers = _optimum_numbers(found, certificate, goal, sense)
+        report = Report(self.json)
+        _print(report, scene, found, goal)
+        report.say(*_certificate_lines(certificate))
+        report.finish(numbers)
+        ended = jb.optimise.Outcome
+        good = (ended.CONVERGED, ended.CORNER, ended.BEYOND_RANGE)
+        return 0 if found.outcome in good else 1
 
 
-def _bounds(scene: Scene | RigidScene, text: str) -> dict[str, tuple[float, float]]:
+def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[float, float]]:
     """Bounds by name from d=0.05:0.2,r,J."""
-    own, found = parameter_values(scene), {}
+    from jaxbiped.continuation._nearest_bifurcation import farthest_allowed
+
+    own, found = jb.parameter_values(scene), {}
     for part in text.split(","):
         name, given, bounds = (each.strip() for each in part.partition("="))
-        check_choice("vary", name, parameter_names(scene))
+        check_choice("vary", name, jb.parameter_names(scene))
         if not given:
             value = float(own[name])
             if value <= 0.0:
                 raise ArgumentError(
                     f"vary = {name} needs bounds, as its value is {value:g}: write {name}=low:high."
                 )
-            ends = (value / _USUAL_RANGE, value * _USUAL_RANGE)
-            least, most = (farthest_allowed(scene, name, end) for end in ends)
-            found[name] = (least, most)
+            least, most = value / _USUAL_RANGE, value * _USUAL_RANGE
+            found[name] = (
+                farthest_allowed(scene, name, least),
+                farthest_allowed(scene, name, most),
+            )
             continue
-        low, colon, high = bounds.partition(":")
         try:
-            if not colon:
-                raise ValueError
+            low, high = bounds.split(":", 1)
             found[name] = (float(low), float(high))
         except ValueError:
             raise ArgumentError(
@@ -100,9 +135,11 @@ def _bounds(scene: Scene | RigidScene, text: str) -> dict[str, tuple[float, floa
     return found
 
 
-def optimum_numbers(found: Optimum, certificate: Certificate, goal: str, sense: str) -> JsonObject:
-    """What is known of an optimum in SI units, ready for JSON."""
-    numbers: JsonObject = {
+def _optimum_numbers(
+    found: "Optimum", certificate: "Certificate", goal: str, sense: str
+) -> "JsonObject":
+    """What is known of an optimum in SI units, for `strict_json`."""
+    return {
         "outcome": str(found.outcome),
         "message": found.message,
         "variables": found.variables,
@@ -111,7 +148,7 @@ def optimum_numbers(found: Optimum, certificate: Certificate, goal: str, sense: 
             "sense": sense,
             "value": found.objective,
             "error": found.error,
-            "unit": OBJECTIVES[goal].quantity.unit,
+            "unit": jb.optimise.OBJECTIVES[goal].quantity.unit,
         },
         "measures": {
             name: {
@@ -125,14 +162,12 @@ def optimum_numbers(found: Optimum, certificate: Certificate, goal: str, sense: 
         "evaluations": found.evaluations,
         "lost": found.lost,
         "unmeasured": found.unmeasured,
-        "certificate": certificate_numbers(certificate),
+        "certificate": _certificate_numbers(certificate),
     }
-    checked: JsonObject = finite(numbers)
-    return checked
 
 
-def certificate_numbers(certificate: Certificate) -> JsonObject:
-    """A certificate, ready for JSON."""
+def _certificate_numbers(certificate: "Certificate") -> "JsonObject":
+    """A certificate, for `strict_json`."""
     told, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
     basin, walk = certificate.basin, certificate.walk
     other, push = certificate.other_engine, certificate.fatal_push
@@ -142,117 +177,96 @@ def certificate_numbers(certificate: Certificate) -> JsonObject:
         "excess": told.excess,
         "constraints": [each._asdict() for each in told.requirements],
         "bounds": [each._asdict() for each in told.bounds],
-        "multipliers": [parts(value) for value in certificate.multipliers.tolist()],
-        "multiplier_errors": np.asarray(certificate.multiplier_errors).tolist(),
+        "multipliers": certificate.multipliers,
+        "multiplier_errors": certificate.multiplier_errors,
         "unit_multiplier_error": certificate.unit_multiplier_error,
         "stable": certificate.stable,
         "sensitivity_norm": {"value": norm, "error": norm_error},
-        "basin": None if basin is None else dataclasses.asdict(basin),
-        "fatal_push": push and {"distance": push.distance, "push": push.push.tolist()},
-        "walk": None if walk is None else walk._asdict(),
-        "other_engine": None if other is None else other._asdict(),
+        "basin": basin and dataclasses.asdict(basin),
+        "fatal_push": push and {"distance": push.distance, "push": push.push},
+        "walk": walk and walk._asdict(),
+        "other_engine": other and other._asdict(),
         "nearest_bifurcations": [
-            {
-                "along": each.along,
-                "kind": None if each.kind is None else str(each.kind),
-                "value": each.value,
-                "ratio": each.ratio,
-                "multiplier": parts(each.multiplier),
-                "error": each.error,
-            }
+            each._asdict() | {"kind": None if each.kind is None else str(each.kind)}
             for each in certificate.nearest_bifurcations
         ],
         "failed": certificate.failed,
     }
 
 
-def _print(
-    report: Report,
-    scene: Scene | RigidScene,
-    found: Optimum,
-    certificate: Certificate,
-    goal: str,
-) -> None:
-    units, own = parameter_quantities(scene), parameter_values(scene)
-    rows = [
-        (name, f"{float(own[name]):.6g}", f"{value:.6g}", units[name].unit_in_text)
-        for name, value in found.variables.items()
-    ]
-    report.say(table(("variable", "began", "best", "unit"), rows, most=_MOST_ROWS))
-    report.say()
-    first = found.history[0].measures if found.history else {}
-    measures = [
-        (
-            name,
-            f"{first[name]:.6g}" if name in first else "–",
-            *_told(found, name, value),
-            OBJECTIVES[name].quantity.unit_in_text,
-        )
-        for name, value in found.known.values.items()
-        if name in OBJECTIVES
-    ]
-    report.say(table(("measure", "began", "best", "error", "unit"), measures, most=_MOST_ROWS))
-    report.say()
+def _print(report: Report, scene: "jb.Scene | jb.RigidScene", found: "Optimum", goal: str) -> None:
+    units, own = jb.parameter_quantities(scene), jb.parameter_values(scene)
+    variables = {
+        "variable": "{0[0]}",
+        "began": "{0[1]:.6g}",
+        "best": "{0[2]:.6g}",
+        "unit": "{0[3].unit_in_text}",
+    }
+    rows = [(name, float(own[name]), x, units[name]) for name, x in found.variables.items()]
+    measures = {
+        "measure": "{0[0]}",
+        "began": "{0[1]}",
+        "best": "{0[2]}",
+        "error": "{0[3]}",
+        "unit": "{0[4].quantity.unit_in_text}",
+    }
+    report.say(columns(variables, rows), "", columns(measures, _measures(found)), "")
     report.say(
         f"{goal} {found.objective:.6g}, {found.outcome} after {len(found.history)} iterations and "
         f"{found.evaluations} gaits ({found.message})"
     )
-    for line in _certificate_lines(certificate):
-        report.say(line)
 
 
-def _told(found: Optimum, name: str, value: float) -> tuple[str, str]:
-    """A measure and its error, or more than what a range holds."""
-    if name in found.known.beyond_range:
-        return f"> {value:.6g}", "–"
-    return f"{value:.6g}", f"{found.known.errors[name]:.1e}"
+def _measures(found: "Optimum") -> Iterator[tuple[object, ...]]:
+    """Each measure, its first value, its best one and the error, or more than a range holds."""
+    first = found.history[0].measures if found.history else {}
+    for name, value in found.known.values.items():
+        if name in jb.optimise.OBJECTIVES:
+            began = f"{first[name]:.6g}" if name in first else "–"
+            best, error = f"{value:.6g}", f"{found.known.errors[name]:.1e}"
+            if name in found.known.beyond_range:
+                best, error = f"> {best}", "–"
+            yield name, began, best, error, jb.optimise.OBJECTIVES[name]
 
 
-def _bifurcation_line(nearest: NearestBifurcation) -> str:
-    if nearest.kind is None:
-        return f"no bifurcation along {nearest.along} in the range that was followed"
-    times = "" if math.isnan(nearest.ratio) else f" ({nearest.ratio:.3g} times its value)"
-    return f"along {nearest.along} the nearest is {nearest.kind} at {nearest.value:.6g}{times}"
-
-
-def _certificate_lines(certificate: Certificate) -> list[str]:
-    told = certificate.optimality
-    lines = [
-        f"optimality: residual {told.residual:.1e}, requirements missed by {told.excess:.1e}",
-        *(
-            f"held by {each.name} at {each.bound:.6g}: multiplier {each.multiplier:.4g} ± "
-            f"{each.multiplier_error:.1e}"
-            for each in (*told.requirements, *told.bounds)
-            if each.active
-        ),
-        f"multipliers: {_sizes(certificate)}; the one that must be 1 is off by "
-        f"{certificate.unit_multiplier_error:.1e}; {_STABLE[certificate.stable]}",
-        "sensitivity norm {:.4g} ± {:.1e}".format(*certificate.sensitivity_norm),
-    ]
-    basin, walk, other = certificate.basin, certificate.walk, certificate.other_engine
+def _certificate_lines(certificate: "Certificate") -> Iterator[str]:
+    told, basin, walk = certificate.optimality, certificate.basin, certificate.walk
+    yield f"optimality: residual {told.residual:.1e}, requirements missed by {told.excess:.1e}"
+    for each in (*told.requirements, *told.bounds):
+        if each.active:
+            yield (
+                f"held by {each.name} at {each.bound:.6g}: multiplier {each.multiplier:.4g} ± "
+                f"{each.multiplier_error:.1e}"
+            )
+    pairs = zip(certificate.multipliers, certificate.multiplier_errors, strict=True)
+    sizes = ", ".join(f"{abs(size):.4f} ± {error:.0e}" for size, error in list(pairs)[:3])
+    yield (
+        f"multipliers: {sizes}; the one that must be 1 is off by "
+        f"{certificate.unit_multiplier_error:.1e}; {_STABLE[certificate.stable]}"
+    )
+    yield "sensitivity norm {:.4g} ± {:.1e}".format(*certificate.sensitivity_norm)
     if basin is not None:
-        lines.append(
+        yield (
             f"basin: {basin.estimate:.3f} of the starts about the gait ({basin.low:.3f} to "
             f"{basin.high:.3f})"
         )
     if certificate.fatal_push is not None:
-        lines.append(f"smallest fatal push seen: {certificate.fatal_push.distance:.4f} (scaled)")
+        yield f"smallest fatal push seen: {certificate.fatal_push.distance:.4f} (scaled)"
     if walk is not None:
         back = "back to the gait" if walk.returned else "NOT back to the gait"
-        lines.append(f"walk from a push of {walk.push:g}: {walk.footsteps} footsteps, {back}")
-    lines += [_bifurcation_line(each) for each in certificate.nearest_bifurcations]
-    lines += [f"{name}: not known ({why})" for name, why in certificate.failed.items()]
-    if other is not None:
-        lines.append(
+        yield f"walk from a push of {walk.push:g}: {walk.footsteps} footsteps, {back}"
+    yield from map(_bifurcation_line, certificate.nearest_bifurcations)
+    for name, why in certificate.failed.items():
+        yield f"{name}: not known ({why})"
+    if (other := certificate.other_engine) is not None:
+        yield (
             f"engine {other.engine}: period differs by {other.period_difference:.1e}, length by "
             f"{other.length_difference:.1e}, spectral radius by {other.radius_difference:.1e}"
         )
-    return lines
 
 
-_STABLE = {True: "stable", False: "NOT STABLE", None: "undecided within the error"}
-
-
-def _sizes(certificate: Certificate) -> str:
-    pairs = zip(np.abs(certificate.multipliers), certificate.multiplier_errors, strict=True)
-    return ", ".join(f"{size:.4f} ± {error:.0e}" for size, error in list(pairs)[:3])
+def _bifurcation_line(nearest: "NearestBifurcation") -> str:
+    if nearest.kind is None:
+        return f"no bifurcation along {nearest.along} in the range that was followed"
+    times = "" if math.isnan(nearest.ratio) else f" ({nearest.ratio:.3g} times its value)"
+    return f"along {nearest.along} the nearest is {nearest.kind} at {nearest.value:.6g}{times}"

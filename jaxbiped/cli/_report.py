@@ -1,10 +1,12 @@
 """Reports for people and for programs."""
 
+import math
 import os
+import string
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from jaxbiped._files import strict_json
 
@@ -19,10 +21,15 @@ class Report:
         self._path = json_path
         self._only_json = str(json_path) == "-"
 
-    def say(self, text: str = "") -> None:
-        """Prints a text, unless standard output belongs to the JSON."""
+    def say(self, *lines: str) -> None:
+        """Prints lines, one that is empty where none is given, unless JSON has the output."""
         if not self._only_json:
-            _write(text + "\n")
+            _write("\n".join(lines) + "\n")
+
+    def wrote(self, paths: Iterable[Path]) -> None:
+        """Says which files were written."""
+        for path in paths:
+            self.say(f"wrote {path}")
 
     def finish(self, numbers: "JsonObject") -> None:
         """Writes the numbers."""
@@ -40,6 +47,29 @@ def _write(text: str) -> None:
     except BrokenPipeError:
         # What is left in the buffer goes nowhere, instead of raising once more at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class _Words(string.Formatter):
+    """Formats, and has a word for what is not known."""
+
+    def format_field(self, value: Any, format_spec: str) -> Any:
+        if value is None or (isinstance(value, float) and not math.isfinite(value)):
+            return "unknown"
+        return super().format_field(value, format_spec)
+
+
+def words(text: str, thing: object) -> str:
+    """A text with what it asks of a thing, `{0.name:.3f}` or `{0[name]:.3f}`.
+
+    None and what is not finite are unknown.
+    """
+    return _Words().format(text, thing)
+
+
+def columns(layout: Mapping[str, str], things: Iterable[object], most: int = 64) -> str:
+    """A table with a row for each thing: `layout` has the format of each column by its head."""
+    rows = [[words(text, each) for text in layout.values()] for each in things]
+    return table(list(layout), rows, most)
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], most: int) -> str:

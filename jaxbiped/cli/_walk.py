@@ -3,137 +3,212 @@
 import dataclasses
 import time
 import warnings
-from collections.abc import Callable
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-import jax.tree_util as jtu
-import numpy as np
-
-from jaxbiped._ending import Ending
+import jaxbiped as jb
+from jaxbiped import _clock
+from jaxbiped._checks import ArgumentError, check_count, check_positive
 from jaxbiped._progress import stage
-from jaxbiped._types import JsonObject
-from jaxbiped.caching import _import_time
-from jaxbiped.cli._driven import cost_sentence, walk_cost
-from jaxbiped.cli._held import constraint_numbers, constraint_sentence
-from jaxbiped.cli._report import Report, table
-from jaxbiped.cli._rigid_walk import run_rigid_walk
-from jaxbiped.cli._warnings import ending_name, relative_residual, walk_warnings
-from jaxbiped.cli.commands._walk import Walk
-from jaxbiped.dynamics._state import RigidState, State
-from jaxbiped.measure._energy_ledger import energy_ledger
-from jaxbiped.measure._footsteps import Footsteps, footsteps
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.simulate._accurate_walk import accurate_walk
-from jaxbiped.simulate._simulation import Simulation
-from jaxbiped.solve._error_estimate import error_numbers, error_sentence
-from jaxbiped.solve._trajectory import Trajectory
+from jaxbiped.cli._options import (
+    AnyAccuracy,
+    Command,
+    Engine,
+    Options,
+    OutputOptions,
+    make_folder,
+    one_of,
+    positive,
+)
+from jaxbiped.cli._scene_options import SceneOptions, StartOptions
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from jaxbiped.dynamics._rigid_state import WalkerState
 
-_MOST_ROWS = 24
+MOST_STEPS = 1 << 20
+"""Solver's steps that nobody asked for more than: about 25 minutes of the seed's walk."""
+_STEPS_OF_TEN_SECONDS = 65536
+_MOST_STRIKES = 4096
 _ROOM = 1 << 17
 """Steps that XLA finds room for at first; a walk that takes more is run again with more room."""
-_SHOWN = 60.0
-"""The part of a long walk that is animated and can be watched [s]."""
 
 
-def run(options: Walk) -> int:
-    """Runs the command; returns the exit code."""
-    imported = time.perf_counter()
-    scene = options.scene.scene()
-    state = options.start.state(scene)
-    if isinstance(scene, RigidScene):
-        assert isinstance(state, RigidState)
-        return run_rigid_walk(scene, state, options.solve, options.output)
-    assert isinstance(state, State)
-    with stage("preparing the start"):
-        request = _request(options, scene, state)
-    options.output.check()
-    began = time.perf_counter()
-    trajectory, seconds = _simulate(request, options.solve.wanted())
-    wall = {
-        "import": imported - _import_time.IMPORT_BEGAN,
-        "compile": time.perf_counter() - began - seconds,
-        "run": seconds,
-    }
-    _report(options, scene, trajectory, wall, float(request.rtol))
-    return 1 if trajectory.outcome == Ending.SOLVER_FAILED else 0
+class SolveOptions(Options, of=("simulate",)):
+    """How long and how to solve."""
+
+    duration: Annotated[float, positive("s")] = 10.0
+    """Simulated time [s]."""
+    solver: Annotated[str, one_of("solvers.SOLVERS")]
+    """Name of a solver: ours (rodas3p, rodas4, rodas4p, rodas5p) or one of diffrax's."""
+    accuracy: AnyAccuracy | None = None
+    """In place of tolerances: draft, balanced or tight; or a relative error, such as 1e-4."""
+    rtol: Annotated[float | None, positive()] = None
+    """Relative tolerance; 1e-6 unless given."""
+    atol: Annotated[float | None, positive()] = None
+    """Absolute tolerance (SI units); a hundredth of the relative one unless given."""
+    dt: Annotated[float | None, positive("s")] = None
+    """Steps of this size [s], in place of tolerances; what --solver euler needs."""
+    max_solver_steps: int | None = None
+    """Cap on the solver's steps: unless given 65536 for each ten seconds, at most 1048576."""
+    engine: Engine
+
+    def check(self) -> None:
+        """Raises `ArgumentError` for what is wrong in itself."""
+        super().check()
+        for name in ("accuracy", "dt") if self.rtol is not None else ():
+            if getattr(self, name) is not None:
+                raise ArgumentError(
+                    f"rtol = {self.rtol:g} is not allowed with {name} = {getattr(self, name)}: "
+                    "give one of them."
+                )
+        self.most_steps()
+
+    def check_rolling(self) -> None:
+        """Raises `ArgumentError` for what rigid feet have no use for."""
+        for name in ("solver", "atol", "dt"):
+            if getattr(self, name) != getattr(SolveOptions, name):
+                raise ArgumentError(
+                    f'{name} = {getattr(self, name)} is not allowed with model = "rigid": its '
+                    "steps are dopri8's, with an absolute tolerance of a hundredth of the "
+                    "relative one."
+                )
+
+    def wanted(self) -> float | None:
+        """The relative error asked for; None where tolerances decide. Raises `ArgumentError`."""
+        if self.accuracy is None:
+            return None
+        from jaxbiped.simulate._accurate_walk import check_accurate_walk
+        from jaxbiped.solve._accuracy import accuracy_told
+
+        return check_accurate_walk(accuracy_told(self.accuracy), atol=self.atol, dt=self.dt)
+
+    def tolerances(self) -> dict[str, Any]:
+        """What decides on the steps' sizes, as `simulate` takes it; raises `ArgumentError`."""
+        if self.wanted() is not None:
+            return {}
+        if self.accuracy is not None:
+            return {"accuracy": self.accuracy, "atol": self.atol}
+        return {"rtol": self.relative, "atol": self.atol}
+
+    @property
+    def relative(self) -> float:
+        """The relative tolerance, where no accuracy is given."""
+        return 1e-6 if self.rtol is None else self.rtol
+
+    def most_steps(self) -> int:
+        """The cap on the solver's steps; raises `ArgumentError`."""
+        check_positive("duration", self.duration, "s")
+        if self.max_solver_steps is not None:
+            check_count("max_solver_steps", self.max_solver_steps)
+            return self.max_solver_steps
+        if self.dt is not None:
+            return MOST_STEPS
+        return int(min(MOST_STEPS, _STEPS_OF_TEN_SECONDS * max(1.0, self.duration / 10.0)))
 
 
-def _request(options: Walk, scene: Scene | RedundantScene, state: State) -> Simulation:
-    return Simulation.prepare(
-        scene,
-        state,
-        duration=options.solve.duration,
-        solver=options.solve.solver,
-        **options.solve.tolerances(),
-        dt=options.solve.dt,
-        engine=options.solve.engine,
-        max_solver_steps=options.solve.most_steps(),
-    )
+class Walk(Command):
+    """Simulate the seed's walker from a start; print its footsteps and how it ended."""
+
+    scene: SceneOptions
+    start: StartOptions
+    solve: SolveOptions
+    output: OutputOptions
+
+    def run(self) -> int:
+        """Runs the command; returns the exit code."""
+        imported = time.perf_counter()
+        scene = self.scene.scene()
+        state = self.start.state(scene)
+        if isinstance(scene, jb.RigidScene):
+            return self._roll(scene, state)
+        return self._walk(scene, state, imported)
+
+    def _walk(
+        self, scene: "jb.Scene | jb.RedundantScene", state: "WalkerState", imported: float
+    ) -> int:
+        from jaxbiped.cli._walk_report import report_walk
+
+        solve = self.solve
+        with stage("preparing the start"):
+            request = jb.Simulation.prepare(
+                scene,
+                state,
+                duration=solve.duration,
+                solver=solve.solver,
+                **solve.tolerances(),
+                dt=solve.dt,
+                engine=solve.engine,
+                max_solver_steps=solve.most_steps(),
+            )
+        make_folder(self.output.out)
+        began = time.perf_counter()
+        walk, seconds = _simulate(request, solve.wanted())
+        wall = {
+            "import": imported - _clock.IMPORT_BEGAN,
+            "compile": time.perf_counter() - began - seconds,
+            "run": seconds,
+        }
+        tolerance = float(request.rtol) if walk.error is None else walk.error.rtol
+        rtol = tolerance if solve.dt is None else None
+        settings = {"name": solve.solver, "rtol": rtol, "dt": solve.dt}
+        return report_walk(self.output, scene, state, walk, settings, wall)
+
+    def _roll(self, scene: "jb.RigidScene", state: "WalkerState") -> int:
+        """Walks on rigid feet."""
+        from jaxbiped.cli._walk_report import report_walk
+        from jaxbiped.solve._accuracy import ACCURACIES
+
+        solve = self.solve
+        make_folder(self.output.out)
+        solve.check_rolling()
+        wanted, tolerances = solve.wanted(), solve.tolerances()
+        tolerances.pop("atol", None)
+        options = dict(
+            duration=solve.duration,
+            engine=solve.engine,
+            max_arrivals=_MOST_STRIKES,
+            max_solver_steps=solve.most_steps(),
+            **(tolerances if wanted is None else {"accuracy": wanted}),
+        )
+        prepared = time.perf_counter()
+        with stage("compiling the simulation (first time for this kind of scene)"):
+            _rigid_walk(scene, state, options)
+        compiled = time.perf_counter()
+        with stage(f"simulating {solve.duration:g} s"):
+            walk = _rigid_walk(scene, state, options)
+        finished = time.perf_counter()
+        # The first run compiles; what a run takes by itself is the second one's.
+        wall = {
+            "import": prepared - _clock.IMPORT_BEGAN,
+            "compile": 2.0 * compiled - prepared - finished,
+            "run": finished - compiled,
+        }
+        rtol = solve.relative
+        if walk.error is not None:
+            rtol = walk.error.rtol
+        elif solve.accuracy is not None:
+            rtol = ACCURACIES[solve.accuracy].rigid_walk
+        settings = {"name": "dopri8", "rtol": rtol}
+        return report_walk(self.output, scene, state, walk, settings, wall)
 
 
-def _report(
-    options: Walk, scene: Any, trajectory: Trajectory, wall: dict[str, float], tolerance: float
-) -> None:
-    with stage("measuring the footsteps"):
-        steps = footsteps(scene, trajectory)
-        ledger = energy_ledger(scene, trajectory)
-    known = tolerance if trajectory.error is None else trajectory.error.rtol
-    rtol = known if options.solve.dt is None else None
-    numbers: JsonObject = {
-        "ending": ending_name(scene, trajectory),
-        "slope_rad": float(scene.ground.slope),
-        "duration_s": float(np.asarray(trajectory.t)[-1]),
-        "steps": _step_list(steps),
-        "energy_residual_J": float(ledger.residual[0]),
-        "energy_residual_relative": relative_residual(ledger),
-        "gravity_work_J": float(ledger.gravity_work[0]),
-        "solver": {
-            "name": options.solve.solver,
-            "rtol": rtol,
-            "dt": options.solve.dt,
-            "engine": trajectory.engine,
-            "accepted": int(trajectory.accepted),
-            "rejected": int(trajectory.rejected),
-        },
-        "wall_s": wall,
-    }
-    if trajectory.error is not None:
-        numbers["error"] = error_numbers(trajectory.error)
-    cost: JsonObject = {}
-    if scene.actuation is not None:
-        cost = walk_cost(scene, trajectory)
-        numbers |= {"actuation_work_J": float(ledger.actuation_work[0])} | cost
-    numbers["warnings"] = walk_warnings(scene, numbers, rtol=rtol)
-    report = Report(options.output.json)
-    if scene.redundant:
-        numbers["constraints"] = constraint_numbers(scene, trajectory)
-    _print(report, numbers)
-    if cost:
-        report.say(cost_sentence(cost))
-    if trajectory.error is not None:
-        report.say(error_sentence(trajectory.error))
-    for sentence in numbers["warnings"]:
-        report.say(f"WARNING: {sentence}")
-    if scene.redundant:
-        report.say(constraint_sentence(numbers["constraints"]))
-    if options.output.out is not None:
-        with stage("drawing the figures and the animation"):
-            paths = write_outputs(scene, trajectory, options.output.out)
-        for path in paths:
-            report.say(f"wrote {path}")
-    report.finish(numbers)
+def _rigid_walk(
+    scene: "jb.RigidScene", state: Any, options: dict[str, Any]
+) -> "jb.Trajectory[Any]":
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
+        walk = jb.rigid_walk(scene, state, **options)
+    walk.t.block_until_ready()
+    return walk
 
 
-def _simulate(request: Simulation, wanted: float | None) -> tuple[Trajectory, float]:
+def _simulate(request: "jb.Simulation", wanted: float | None) -> "tuple[jb.Trajectory[Any], float]":
     """The trajectory, and how long the solve took once it was compiled [s].
 
     To a `wanted` relative error it takes several solves, compiling among them.
     """
     if wanted is not None:
+        from jaxbiped.simulate._accurate_walk import accurate_walk
+
         began = time.perf_counter()
         with warnings.catch_warnings(), stage("simulating, with error bars"):
             warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
@@ -144,12 +219,12 @@ def _simulate(request: Simulation, wanted: float | None) -> tuple[Trajectory, fl
         room = min(most, _ROOM)
     while True:
         trajectory, seconds = _run(dataclasses.replace(request, max_solver_steps=room))
-        if room == most or trajectory.outcome is not Ending.OUT_OF_STEPS:
+        if room == most or trajectory.outcome is not jb.Ending.OUT_OF_STEPS:
             return trajectory, seconds
         room = min(most, 4 * room)
 
 
-def _run(request: Simulation) -> tuple[Trajectory, float]:
+def _run(request: "jb.Simulation") -> "tuple[jb.Trajectory[Any], float]":
     """The trajectory of a request and how long it took once it was compiled [s]."""
     with stage("compiling the simulation (first time for this kind of scene)"):
         program = request.compile()
@@ -157,87 +232,3 @@ def _run(request: Simulation) -> tuple[Trajectory, float]:
     with stage(f"simulating {float(request.duration):g} s"):
         trajectory = program()
     return trajectory, time.perf_counter() - compiled
-
-
-def write_outputs(scene: Any, trajectory: Trajectory, out: Path) -> list[Path]:
-    """Writes the figures, the animations and the trajectory; returns their paths."""
-    from jaxbiped import plot
-    from jaxbiped.measure._dataset import trajectory_dataset
-
-    figures: dict[str, Callable[[Scene, Trajectory], Figure]] = {
-        "strobe.png": plot.gait_strobe,
-        "phase_portrait.png": plot.phase_portrait,
-        "leg_angles.png": plot.leg_angles,
-        "penetrations.png": plot.penetrations,
-        "contact_forces.png": plot.contact_forces,
-    }
-    # The numbers first: no picture that fails takes them away.
-    trajectory_dataset(scene, trajectory).to_netcdf(out / "trajectory.nc")
-    for name, draw in figures.items():
-        draw(scene, trajectory).savefig(out / name)
-    shown = _beginning(trajectory)
-    page = plot.view(scene, shown).save(out / "walk.html")
-    plot.save_animation(plot.animate(scene, shown), out / "walk.gif")
-    return [out / "trajectory.nc", *(out / name for name in figures), out / "walk.gif", page]
-
-
-def _beginning(trajectory: Trajectory) -> Trajectory:
-    """The part of a walk that is animated."""
-    count = int(np.searchsorted(np.asarray(trajectory.t), _SHOWN, side="right"))
-    t, state = jtu.tree_map(lambda leaf: leaf[:count], (trajectory.t, trajectory.state))
-    return dataclasses.replace(trajectory, t=t, state=state)
-
-
-def _step_list(steps: Footsteps) -> list[dict[str, float]]:
-    names = (
-        "time_s",
-        "period_s",
-        "length_m",
-        "speed_m_s",
-        "peak_normal_N",
-        "max_penetration_m",
-        "double_support_s",
-    )
-    columns = [np.asarray(getattr(steps, name)) for name in names]
-    return [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns, strict=True)]
-
-
-def _print(report: Report, numbers: JsonObject) -> None:
-    rows = [
-        (
-            str(k + 1),
-            f"{row['time_s']:.4f}",
-            f"{row['period_s']:.4f}",
-            f"{row['length_m']:.4f}",
-            f"{row['speed_m_s']:.4f}",
-            f"{row['peak_normal_N']:.1f}",
-            f"{1e3 * row['max_penetration_m']:.3f}",
-            f"{1e3 * row['double_support_s']:.3f}",
-        )
-        for k, row in enumerate(numbers["steps"])
-    ]
-    head = (
-        "step",
-        "time s",
-        "period s",
-        "length m",
-        "speed m/s",
-        "peak N",
-        "depth mm",
-        "double ms",
-    )
-    report.say(table(head, rows, most=_MOST_ROWS))
-    solver, wall = numbers["solver"], numbers["wall_s"]
-    report.say(
-        f"{numbers['ending']} after {numbers['duration_s']:.4g} s "
-        f"and {len(rows)} footsteps on a slope of {numbers['slope_rad']:g} rad"
-    )
-    report.say(
-        f"energy left open {numbers['energy_residual_J']:.1e} J "
-        f"of {numbers['gravity_work_J']:.4g} J of gravity's work"
-    )
-    report.say(
-        f"{solver['name']} ({solver['engine']}): {solver['accepted']} steps accepted, "
-        f"{solver['rejected']} rejected; "
-        f"import {wall['import']:.1f} s, compile {wall['compile']:.1f} s, run {wall['run']:.3f} s"
-    )

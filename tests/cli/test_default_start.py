@@ -8,7 +8,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.cli._default_start import default_start
-from jaxbiped.cli._walk_options import StartOptions
+from jaxbiped.cli._scene_options import StartOptions
 
 
 @pytest.mark.parametrize("slope", [0.02, 0.04])

@@ -1,25 +1,15 @@
 """The command doctor, against installations with one thing wrong."""
 
-import json
-
 import pytest
 
-from jaxbiped.cli import _doctor, main
-from jaxbiped.cli._doctor import complaints
-from jaxbiped.cli._self_test import Truth, self_test
-
-
-def _told(capsys, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        main(["doctor", *arguments])
-    return ended.value.code, capsys.readouterr().out
+from jaxbiped.cli import _doctor
+from jaxbiped.cli._doctor import Truth, complaints, self_test
+from tests.cli.commands import numbers_of, run
 
 
 @pytest.mark.slow
 def test_a_sound_installation_passes(capsys):
-    code, printed = _told(capsys, "--json", "-")
-    told = json.loads(printed)
-    assert code == 0
+    told = numbers_of(capsys, "doctor")
     assert told["wrong"] == []
     assert [each["holds"] for each in told["self_test"]] == [True, True, True]
     assert told["vector_width"] in (2, 4, 8)
@@ -30,8 +20,8 @@ def test_a_sound_installation_passes(capsys):
 def test_what_is_wrong_is_said_and_costs_the_exit_code(capsys, monkeypatch):
     off = Truth("height", 1.0, 1.5, 1e-9)
     monkeypatch.setattr(_doctor, "self_test", lambda: (off, off._replace(found=1.0)))
-    code, printed = _told(capsys)
-    assert code == 1
+    assert run("doctor") == 1
+    printed = capsys.readouterr().out
     assert "height is off by 5e-01" in printed
     assert printed.count("wrong") == 1
 
@@ -39,8 +29,8 @@ def test_what_is_wrong_is_said_and_costs_the_exit_code(capsys, monkeypatch):
         raise RuntimeError("no code for this CPU")
 
     monkeypatch.setattr(_doctor, "self_test", broken)
-    code, printed = _told(capsys)
-    assert code == 1
+    assert run("doctor") == 1
+    printed = capsys.readouterr().out
     assert "the self-test ended with RuntimeError: no code for this CPU" in printed
 
 

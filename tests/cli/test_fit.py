@@ -5,15 +5,9 @@ import json
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli import main
+from tests.cli.commands import numbers_of, run
 
 pytestmark = pytest.mark.slow
-
-
-def _run(*words):
-    with pytest.raises(SystemExit) as ended:
-        main(["fit", *words])
-    return ended.value.code
 
 
 @pytest.fixture
@@ -28,8 +22,8 @@ def file(tmp_path):
 
 def test_a_table_and_its_numbers(file, tmp_path, capsys):
     numbers = tmp_path / "fit.json"
-    words = ("--model", "rigid", "--J", "0.011", "--vary", "J,d", "--json", str(numbers))
-    assert _run(str(file), *words) == 0
+    words = ("--model", "rigid", "--J", "0.011", "--vary", "J,d", "--json", numbers)
+    assert run("fit", file, *words) == 0
     shown = capsys.readouterr().out
     held = json.loads(numbers.read_text())
     truth = float(jb.parameter_values(jb.ladder()["rigid"])["J"])
@@ -42,8 +36,7 @@ def test_a_table_and_its_numbers(file, tmp_path, capsys):
 
 
 def test_only_json(file, capsys):
-    assert _run(str(file), "--model", "rigid", "--vary", "d", "--json", "-") == 0
-    held = json.loads(capsys.readouterr().out)
+    held = numbers_of(capsys, "fit", file, "--model", "rigid", "--vary", "d")
     assert held["undetermined"] == []
 
 
@@ -57,10 +50,5 @@ def test_only_json(file, capsys):
     ],
 )
 def test_bad_options(file, capsys, words, said):
-    assert _run(str(file), "--model", "rigid", *words) == 2
+    assert run("fit", file, "--model", "rigid", *words) == 2
     assert said in capsys.readouterr().err
-
-
-def test_a_missing_file(capsys):
-    assert _run("none.json", "--vary", "J") == 2
-    assert "none.json" in capsys.readouterr().err

@@ -8,19 +8,12 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli import _gait as command
-from jaxbiped.cli import main
+from tests.cli.commands import run
 from tests.drawn import assert_is_drawn, points_of, saved_figures
 
 pytestmark = pytest.mark.slow
 
 MEASURES = {"period_s", "step_length_m", "speed_m_s", "peak_normal_N", "spectral_radius"}
-
-
-def _run(*arguments):
-    with pytest.raises(SystemExit) as stopped:
-        main(["gait", *arguments])
-    return stopped.value.code
 
 
 def _read(path):
@@ -38,13 +31,15 @@ def gait(tmp_path_factory):
     folder = tmp_path_factory.mktemp("gait")
     found = []
 
+    find_gait = jb.find_gait
+
     def find(*arguments, **options):
-        found.append(jb.find_gait(*arguments, **options))
+        found.append(find_gait(*arguments, **options))
         return found[-1]
 
     with pytest.MonkeyPatch.context() as patch, saved_figures() as figures:
-        patch.setattr(command, "find_gait", find)
-        code = _run("--out", str(folder / "out"), "--json", str(folder / "gait.json"))
+        patch.setattr(jb, "find_gait", find)
+        code = run("gait", "--out", folder / "out", "--json", folder / "gait.json")
     return code, folder, found[0], figures
 
 
@@ -121,8 +116,8 @@ def test_a_search_that_fails_says_so(gait, tmp_path, capsys, monkeypatch):
         measures=gait[2].measures._replace(period=unknown),
         multipliers=np.full(6, np.nan + 0j),
     )
-    monkeypatch.setattr(command, "find_gait", lambda *arguments, **options: lost)
-    assert _run("--out", str(tmp_path / "out"), "--json", str(tmp_path / "gait.json")) == 1
+    monkeypatch.setattr(jb, "find_gait", lambda *arguments, **options: lost)
+    assert run("gait", "--out", tmp_path / "out", "--json", tmp_path / "gait.json") == 1
     printed = capsys.readouterr().out
     assert len(printed.strip().splitlines()) == 1
     for word in ("not converged", "1.23e-02", "fell forward", "hip_z = 0.399354"):
@@ -134,21 +129,3 @@ def test_a_search_that_fails_says_so(gait, tmp_path, capsys, monkeypatch):
     assert numbers["multipliers"] == [[None, None]] * 6
     assert numbers["stable"] is False
     assert not list((tmp_path / "out").iterdir())
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--accuracy", "nonsense"], ("accuracy", "nonsense", "balanced, tight")),
-        (["--K", "-1"], ("K", "-1", "above 0")),
-        (["--footsteps", "0"], ("footsteps", "0", "above 0")),
-        (["--section", "lunch"], ("section", "lunch", "mid-stance")),
-        (["--json", "/no/such/folder/x.json"], ("--json", "/no/such/folder/x.json", "folder")),
-    ],
-)
-def test_bad_input_is_one_sentence_and_exit_code_2(arguments, words, capsys):
-    assert _run(*arguments) == 2
-    printed = capsys.readouterr()
-    assert printed.out == ""
-    assert len(printed.err.strip().splitlines()) == 1
-    assert all(word in printed.err for word in words)

@@ -7,11 +7,17 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli import _driven
-from jaxbiped.cli._chosen_starts import read_starts
+from jaxbiped._strict_json import strict_json
+from jaxbiped.cli import _walk_report
+from jaxbiped.cli._basin_starts import read_starts
 from jaxbiped.cli._gait import _assumption_line, gait_numbers
-from jaxbiped.cli._walk import _step_list
-from jaxbiped.cli._warnings import cut_short, friction_warnings, relative_residual, walk_warnings
+from jaxbiped.cli._walk_report import footstep_rows
+from jaxbiped.cli._walk_warnings import (
+    cut_short,
+    friction_warnings,
+    relative_residual,
+    walk_warnings,
+)
 from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._gait import Measures
 from jaxbiped.measure._energy_ledger import EnergyLedger
@@ -36,7 +42,7 @@ def gait(radius=0.5, found=jb.gait.Search.FOUND):
 
 
 def test_a_gaits_numbers_stand_under_their_names():
-    numbers = json.loads(json.dumps(gait_numbers(gait())))
+    numbers = json.loads(strict_json(gait_numbers(gait())))
     names = ("period_s", "step_length_m", "speed_m_s", "peak_normal_N", "spectral_radius")
     assert [numbers[name] for name in names] == [0.44, 0.18, 0.41, 160.0, 0.5]
     assert numbers["multipliers"] == [[0.3, 0.4], [None, None]]
@@ -80,11 +86,11 @@ def test_the_cost_of_a_walk_is_over_all_its_footsteps(monkeypatch):
         cost=np.zeros(2), motor_work=np.array([0.2, 0.3]), gravity_work=np.array([0.1, 0.05]),
         distance=np.array([0.2, 0.3]),
     )  # fmt: skip
-    monkeypatch.setattr(_driven, "cost_of_transport", lambda *_: found)
-    told = _driven.walk_cost(jb.with_parameters(SCENE, {"hip_mass": 0.5}), None)
+    monkeypatch.setattr(jb.measure, "cost_of_transport", lambda *_: found)
+    told = _walk_report.walk_cost(jb.with_parameters(SCENE, {"hip_mass": 0.5}), None)
     assert told["cost_of_transport"] == pytest.approx(0.65 / (2.5 * 9.8 * 0.5))
     assert told["motor_work_J"] == pytest.approx(0.5)
-    assert f"{told['cost_of_transport']:.5f}" in _driven.cost_sentence(told)
+    assert f"{told['cost_of_transport']:.5f}" in _walk_report.cost_sentence(told)
 
 
 def ledger(residual):
@@ -127,7 +133,7 @@ def test_friction_that_grows_with_slip_is_warned_of():
 
 def test_rows_of_a_table_of_footsteps_are_footsteps():
     steps = Footsteps(*[np.array([k, k + 0.5]) for k in range(len(Footsteps._fields))])
-    rows = _step_list(steps)
+    rows = footstep_rows(steps)
     assert len(rows) == 2
     for name, value in rows[1].items():
         assert value == Footsteps._fields.index(name) + 0.5

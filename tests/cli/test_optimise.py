@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from jaxbiped.cli import main
+from tests.cli.commands import numbers_of, run
 
 pytestmark = pytest.mark.slow
-RIGID = [
+RIGID = (
     "optimise",
     "--model",
     "rigid",
@@ -17,20 +17,12 @@ RIGID = [
     "64",
     "--footsteps",
     "20",
-]
-
-
-def run(arguments, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    return ended.value.code, capsys.readouterr()
+)
 
 
 def test_numbers_and_tables(capsys, tmp_path):
     held = ["--vary", "d=0.08:0.12,r=0.06:0.1", "--subject-to", "step_length<0.19"]
-    code, said = run([*RIGID, *held, "--json", "-"], capsys)
-    assert code == 0
-    numbers = json.loads(said.out)
+    numbers = numbers_of(capsys, *RIGID, *held)
     assert set(numbers["variables"]) == {"d", "r"}
     assert numbers["objective"]["name"] == "speed"
     assert numbers["objective"]["value"] > numbers["history"][0]["objective"]
@@ -42,9 +34,8 @@ def test_numbers_and_tables(capsys, tmp_path):
     assert certificate["unit_multiplier_error"] < 1e-5
     assert certificate["walk"]["returned"] is True
     assert certificate["basin"]["count"] > 0
-    code, said = run([*RIGID, *held, "--json", str(tmp_path / "best.json")], capsys)
-    assert code == 0
-    assert "held by step_length" in said.out
+    assert run(*RIGID, *held, "--json", tmp_path / "best.json") == 0
+    assert "held by step_length" in capsys.readouterr().out
     assert json.loads((tmp_path / "best.json").read_text()) == numbers
 
 
@@ -63,8 +54,8 @@ def test_numbers_and_tables(capsys, tmp_path):
     ],
 )
 def test_refusals_are_one_sentence_and_exit_with_2(arguments, sentence, capsys):
-    code, said = run([*RIGID, *arguments], capsys)
-    assert code == 2
+    assert run(*RIGID, *arguments) == 2
+    said = capsys.readouterr()
     assert sentence in said.err
     assert len(said.err.strip().splitlines()[-1:]) == 1
     assert not said.out

@@ -1,10 +1,12 @@
 """What takes long in a command, against the word that names it."""
 
 import contextlib
+import functools
 import importlib
 
 import pytest
 
+import jaxbiped as jb
 from jaxbiped.cli import main
 
 WALK = ["walk", "--duration", "0.05"]
@@ -18,18 +20,18 @@ class _ReachedError(Exception):
 @pytest.mark.parametrize(
     ("arguments", "module", "slow", "word"),
     [
-        (WALK, "cli._walk", "Simulation.prepare", "start"),
-        (WALK, "cli._walk", "Simulation.compile", "compiling"),
-        (WALK, "cli._walk", "footsteps", "footsteps"),
-        ([*WALK, "--out", "{out}"], "cli._walk", "write_outputs", "figures"),
-        (HELD, "cli._walk", "Simulation.prepare", "start"),
-        ([*WALK, "--model", "rigid"], "cli._rigid_walk", "rigid_walk", "compiling"),
-        (["basin"], "cli._basin", "labelling", "gaits"),
-        (["models"], "cli._models", "operation_counts", "counting"),
+        (WALK, "_walk", "Simulation.prepare", "start"),
+        (WALK, "_walk", "Simulation.compile", "compiling"),
+        (WALK, "_walk_report", "footsteps", "footsteps"),
+        ([*WALK, "--out", "{out}"], "_walk_report", "cli._walk_report.write_outputs", "figures"),
+        (HELD, "_walk", "Simulation.prepare", "start"),
+        ([*WALK, "--model", "rigid"], "_walk", "rigid_walk", "compiling"),
+        (["basin"], "_basin", "labelling", "gaits"),
+        (["models"], "_models", "measure.operation_counts", "counting"),
         (
             ["constraints"],
-            "cli._constraint_comparison",
-            "final_truth",
+            "_constraint_comparison",
+            "cli._constraint_comparison.final_truth",
             "minimal formulation",
         ),
     ],
@@ -46,10 +48,10 @@ def test_the_slow_part_is_named(arguments, module, slow, word, monkeypatch, tmp_
     def stop(*_, **__):
         raise _ReachedError
 
-    place = importlib.import_module(f"jaxbiped.{module}")
+    place = importlib.import_module(f"jaxbiped.cli.{module}")
     monkeypatch.setattr(place, "stage", recorded)
     *parts, name = slow.split(".")
-    monkeypatch.setattr(getattr(place, parts[0]) if parts else place, name, stop)
+    monkeypatch.setattr(functools.reduce(getattr, parts, jb), name, stop)
     with pytest.raises(_ReachedError):
         main([text.format(out=tmp_path) for text in arguments])
     (message,) = active

@@ -1,47 +1,40 @@
 """What `jaxbiped walk` warns of, against walks that have it."""
 
-import json
 import math
 
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli import main
-from jaxbiped.cli._warnings import walk_warnings
+from jaxbiped.cli._walk_warnings import walk_warnings
+from tests.cli.commands import numbers_of
 
 pytestmark = pytest.mark.slow
 
 
-def _walked(capsys, *arguments):
-    """The numbers that the command writes."""
-    with pytest.raises(SystemExit) as stopped:
-        main(["walk", *arguments, "--json", "-"])
-    assert stopped.value.code == 0
-    return json.loads(capsys.readouterr().out)
-
-
 def test_an_ordinary_walk_has_no_warnings(capsys):
-    numbers = _walked(capsys, "--duration", "1")
+    numbers = numbers_of(capsys, "walk", "--duration", "1")
     assert numbers["warnings"] == []
     assert numbers["energy_residual_relative"] < 1e-4
 
 
 def test_free_flight_is_airborne(capsys):
-    numbers = _walked(capsys, "--hip-z", "100", "--duration", "1")
+    numbers = numbers_of(capsys, "walk", "--hip-z", "100", "--duration", "1")
     assert numbers["ending"] == "airborne"
     (warning,) = numbers["warnings"]
     assert "--hip-z" in warning
 
 
 def test_a_flight_that_came_down_is_none(capsys):
-    assert _walked(capsys, "--hip-z", "0.42", "--duration", "0.2")["ending"] != "airborne"
+    assert (
+        numbers_of(capsys, "walk", "--hip-z", "0.42", "--duration", "0.2")["ending"] != "airborne"
+    )
 
 
 @pytest.mark.parametrize(
     "arguments", [("--rtol", "0.3"), ("--hip-z", "5", "--omega-1", "1e4")], ids=["rtol", "spinning"]
 )
 def test_energy_left_open_is_a_warning_and_a_number(arguments, capsys):
-    numbers = _walked(capsys, *arguments)
+    numbers = numbers_of(capsys, "walk", *arguments)
     (warning,) = (each for each in numbers["warnings"] if "left open" in each)
     assert numbers["energy_residual_relative"] > 1e-3
     assert f"{numbers['energy_residual_relative']:.2g}" in warning
@@ -64,14 +57,14 @@ def test_what_overflowed_is_no_accurate_walk():
 
 
 def test_friction_that_grows_with_slip(capsys):
-    (warning,) = _walked(capsys, "--mu-kinetic", "0.6", "--duration", "0.1")["warnings"]
+    (warning,) = numbers_of(capsys, "walk", "--mu-kinetic", "0.6", "--duration", "0.1")["warnings"]
     assert "mu_kinetic = 0.6" in warning
     assert "mu_static = 0.5" in warning
 
 
 def test_a_cap_on_steps_bounds_a_walk_of_any_duration(capsys):
     """A duration of 1e9 s takes no more memory than the steps that are walked."""
-    numbers = _walked(capsys, "--duration", "1e9", "--max-solver-steps", "1500")
+    numbers = numbers_of(capsys, "walk", "--duration", "1e9", "--max-solver-steps", "1500")
     assert numbers["ending"] == "out of steps"
     (warning,) = numbers["warnings"]
     assert "1500" in warning
@@ -79,12 +72,12 @@ def test_a_cap_on_steps_bounds_a_walk_of_any_duration(capsys):
 
 
 def test_a_walk_that_ends_ends_whatever_its_duration(capsys):
-    numbers = _walked(capsys, "--duration", "1e9", "--slope", "0.06")
+    numbers = numbers_of(capsys, "walk", "--duration", "1e9", "--slope", "0.06")
     assert numbers["ending"] == "fell forward"
 
 
 def test_steps_of_one_size_that_are_too_long(capsys):
-    numbers = _walked(capsys, "--solver", "euler", "--dt", "1e-3", "--duration", "0.3")
+    numbers = numbers_of(capsys, "walk", "--solver", "euler", "--dt", "1e-3", "--duration", "0.3")
     assert (numbers["solver"]["dt"], numbers["solver"]["rtol"]) == (1e-3, None)
     (warning,) = numbers["warnings"]
     assert "--dt" in warning

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli import _gait as command
 from jaxbiped.cli import main
 from jaxbiped.gait import _gait_measures as measuring
 
@@ -17,10 +16,12 @@ pytestmark = pytest.mark.slow
 HOW = dict(parameters=("K", "c"), radius_sensitivities=False, accuracy="tight")
 """All tests here ask for the same, so that one compiled search serves them."""
 
+FIND_GAIT = jb.find_gait
+
 
 def find_alike(*arguments, **options):
     """`find_gait` with fewer sensitivities, whatever was asked for."""
-    return jb.find_gait(*arguments, **options | HOW)
+    return FIND_GAIT(*arguments, **options | HOW)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +91,7 @@ def test_measures_differentiate_in_both_modes(gaits, monkeypatch):
 def test_the_command_finds_it_too(gaits, monkeypatch, tmp_path, capsys):
     """From the seed's start; the same search, told and written as any gait is."""
     minimal, _ = gaits
-    monkeypatch.setattr(command, "find_gait", find_alike)
+    monkeypatch.setattr(jb, "find_gait", find_alike)
     flags = ("--formulation", "redundant", "--method", "index1", "--accuracy", "tight")
     with pytest.raises(SystemExit) as stopped:
         main(["gait", *flags, "--json", str(tmp_path / "gait.json")])

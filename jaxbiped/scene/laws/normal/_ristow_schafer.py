@@ -31,7 +31,7 @@ class RistowSchafer(AbstractHertzianLaw):
     Attributes (leaves of any batch shape):
         K: contact stiffness [N/mⁿ].
         c: contact damping [N·s/m²].
-        n: exponent [–].
+        n: exponent of the contact law [–].
 
     Raises:
         ArgumentError: K not above 0, c below 0 or n below 1.

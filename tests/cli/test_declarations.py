@@ -1,5 +1,6 @@
-"""What options choose from without JAX, against what the registries hold."""
+"""What is read of declarations without JAX, against what importing them gives."""
 
+import dataclasses
 import inspect
 import subprocess
 import sys
@@ -7,49 +8,87 @@ import sys
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._parameter_declaration import parameter_infos
-from jaxbiped.cli import _choices
-from jaxbiped.cli import _gait as gait_command
+from jaxbiped._parameter import parameter_infos
+from jaxbiped.cli._declarations import documentation, fields, names, registered, signature
+from jaxbiped.cli._gait import _SECTIONS
+from jaxbiped.cli._scene_options import SEED
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 from jaxbiped.solve._solvers import SOLVERS
 from jaxbiped.sweep._sweep import CHUNK
 
 
 @pytest.mark.parametrize(
-    ("names", "registry"),
+    ("read", "registry"),
     [
-        (_choices.normal_law_names(), jb.laws.NORMAL_LAWS),
-        (_choices.friction_law_names(), jb.laws.FRICTION_LAWS),
-        (_choices.CONSTRAINT_METHODS, jb.constraints.CONSTRAINT_METHODS),
-        (_choices.ORIENTATIONS, jb.constraints.ORIENTATIONS),
-        (_choices.ENGINES, jb.ENGINES),
-        (_choices.SOLVERS, SOLVERS),
-        (_choices.ACCURACIES, jb.ACCURACIES),
-        (_choices.GAIT_ACCURACIES, GAIT_ACCURACIES),
-        (_choices.SECTIONS, gait_command._SECTIONS),
-        (_choices.SAMPLINGS, jb.starts.SAMPLINGS),
-        (_choices.OPTIMISERS, jb.optimise.OPTIMISERS),
+        (registered("laws", "normal"), jb.laws.NORMAL_LAWS),
+        (registered("laws", "friction", "bristles"), jb.laws.FRICTION_LAWS),
+        (registered("actuation"), jb.actuation.ACTUATORS),
+        (names("constraints.CONSTRAINT_METHODS"), jb.constraints.CONSTRAINT_METHODS),
+        (names("constraints.ORIENTATIONS"), jb.constraints.ORIENTATIONS),
+        (names("ENGINES"), jb.ENGINES),
+        (names("solvers.SOLVERS"), SOLVERS),
+        (names("ACCURACIES"), jb.ACCURACIES),
+        (names("ACCURACIES"), GAIT_ACCURACIES),
+        (names("starts.SAMPLINGS"), jb.starts.SAMPLINGS),
+        (names("optimise.OPTIMISERS"), jb.optimise.OPTIMISERS),
     ],
 )
-def test_names_are_those_of_the_registry_in_its_order(names, registry):
-    assert list(names) == list(registry)
+def test_names_are_those_of_the_registry_in_its_order(read, registry):
+    assert list(read) == list(registry)
+
+
+def test_sections_are_the_package_s():
+    assert {name: type(getattr(jb, kind)()).__name__ for name, kind in _SECTIONS.items()} == {
+        "mid-stance": "MidStance",
+        "heel-strike": "HeelStrike",
+    }
 
 
 def test_the_chunk_is_the_sweep_s():
-    assert _choices.CHUNK == CHUNK
+    assert signature("sweep")["chunk"].default == CHUNK
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "seed_scene", "simulate", "find_gait", "continue_gait", "fit_gait", "optimise_gait",
+        "optimise.certify", "labelling", "sweep", "starts.sample", "starts.grid",
+    ],
+)  # fmt: skip
+def test_defaults_are_those_of_the_function(name):
+    function = jb
+    for part in name.split("."):
+        function = getattr(function, part)
+    own = inspect.signature(function).parameters
+    read = signature(name)
+    assert len(read) > 1
+    for argument, (default, said, _) in read.items():
+        assert default == own[argument].default
+        assert said.endswith(".")
+
+
+def test_fields_of_an_actuator_are_its_own():
+    for name, kind in jb.actuation.ACTUATORS.items():
+        read = fields(registered("actuation")[name])
+        assert list(read) == [field.name for field in dataclasses.fields(kind)]
 
 
 def test_the_seed_s_parameters_are_those_of_its_scene():
     named = inspect.signature(jb.seed_scene).parameters.items()
     usual = {name: each.default for name, each in named if each.kind is each.KEYWORD_ONLY}
-    assert {name: each.value for name, each in _choices.SEED.items()} == usual
+    assert {name: each.default for name, each in SEED.items()} == usual
     scene = jb.seed_scene()
     parts = (scene.walker, scene.ground, scene.normal, scene.friction)
     declared = {name: info for part in parts for name, info in parameter_infos(part).items()}
-    assert set(_choices.SEED) == set(declared)
-    for name, (_, info) in _choices.SEED.items():
-        assert info.quantity.unit == declared[name].quantity.unit
-        assert info[1:] == declared[name][1:], name
+    assert set(SEED) == set(declared)
+    for name, parameter in SEED.items():
+        assert parameter.info == declared[name]
+
+
+def test_help_tells_the_seed_s_start():
+    said = documentation("jaxbiped.cli._scene_options", "StartOptions")
+    for name, value in jb.seed_state()._asdict().items():
+        assert f"the seed's is {float(value):g}" in said[name]
 
 
 _ASK = """

@@ -1,11 +1,8 @@
 """`jaxbiped cache`: what is kept on disk for the next process."""
 
-import dataclasses
-from pathlib import Path
-
-from jaxbiped._files import check_writable_file
-from jaxbiped.caching._disk_cache import BYTES, CACHE_VARIABLE, cache_folder, clear_disk, disk_use
-from jaxbiped.cli._report import Report, table
+from jaxbiped._disk_cache import BYTES, CACHE_VARIABLE, cache_folder, clear_disk, disk_use
+from jaxbiped.cli._options import Command, JsonPath
+from jaxbiped.cli._report import Report, columns
 
 _CONTENT = {
     "lanes": "machine code of lanes",
@@ -16,30 +13,22 @@ _CONTENT = {
 }
 
 
-@dataclasses.dataclass(frozen=True)
-class Cache:
+class Cache(Command):
     """Show the compiled programs that are kept on disk, or remove them."""
 
     clear: bool = False
     """Remove them all: what is run next compiles again."""
-    json: Path | None = None
+    json: JsonPath = None
     """File for the same in JSON; - prints only that."""
-
-    def check(self) -> None:
-        """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
-        if self.json is not None and str(self.json) != "-":
-            check_writable_file("--json", self.json)
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
         report, folder = Report(self.json), cache_folder()
         removed = clear_disk() if self.clear else None
         use = disk_use()
-        rows = [
-            (_CONTENT[kind], str(each.entries), f"{each.size / 2**20:.1f}")
-            for kind, each in use.items()
-        ]
-        report.say(table(("kept", "entries", "MiB"), rows, most=len(rows)))
+        rows = [(_CONTENT[kind], each.entries, each.size / 2**20) for kind, each in use.items()]
+        layout = {"kept": "{0[0]}", "entries": "{0[1]}", "MiB": "{0[2]:.1f}"}
+        report.say(columns(layout, rows))
         if folder is None:
             report.say(f"nothing is kept: {CACHE_VARIABLE} is empty")
         else:

@@ -71,6 +71,14 @@ def walk_warnings(
     return [*found, *friction_warnings(scene)]
 
 
+def rigid_warnings(scene: Any, numbers: JsonObject, *, rtol: float | None) -> list[str]:
+    """The same of a walk on rigid feet."""
+    found, listed = cut_short(numbers["ending"], numbers["solver"]["attempted"]), numbers["steps"]
+    if numbers["footsteps"] > len(listed):
+        found.append(f"only the first {len(listed)} footsteps are listed")
+    return found
+
+
 def cut_short(ending: str, steps: int) -> list[str]:
     """A sentence where the cap on the solver's steps ended a walk."""
     if ending != str(Ending.OUT_OF_STEPS):

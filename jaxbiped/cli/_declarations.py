@@ -1,0 +1,195 @@
+"""Declarations of public names: signatures, parameters and registries, read and not imported.
+
+Help and refusals come before JAX is imported. So what options begin at, what they choose from and
+what is said of them is read in the source of what declares it, as syntax.
+"""
+
+import ast
+import contextlib
+import math
+import re
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jaxbiped
+from jaxbiped._parameter_info import ParameterInfo
+from jaxbiped._quantity import Quantity
+
+_ROOT = Path(jaxbiped.__file__).parent
+_EXPORT = re.compile(r"^from (\S+) import \(?\s*(\w+) as", re.MULTILINE)
+_STATEMENT = re.compile(r"^[^\s)\]}#]", re.MULTILINE)
+_NAMED = re.compile(r'^class (\w+)|^    name: ClassVar.* = "(.+)"$', re.MULTILINE)
+_FIELD = re.compile(r'^(?:class (\w+)|(\S)|    (\w+): |    """(.*?)""")', re.MULTILINE | re.DOTALL)
+_ENTRY = re.compile(r"^ {4}((?:\w+, )*\w+): (.+(?:\n {8}.+)*)", re.MULTILINE)
+_SENTENCE_END = re.compile(r"\. (?=[A-Z])")
+_UNIT = re.compile(r" \[[^]]*\]")
+_OPENINGS = (("def ", "("), ("class ", "("), ("class ", ":"), ("", ": "), ("", " = "))
+"""What stands before and after a name where a statement binds it."""
+_SOURCES: dict[str, str] = {}
+"""Texts of the modules that were read."""
+
+
+class Argument(NamedTuple):
+    """A keyword of a function, or a parameter: its default, and the first sentence about it."""
+
+    default: Any
+    help: str
+    info: ParameterInfo | None = None
+
+
+def signature(name: str) -> dict[str, Argument]:
+    """The keywords of a public function whose defaults are plain values."""
+    home, function = _definition(name)
+    assert isinstance(function, ast.FunctionDef)
+    said, found = _entries(function), {}
+    for keyword, default in zip(function.args.kwonlyargs, function.args.kw_defaults, strict=True):
+        with contextlib.suppress(ValueError):
+            if isinstance(default, ast.Name):
+                default = getattr(_statement(home, default.id), "value", None)
+            if default is not None:
+                value = ast.literal_eval(default)
+                found[keyword.arg] = Argument(value, said.get(keyword.arg, ""))
+    return found
+
+
+def parameters(name: str) -> dict[str, Argument]:
+    """The fields of a public class that are declared by `parameter`, units in what is said."""
+    _, part = _definition(name)
+    assert isinstance(part, ast.ClassDef)
+    said, found = _entries(part), {}
+    for node in part.body:
+        call = node.value if isinstance(node, ast.AnnAssign) else None
+        if isinstance(call, ast.Call) and ast.unparse(call.func) == "parameter":
+            default, info = _declared(call)
+            own = ast.unparse(node.target)  # type: ignore[attr-defined]
+            words = _UNIT.sub("", said.get(own, "")).removesuffix(".")
+            unit = f" [{info.quantity.unit}]" if info.quantity.unit else ""
+            found[own] = Argument(default, f"{words}{unit}.", info)
+    return found
+
+
+def names(registry: str) -> tuple[str, ...]:
+    """The names that a public tuple or table holds."""
+    value = getattr(_definition(registry)[1], "value", None)
+    if isinstance(value, ast.Dict):
+        return tuple(ast.literal_eval(key) for key in value.keys if key is not None)
+    return tuple(ast.literal_eval(value))  # type: ignore[arg-type]
+
+
+def registered(namespace: str, *packages: str) -> dict[str, str]:
+    """Public classes of a namespace by the `name` that each declares, in the order of its lines.
+
+    With `packages`, those that lie in one of these.
+    """
+    found, kind = {}, ""
+    for home, own in _EXPORT.findall(_source(".".join(_home(namespace)))):
+        if not packages or any(f".{package}." in home for package in packages):
+            for each, name in _NAMED.findall(_source(home)):
+                kind = each or kind
+                if name and kind == own:
+                    found[name] = f"{namespace}.{own}"
+    return found
+
+
+def fields(name: str) -> dict[str, Any]:
+    """The fields of a public class and their defaults, None for what has none."""
+    _, part = _definition(name)
+    assert isinstance(part, ast.ClassDef)
+    found = {}
+    for node in part.body:
+        if isinstance(node, ast.AnnAssign) and "ClassVar" not in ast.unparse(node.annotation):
+            said = {each.arg: each.value for each in getattr(node.value, "keywords", ())}
+            default = said.get("default")
+            found[ast.unparse(node.target)] = default and ast.literal_eval(default)
+    return found
+
+
+def documentation(module: str, kind: str) -> dict[str, str]:
+    """What stands below each field of a class, on one line."""
+    found, inside, field = {}, False, ""
+    for opened, other, named, said in _FIELD.findall(_source(module)):
+        if opened or other:
+            inside, field = opened == kind, ""
+        elif named:
+            field = named
+        elif inside and field:
+            found[field] = " ".join(said.split())
+    return found
+
+
+def concept(name: str) -> str:
+    """What the module of a public name is about, by its first line."""
+    line = _source(_home(name)[0]).partition("\n")[0].strip('".')
+    return line.rpartition(": ")[2].capitalize()
+
+
+def _definition(name: str) -> tuple[str, ast.stmt]:
+    """Module and statement that define a public name, such as "optimise.certify"."""
+    home, own = _home(name)
+    return home, _statement(home, own)
+
+
+def _home(name: str) -> tuple[str, str]:
+    """Module that defines a public name, and its name there: by the lines that export it."""
+    module = home = "jaxbiped"
+    for own in name.split("."):
+        exports = {each: home for home, each in _EXPORT.findall(_source(module))}
+        home, module = exports[own], f"{exports[own]}.{own}"
+    return home, own
+
+
+def _statement(module: str, own: str) -> ast.stmt:
+    """The statement of a module that binds a name; of a function up to its docstring's end."""
+    source = _source(module)
+    openings = (f"\n{before}{own}{after}" for before, after in _OPENINGS)
+    begin = 1 + max(map(source.find, openings))
+    if not begin:
+        raise ValueError(f"{module} does not define {own}")
+    follows = _STATEMENT.search(source, source.index("\n", begin))
+    text = source[begin : follows.start() if follows else len(source)]
+    if text.startswith("def "):
+        text = '"""'.join(text.split('"""')[:2]) + '"""'
+    return ast.parse(text).body[0]
+
+
+def _source(module: str) -> str:
+    if module not in _SOURCES:
+        path = _ROOT.joinpath(*module.split(".")[1:])
+        if path == _ROOT:
+            path = path / "__init__.pyi"
+        else:
+            path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+        _SOURCES[module] = path.read_text(encoding="utf-8")
+    return _SOURCES[module]
+
+
+def _entries(node: ast.FunctionDef | ast.ClassDef) -> dict[str, str]:
+    """The first sentence of what a docstring says of each argument or attribute."""
+    found = {}
+    for owners, text in _ENTRY.findall(ast.get_docstring(node) or ""):
+        first = _SENTENCE_END.split(" ".join(text.replace("`", "").split()))[0].removesuffix(".")
+        for own in owners.split(", "):
+            found[own] = first[:1].upper() + first[1:] + "."
+    return found
+
+
+def _declared(call: ast.Call) -> tuple[Any, ParameterInfo]:
+    """Default and metadata of a field that a call of `parameter` declares."""
+    expression = compile(ast.Expression(call), "parameter", "eval")
+    declared: tuple[Any, ParameterInfo] = eval(expression, {"parameter": _parameter, "math": math})
+    return declared
+
+
+def _parameter(
+    words: str,
+    symbol: str = "",
+    unit: str = "",
+    *,
+    positive: bool = False,
+    minimum: float | None = None,
+    size_below: float | None = None,
+    several: bool = False,
+    default: float | None = None,
+) -> tuple[Any, ParameterInfo]:
+    """What `jaxbiped.laws.parameter` keeps of its arguments."""
+    return default, ParameterInfo(Quantity(words, symbol, unit), positive, minimum, size_below)

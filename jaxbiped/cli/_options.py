@@ -1,0 +1,170 @@
+"""Options of commands: what a field's type says of it is checked, its default is a signature's."""
+
+import dataclasses
+import inspect
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple, dataclass_transform, get_args
+
+from tyro.conf import OmitArgPrefixes, arg
+
+from jaxbiped._checks import check_choice, check_count, check_not_negative, check_positive
+from jaxbiped._paths import check_writable_directory, check_writable_file
+from jaxbiped.cli._declarations import Argument, documentation, names, signature
+
+
+class Check(NamedTuple):
+    """In the type of a field: what its value must pass, called with the option's name and it."""
+
+    value: Callable[[str, Any], object]
+    each: bool = False
+    """Whether it is meant for every entry of a tuple."""
+
+
+class Field(NamedTuple):
+    """A field that is made, not written: its type and its default."""
+
+    kind: Any
+    default: Any
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+class Options:
+    """Options of a command, or a group of them: a subclass is a frozen dataclass.
+
+    Args:
+        of: public functions. A field without a default has that of their first argument of its
+            name, and what is said of it there for help, unless its type or its docstring has some.
+        made: further fields.
+    """
+
+    def __init_subclass__(
+        cls, of: tuple[str, ...] = (), made: Mapping[str, Field] | None = None
+    ) -> None:
+        known: dict[str, Argument] = {}
+        for function in reversed(of):
+            known |= signature(function)
+        own = inspect.get_annotations(cls)
+        said = documentation(cls.__module__, cls.__name__) if own else {}
+        for name, kind in own.items():
+            group = get_args(kind)[0] if get_args(kind) else kind
+            if isinstance(group, type) and issubclass(group, Options):
+                # Its flags bear their names alone; tyro would look long for what is said of it.
+                own[name] = Annotated[kind, OmitArgPrefixes, arg(help=group.__doc__)]
+                setattr(cls, name, dataclasses.field(default_factory=group))
+                continue
+            if name in known and not hasattr(cls, name):
+                setattr(cls, name, known[name].default)
+                said.setdefault(name, known[name].help)
+            if not any(getattr(each, "help", None) for each in _said_by(kind)):
+                own[name] = Annotated[kind, arg(help=said[name])]
+        for name, field in (made or {}).items():
+            own[name] = field.kind
+            setattr(cls, name, field.default)
+        cls.__annotations__ = own
+        dataclasses.dataclass(frozen=True, kw_only=True, eq=False, repr=False)(cls)
+
+    def arguments(self, function: str) -> dict[str, Any]:
+        """The options that are keywords of a public function by their names."""
+        return {name: value for name, value in vars(self).items() if name in signature(function)}
+
+    def check(self) -> None:
+        """Raises `ArgumentError` for what is wrong in itself, before anything slow is imported."""
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            value = getattr(self, field.name)
+            if isinstance(value, Options):
+                value.check()
+            for said in _said_by(field.type) if value is not None else ():
+                if isinstance(said, Check):
+                    name = _name(field.name, field.type)
+                    for entry in value if said.each else (value,):
+                        said.value(name, entry)
+
+
+def _said_by(kind: Any) -> tuple[Any, ...]:
+    """What a type, or what it is made of, is annotated with."""
+    inner = get_args(kind)
+    if hasattr(kind, "__metadata__"):
+        return (*_said_by(inner[0]), *kind.__metadata__)
+    return tuple(said for each in inner for said in _said_by(each))
+
+
+def _name(name: str, kind: Any) -> str:
+    """The name by which an option is given."""
+    own = (getattr(each, "name", None) for each in _said_by(kind))
+    return next(filter(None, own), name)
+
+
+class Command(Options):
+    """A command with its options."""
+
+    def run(self) -> int:
+        """Runs it; returns the exit code."""
+        raise NotImplementedError
+
+
+def one_of(registry: str) -> Check:
+    """Whether a name is in a public tuple or table."""
+    return Check(lambda name, value: check_choice(name, value, names(registry)))
+
+
+def among(*allowed: str) -> Check:
+    """Whether a name is one of these."""
+    return Check(lambda name, value: check_choice(name, value, allowed))
+
+
+def positive(unit: str = "") -> Check:
+    """Whether a number is finite and above 0."""
+    return Check(lambda name, value: check_positive(name, value, unit))
+
+
+def _check_accuracy(name: str, accuracy: str) -> None:
+    """Raises `ArgumentError` unless it names an accuracy or is a relative error above 0."""
+    try:
+        number = float(accuracy)
+    except ValueError:
+        check_choice(name, accuracy, (*names("ACCURACIES"), "a relative error above 0"))
+    else:
+        check_positive(name, number)
+
+
+def _check_json(name: str, path: Path) -> None:
+    if str(path) != "-":
+        check_writable_file(f"--{name}", path)
+
+
+def make_folder(out: Path | None) -> None:
+    """Makes the folder of --out, where there is one; raises where it cannot be written."""
+    if out is not None:
+        check_writable_directory("--out", out)
+
+
+Count = Annotated[int, Check(check_count)]
+NotNegative = Annotated[int, Check(check_not_negative)]
+AnyAccuracy = Annotated[str, Check(_check_accuracy)]
+Accuracy = Annotated[
+    AnyAccuracy,
+    arg(
+        help="How accurately to solve: draft, balanced or tight; or a relative error, such as 1e-4."
+    ),
+]
+GaitAccuracy = Annotated[
+    str, arg(help="How accurately to solve: balanced or tight."), one_of("ACCURACIES")
+]
+"""Of a gait with derivatives."""
+Engine = Annotated[
+    str,
+    arg(help="What computes: xla, lanes, cuda, or auto for the faster one that can."),
+    one_of("ENGINES"),
+]
+CycleFootsteps = Annotated[Count, arg(help="Footsteps in a cycle.")]
+JsonPath = Annotated[Path | None, Check(_check_json)]
+Numbers = Annotated[JsonPath, arg(help="File for the numbers in SI units; - prints only them.")]
+
+
+class OutputOptions(Options):
+    """Where results go."""
+
+    out: Path | None = None
+    """Folder for pictures, an animation and the trajectory."""
+    json: Numbers = None
