@@ -81,7 +81,8 @@ def strict_json(
     """A value as JSON.
 
     Args:
-        value: plain values, arrays and numbers of NumPy, in mappings and sequences.
+        value: plain values, complex ones as pairs of their parts, arrays and numbers of NumPy, in
+            mappings and sequences.
         indent: of each level; all on one line unless given.
         unknown: what stands for a number that is not finite; null unless given.
 
@@ -99,6 +100,9 @@ def _plain(value: Any, unknown: Callable[[float], Any]) -> Any:
         return [_plain(each, unknown) for each in value]
     if hasattr(value, "tolist"):
         return _plain(value.tolist(), unknown)
+    if isinstance(value, complex):
+        known = math.isfinite(value.real) and math.isfinite(value.imag)
+        return _plain([value.real, value.imag] if known else [math.nan, math.nan], unknown)
     if isinstance(value, float) and not math.isfinite(value):
         return unknown(value)
     return value

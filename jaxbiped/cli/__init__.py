@@ -29,7 +29,6 @@ from jaxbiped.cli._refusal import one_sentence
 from jaxbiped.cli._report import Report as Report
 from jaxbiped.cli._trade import Trade
 from jaxbiped.cli._walk import Walk
-from jaxbiped.cli.commands._extremes import Extremes
 
 _Command = (
     Annotated[Walk, subcommand("walk")]
@@ -121,7 +120,7 @@ def _with_home(options: Any) -> Any:
     return dataclasses.replace(options, **changed) if changed else options
 
 
-def _parse(arguments: list[str]) -> Command | Extremes | None:
+def _parse(arguments: list[str]) -> Command | None:
     """The command; exits with 2 and one sentence where there is none."""
     refusal = io.StringIO()
     try:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import jaxbiped as jb
-from jaxbiped import _clock
 from jaxbiped._progress import stage
+from jaxbiped.caching import _import_time
 from jaxbiped.cli._basin_starts import StartsOptions
 from jaxbiped.cli._options import (
     AnyAccuracy,
@@ -82,8 +82,8 @@ class Basin(Command):
     def run(self) -> int:
         """Runs the command; returns the exit code."""
         from jaxbiped.solve._accuracy import accuracy_told
-        from jaxbiped.sweep._effort import effort_of
-        from jaxbiped.sweep._zarr_store import check_store
+        from jaxbiped.sweep._labelling_settings import effort_of
+        from jaxbiped.sweep._store_files import check_store
 
         scene: Any = self.scene.scene()
         starts = self.starts.chosen(scene)
@@ -120,7 +120,7 @@ class Basin(Command):
             with stage("drawing the basin"):
                 paths = _write_results(found, known, starts, self.output.out)
             report.wrote(paths)
-        numbers["wall_s"] = time.perf_counter() - _clock.IMPORT_BEGAN
+        numbers["wall_s"] = time.perf_counter() - _import_time.IMPORT_BEGAN
         report.finish(numbers)
         return 0
 

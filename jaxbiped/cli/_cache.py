@@ -1,6 +1,6 @@
 """`jaxbiped cache`: what is kept on disk for the next process."""
 
-from jaxbiped._disk_cache import BYTES, CACHE_VARIABLE, cache_folder, clear_disk, disk_use
+from jaxbiped.caching._disk_cache import BYTES, CACHE_VARIABLE, cache_folder, clear_disk, disk_use
 from jaxbiped.cli._options import Command, JsonPath
 from jaxbiped.cli._report import Report, columns
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 import jaxbiped as jb
-from jaxbiped import _clock
 from jaxbiped._checks import check_finite
+from jaxbiped.caching import _import_time
 from jaxbiped.cli._options import (
     Check,
     Command,
@@ -65,8 +65,8 @@ class ContinueGait(Command, of=("continue_gait",)):
             **self.arguments("continue_gait"),
         )
         wall = {
-            "import": imported - _clock.IMPORT_BEGAN,
-            "total": time.perf_counter() - _clock.IMPORT_BEGAN,
+            "import": imported - _import_time.IMPORT_BEGAN,
+            "total": time.perf_counter() - _import_time.IMPORT_BEGAN,
         }
         report = Report(self.output.json)
         if len(branch):

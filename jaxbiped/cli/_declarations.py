@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import jaxbiped
-from jaxbiped._parameter_info import ParameterInfo
-from jaxbiped._quantity import Quantity
+from jaxbiped._quantity import ParameterInfo, Quantity
 
 _ROOT = Path(jaxbiped.__file__).parent
 _EXPORT = re.compile(r"^from (\S+) import \(?\s*(\w+) as", re.MULTILINE)
@@ -118,9 +117,11 @@ def documentation(module: str, kind: str) -> dict[str, str]:
 
 
 def concept(name: str) -> str:
-    """What the module of a public name is about, by its first line."""
-    line = _source(_home(name)[0]).partition("\n")[0].strip('".')
-    return line.rpartition(": ")[2].capitalize()
+    """The first sentence of what is said of a public class, without its stop."""
+    _, part = _definition(name)
+    assert isinstance(part, ast.ClassDef)
+    said = " ".join((ast.get_docstring(part) or "").partition("\n\n")[0].split())
+    return _SENTENCE_END.split(said)[0].removesuffix(".")
 
 
 def _definition(name: str) -> tuple[str, ast.stmt]:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import jaxbiped as jb
-from jaxbiped._disk_cache import cache_folder, disk_use
+from jaxbiped.caching._disk_cache import cache_folder, disk_use
 from jaxbiped.cli._options import Command, JsonPath
 from jaxbiped.cli._report import Report, columns
 
@@ -144,8 +144,8 @@ def self_test() -> tuple[Truth, ...]:
 
 def _fall() -> tuple[float, float]:
     """Of a walker that is let go 2 m above level ground: height of its hip, and by gravity."""
-    from jaxbiped._cached_jit import cached_jit
     from jaxbiped._types import as_float
+    from jaxbiped.caching._cached_jit import cached_jit
 
     scene = jb.with_parameters(jb.seed_scene(), {"slope": 0.0})
     start = jb.State(*map(as_float, (0.0, 2.0, 0.1, -0.1, 0.0, 0.0, 0.0, 0.0)))

@@ -6,7 +6,7 @@ from typing import Annotated
 from tyro.conf import Positional
 
 import jaxbiped as jb
-from jaxbiped._paths import read_json
+from jaxbiped._files import read_json
 from jaxbiped.cli._options import Check, Command, Count, Engine, GaitAccuracy, Numbers
 from jaxbiped.cli._report import Report, columns
 from jaxbiped.cli._scene_options import SceneOptions, minimal

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import jaxbiped as jb
-from jaxbiped import _clock
+from jaxbiped.caching import _import_time
 from jaxbiped.cli._options import (
     Accuracy,
     Command,
@@ -94,8 +94,8 @@ class FindGait(Command, of=("find_gait",)):
             )
         found = gait.outcome is jb.gait.Search.FOUND  # waits for the result
         wall = {
-            "import": imported - _clock.IMPORT_BEGAN,
-            "total": time.perf_counter() - _clock.IMPORT_BEGAN,
+            "import": imported - _import_time.IMPORT_BEGAN,
+            "total": time.perf_counter() - _import_time.IMPORT_BEGAN,
         }
         search = jb.gait.explain_search(scene, gait)
         numbers = gait_numbers(gait) | {"search": search, "wall_s": wall}

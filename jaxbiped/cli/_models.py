@@ -23,8 +23,8 @@ class Models(Command):
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
-        from jaxbiped._parameter import parameter_infos
-        from jaxbiped.dynamics._formulation import state_type
+        from jaxbiped._parameter_declaration import parameter_infos
+        from jaxbiped.dynamics._state import state_type
 
         seed = jb.seed_scene()
         with stage("counting the operations of every law"):
@@ -60,7 +60,7 @@ def _operations(scene: Any) -> int:
 
 def _laws(seed: "jb.Scene", kind: str) -> "list[JsonObject]":
     """The laws of a kind, each in the seed's scene with the values of its parameters there."""
-    from jaxbiped._parameter import parameter_infos
+    from jaxbiped._parameter_declaration import parameter_infos
 
     matched: dict[str, Any] = {name: SEED[name].default for name in MATCHED[kind]}
     if kind == "normal":

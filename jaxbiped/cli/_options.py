@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple, dataclass_transform, get_args
 from tyro.conf import OmitArgPrefixes, arg
 
 from jaxbiped._checks import check_choice, check_count, check_not_negative, check_positive
-from jaxbiped._paths import check_writable_directory, check_writable_file
+from jaxbiped._files import check_writable_directory, check_writable_file
 from jaxbiped.cli._declarations import Argument, documentation, names, signature
 
 

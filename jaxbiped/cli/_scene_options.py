@@ -19,7 +19,7 @@ from jaxbiped.cli._declarations import (
 from jaxbiped.cli._options import Check, Field, Options, among, one_of
 
 if TYPE_CHECKING:
-    from jaxbiped.dynamics._rigid_state import WalkerState
+    from jaxbiped.dynamics._state import WalkerState
     from jaxbiped.scene.actuation._abstract_actuator import Actuation
 
     AnyScene = jb.Scene | jb.RigidScene | jb.RedundantScene
@@ -93,7 +93,7 @@ class ActuationOptions(Options, made=dict(_actuator_fields())):
 
 
 def _actuator(option: str, kind: Any, texts: tuple[str, ...]) -> Any:
-    from jaxbiped._parameter import parameter_infos
+    from jaxbiped._parameter_declaration import parameter_infos
 
     infos = parameter_infos(kind)
     values: dict[str, Any] = {}
@@ -135,7 +135,7 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
         """Raises `ArgumentError` for what is wrong in itself, before a scene is made."""
         super().check()
         check_choice("normal", self.normal, registered("laws", "normal"))
-        check_choice("friction", self.friction, registered("laws", "friction", "bristles"))
+        check_choice("friction", self.friction, registered("laws", "friction"))
         check_pair("l", self.values["l"], "r", self.values["r"])
         for name, value in self.named_values().items():
             own = name.rpartition(".")[2]

@@ -6,9 +6,9 @@ import warnings
 from typing import TYPE_CHECKING, Annotated, Any
 
 import jaxbiped as jb
-from jaxbiped import _clock
 from jaxbiped._checks import ArgumentError, check_count, check_positive
 from jaxbiped._progress import stage
+from jaxbiped.caching import _import_time
 from jaxbiped.cli._options import (
     AnyAccuracy,
     Command,
@@ -22,7 +22,7 @@ from jaxbiped.cli._options import (
 from jaxbiped.cli._scene_options import SceneOptions, StartOptions
 
 if TYPE_CHECKING:
-    from jaxbiped.dynamics._rigid_state import WalkerState
+    from jaxbiped.dynamics._state import WalkerState
 
 MOST_STEPS = 1 << 20
 """Solver's steps that nobody asked for more than: about 25 minutes of the seed's walk."""
@@ -143,7 +143,7 @@ class Walk(Command):
         began = time.perf_counter()
         walk, seconds = _simulate(request, solve.wanted())
         wall = {
-            "import": imported - _clock.IMPORT_BEGAN,
+            "import": imported - _import_time.IMPORT_BEGAN,
             "compile": time.perf_counter() - began - seconds,
             "run": seconds,
         }
@@ -178,7 +178,7 @@ class Walk(Command):
         finished = time.perf_counter()
         # The first run compiles; what a run takes by itself is the second one's.
         wall = {
-            "import": prepared - _clock.IMPORT_BEGAN,
+            "import": prepared - _import_time.IMPORT_BEGAN,
             "compile": 2.0 * compiled - prepared - finished,
             "run": finished - compiled,
         }

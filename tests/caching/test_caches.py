@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped import _caches
+from jaxbiped.caching import _caches
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import Once, bounded_cache
 from jaxbiped.compiler.runtime import _compiled_program, _record_cache

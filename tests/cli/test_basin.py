@@ -13,7 +13,7 @@ from matplotlib.colors import to_hex
 
 import jaxbiped as jb
 from jaxbiped import plot
-from jaxbiped.plot._label_colours import label_colour
+from jaxbiped.plot.style import label_colour
 from tests.cli.commands import numbers_of, run
 from tests.drawn import assert_is_drawn, saved_figures
 

@@ -1,6 +1,6 @@
 """The command cache, against the folder: what is kept on disk, and gone where that is wanted."""
 
-from jaxbiped._disk_cache import CACHE_VARIABLE, read_entry, write_entry
+from jaxbiped.caching._disk_cache import CACHE_VARIABLE, read_entry, write_entry
 from tests.cli.commands import numbers_of, run
 
 

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._parameter import parameter_infos
+from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped.cli._declarations import documentation, fields, names, registered, signature
 from jaxbiped.cli._gait import _SECTIONS
 from jaxbiped.cli._scene_options import SEED
@@ -21,7 +21,7 @@ from jaxbiped.sweep._sweep import CHUNK
     ("read", "registry"),
     [
         (registered("laws", "normal"), jb.laws.NORMAL_LAWS),
-        (registered("laws", "friction", "bristles"), jb.laws.FRICTION_LAWS),
+        (registered("laws", "friction"), jb.laws.FRICTION_LAWS),
         (registered("actuation"), jb.actuation.ACTUATORS),
         (names("constraints.CONSTRAINT_METHODS"), jb.constraints.CONSTRAINT_METHODS),
         (names("constraints.ORIENTATIONS"), jb.constraints.ORIENTATIONS),

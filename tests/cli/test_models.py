@@ -11,7 +11,6 @@ from reference.rigid import rigid_walker
 import jaxbiped as jb
 from jaxbiped.cli._scene_options import SEED, SceneOptions
 from tests.cli.commands import numbers_of, run
-from tests.rigid_reference import needed_friction
 
 
 def test_lists_every_law_with_units_and_cost(capsys):

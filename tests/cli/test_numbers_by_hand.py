@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped._strict_json import strict_json
+from jaxbiped._files import strict_json
 from jaxbiped.cli import _walk_report
 from jaxbiped.cli._basin_starts import read_starts
 from jaxbiped.cli._gait import _assumption_line, gait_numbers
