@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.basins._labels import Label
+from jaxbiped.basins._label import Label
+from jaxbiped.solve._saved_outputs import LastStep
 from jaxbiped.sweep._convergence_test import NO_GAIT, UNDECIDED, Goals, after_arrival, empty_history
 from jaxbiped.sweep._labelling_loop import CompliantLabelling, Progress, Start, _outcome
 from jaxbiped.sweep._walk_events import contact_places, slip_distances
@@ -210,7 +211,7 @@ def attempt():
             solver=SimpleNamespace(interpolation_cls=Straight),
         )
         zero = jnp.zeros(())
-        last = SimpleNamespace(noted=True, t=t - 0.01, state=before, coefficients=None)
+        last = LastStep(True, t - 0.01, before, ())
         step = _Step(t, after, (zero, zero, zero), last)
         trace = empty_history(zero, 7, (1,))
         flat, none = jnp.zeros((1, 6, 7)), jnp.asarray([NO_GAIT])
