@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     import xarray
 
     from jaxbiped._types import JsonObject
-    from jaxbiped.sweep.starts._starts import AbstractStarts
 
 _GAIT = {
     "gait": "{0[name]}",
@@ -186,7 +185,7 @@ def _print(report: Report, numbers: "JsonObject") -> None:
 
 
 def _write_results(
-    found: "xarray.Dataset", known: "jb.Labelling", starts: "AbstractStarts", out: Path
+    found: "xarray.Dataset", known: "jb.Labelling", starts: "jb.starts.AbstractStarts", out: Path
 ) -> list[Path]:
     """Writes the results, and the picture where there are two axes; returns the paths."""
     paths = [out / "basin.nc"]

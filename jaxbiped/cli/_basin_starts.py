@@ -2,14 +2,11 @@
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.cli._options import Check, Count, Options, one_of
-
-if TYPE_CHECKING:
-    from jaxbiped.sweep.starts._starts import AbstractStarts
 
 _USUAL = ("theta_swing=-0.5:0.3:100", "omega_swing=-2:4:100")
 """Axes of a basin that nobody chose, and as many starts on each."""
@@ -78,7 +75,7 @@ class StartsOptions(Options, of=("starts.sample", "starts.grid")):
             )
         super().check()
 
-    def chosen(self, scene: "jb.Scene | jb.RigidScene") -> "AbstractStarts":
+    def chosen(self, scene: "jb.Scene | jb.RigidScene") -> "jb.starts.AbstractStarts":
         """The starts; raises `ArgumentError`."""
         import numpy as np
 

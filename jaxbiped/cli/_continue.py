@@ -52,11 +52,11 @@ class ContinueGait(Command, of=("continue_gait",)):
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
-        imported = time.perf_counter()
+        continue_gait, imported = jb.continue_gait, time.perf_counter()
         scene = self.scene.scene()
         state = self.start.state(scene) if self.start.given else None
         make_folder(self.output.out)
-        branch = jb.continue_gait(
+        branch = continue_gait(
             scene,  # type: ignore[arg-type]
             self.along,
             bounds=(self.first, self.last),

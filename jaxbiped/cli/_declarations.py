@@ -116,14 +116,6 @@ def documentation(module: str, kind: str) -> dict[str, str]:
     return found
 
 
-def concept(name: str) -> str:
-    """The first sentence of what is said of a public class, without its stop."""
-    _, part = _definition(name)
-    assert isinstance(part, ast.ClassDef)
-    said = " ".join((ast.get_docstring(part) or "").partition("\n\n")[0].split())
-    return _SENTENCE_END.split(said)[0].removesuffix(".")
-
-
 def _definition(name: str) -> tuple[str, ast.stmt]:
     """Module and statement that define a public name, such as "optimise.certify"."""
     home, own = _home(name)

@@ -76,7 +76,7 @@ class FindGait(Command, of=("find_gait",)):
         from jaxbiped.solve._accuracy import accuracy_told
         from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 
-        imported = time.perf_counter()
+        find_gait, imported = jb.find_gait, time.perf_counter()
         scene = self.scene.scene()
         # A start that is not told is the search's own choice.
         state = self.start.state(scene) if self.start.given else None
@@ -84,7 +84,7 @@ class FindGait(Command, of=("find_gait",)):
         section = None if self.section is None else getattr(jb, _SECTIONS[self.section])()
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # the table says it
-            gait = jb.find_gait(
+            gait = find_gait(
                 scene,
                 state,
                 footsteps=self.footsteps,

@@ -23,9 +23,6 @@ from jaxbiped.cli._scene_options import SceneOptions, minimal
 
 if TYPE_CHECKING:
     from jaxbiped._types import JsonObject
-    from jaxbiped.continuation._nearest_bifurcation import NearestBifurcation
-    from jaxbiped.optimise._certificate import Certificate
-    from jaxbiped.optimise._optimum import Optimum
 
 _USUAL_RANGE = 2.0
 """Factor to both sides of a parameter's own value that it varies by unless bounds are given."""
@@ -136,7 +133,7 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
 
 
 def _optimum_numbers(
-    found: "Optimum", certificate: "Certificate", goal: str, sense: str
+    found: "jb.optimise.Optimum", certificate: "jb.optimise.Certificate", goal: str, sense: str
 ) -> "JsonObject":
     """What is known of an optimum in SI units, for `strict_json`."""
     return {
@@ -166,7 +163,7 @@ def _optimum_numbers(
     }
 
 
-def _certificate_numbers(certificate: "Certificate") -> "JsonObject":
+def _certificate_numbers(certificate: "jb.optimise.Certificate") -> "JsonObject":
     """A certificate, for `strict_json`."""
     told, (norm, norm_error) = certificate.optimality, certificate.sensitivity_norm
     basin, walk = certificate.basin, certificate.walk
@@ -194,7 +191,9 @@ def _certificate_numbers(certificate: "Certificate") -> "JsonObject":
     }
 
 
-def _print(report: Report, scene: "jb.Scene | jb.RigidScene", found: "Optimum", goal: str) -> None:
+def _print(
+    report: Report, scene: "jb.Scene | jb.RigidScene", found: "jb.optimise.Optimum", goal: str
+) -> None:
     units, own = jb.parameter_quantities(scene), jb.parameter_values(scene)
     variables = {
         "variable": "{0[0]}",
@@ -217,7 +216,7 @@ def _print(report: Report, scene: "jb.Scene | jb.RigidScene", found: "Optimum", 
     )
 
 
-def _measures(found: "Optimum") -> Iterator[tuple[object, ...]]:
+def _measures(found: "jb.optimise.Optimum") -> Iterator[tuple[object, ...]]:
     """Each measure, its first value, its best one and the error, or more than a range holds."""
     first = found.history[0].measures if found.history else {}
     for name, value in found.known.values.items():
@@ -229,7 +228,7 @@ def _measures(found: "Optimum") -> Iterator[tuple[object, ...]]:
             yield name, began, best, error, jb.optimise.OBJECTIVES[name]
 
 
-def _certificate_lines(certificate: "Certificate") -> Iterator[str]:
+def _certificate_lines(certificate: "jb.optimise.Certificate") -> Iterator[str]:
     told, basin, walk = certificate.optimality, certificate.basin, certificate.walk
     yield f"optimality: residual {told.residual:.1e}, requirements missed by {told.excess:.1e}"
     for each in (*told.requirements, *told.bounds):
@@ -265,7 +264,7 @@ def _certificate_lines(certificate: "Certificate") -> Iterator[str]:
         )
 
 
-def _bifurcation_line(nearest: "NearestBifurcation") -> str:
+def _bifurcation_line(nearest: "jb.continuation.NearestBifurcation") -> str:
     if nearest.kind is None:
         return f"no bifurcation along {nearest.along} in the range that was followed"
     times = "" if math.isnan(nearest.ratio) else f" ({nearest.ratio:.3g} times its value)"

@@ -10,7 +10,6 @@ import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_pair
 from jaxbiped.cli._declarations import (
     Argument,
-    concept,
     fields,
     parameters,
     registered,
@@ -19,9 +18,6 @@ from jaxbiped.cli._declarations import (
 from jaxbiped.cli._options import Check, Field, Options, among, one_of
 
 if TYPE_CHECKING:
-    from jaxbiped.dynamics._state import WalkerState
-    from jaxbiped.scene.actuation._abstract_actuator import Actuation
-
     AnyScene = jb.Scene | jb.RigidScene | jb.RedundantScene
 
 _BODY = ("m", "J", "l", "d", "r", "hip_mass")
@@ -52,9 +48,14 @@ def _parameter_fields() -> Iterator[tuple[str, Field]]:
 
 def _actuator_fields() -> Iterator[tuple[str, Field]]:
     for name, part in registered("actuation").items():
-        numbers = (f"{each}={'…' if x is None else x}" for each, x in fields(part).items())
-        said = arg(help=f"{concept(part)}: {' '.join(numbers)}")
-        checked = Annotated[tuple[str, ...], said, Check(_named_text, each=True)]
+        known, said = parameters(part), []
+        for own, default in fields(part).items():
+            info = known[own].info if own in known else None
+            words = f" {info.quantity.words} [{info.quantity.unit}]" if info else ""
+            said.append(f"{own}={'…' if default is None else default}{words}")
+        checked = Annotated[
+            tuple[str, ...], arg(help="; ".join(said) + "."), Check(_named_text, each=True)
+        ]
         yield name.replace("-", "_"), Field(checked, ())
 
 
@@ -82,7 +83,7 @@ def _numbers(option: str, name: str, text: str, parts: list[str]) -> list[float]
 class ActuationOptions(Options, made=dict(_actuator_fields())):
     """What drives the walker beside gravity, each by its numbers as name=value (SI units)."""
 
-    def actuation(self) -> "Actuation":
+    def actuation(self) -> tuple[Any, ...] | None:
         """The actuators that were asked for, None where none was; raises `ArgumentError`."""
         parts = (
             _actuator(name, kind, texts)
@@ -272,7 +273,7 @@ class StartOptions(Options):
         for name, value in self.given.items():
             check_finite(f"state.{name}", value)
 
-    def state(self, scene: "AnyScene") -> "WalkerState":
+    def state(self, scene: "AnyScene") -> Any:
         """The start, of the kind that the scene needs; raises `ArgumentError`.
 
         A rigid walker takes the place and the legs' angles and rates.

@@ -3,7 +3,7 @@
 import dataclasses
 import time
 import warnings
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError, check_count, check_positive
@@ -21,13 +21,12 @@ from jaxbiped.cli._options import (
 )
 from jaxbiped.cli._scene_options import SceneOptions, StartOptions
 
-if TYPE_CHECKING:
-    from jaxbiped.dynamics._state import WalkerState
-
 MOST_STEPS = 1 << 20
 """Solver's steps that nobody asked for more than: about 25 minutes of the seed's walk."""
 _STEPS_OF_TEN_SECONDS = 65536
 _MOST_STRIKES = 4096
+_Walked: TypeAlias = "tuple[jb.Trajectory[Any], dict[str, Any], dict[str, float]]"
+"""A walk, its solver's settings, and times [s]."""
 _ROOM = 1 << 17
 """Steps that XLA finds room for at first; a walk that takes more is run again with more room."""
 
@@ -115,18 +114,18 @@ class Walk(Command):
 
     def run(self) -> int:
         """Runs the command; returns the exit code."""
+        from jaxbiped.cli._walk_report import report_walk
+
         imported = time.perf_counter()
         scene = self.scene.scene()
         state = self.start.state(scene)
-        if isinstance(scene, jb.RigidScene):
-            return self._roll(scene, state)
-        return self._walk(scene, state, imported)
+        walked = self._roll if isinstance(scene, jb.RigidScene) else self._walk
+        walk, settings, wall = walked(scene, state)
+        wall["import"] = imported - _clock.IMPORT_BEGAN
+        return report_walk(self.output, scene, state, walk, settings, wall)
 
-    def _walk(
-        self, scene: "jb.Scene | jb.RedundantScene", state: "WalkerState", imported: float
-    ) -> int:
-        from jaxbiped.cli._walk_report import report_walk
-
+    def _walk(self, scene: Any, state: Any) -> _Walked:
+        """Walks on compliant feet."""
         solve = self.solve
         with stage("preparing the start"):
             request = jb.Simulation.prepare(
@@ -142,21 +141,13 @@ class Walk(Command):
         make_folder(self.output.out)
         began = time.perf_counter()
         walk, seconds = _simulate(request, solve.wanted())
-        wall = {
-            "import": imported - _import_time.IMPORT_BEGAN,
-            "compile": time.perf_counter() - began - seconds,
-            "run": seconds,
-        }
+        wall = {"compile": time.perf_counter() - began - seconds, "run": seconds}
         tolerance = float(request.rtol) if walk.error is None else walk.error.rtol
         rtol = tolerance if solve.dt is None else None
-        settings = {"name": solve.solver, "rtol": rtol, "dt": solve.dt}
-        return report_walk(self.output, scene, state, walk, settings, wall)
+        return walk, {"name": solve.solver, "rtol": rtol, "dt": solve.dt}, wall
 
-    def _roll(self, scene: "jb.RigidScene", state: "WalkerState") -> int:
+    def _roll(self, scene: Any, state: Any) -> _Walked:
         """Walks on rigid feet."""
-        from jaxbiped.cli._walk_report import report_walk
-        from jaxbiped.solve._accuracy import ACCURACIES
-
         solve = self.solve
         make_folder(self.output.out)
         solve.check_rolling()
@@ -175,20 +166,15 @@ class Walk(Command):
         compiled = time.perf_counter()
         with stage(f"simulating {solve.duration:g} s"):
             walk = _rigid_walk(scene, state, options)
-        finished = time.perf_counter()
+        run = time.perf_counter() - compiled
         # The first run compiles; what a run takes by itself is the second one's.
-        wall = {
-            "import": prepared - _import_time.IMPORT_BEGAN,
-            "compile": 2.0 * compiled - prepared - finished,
-            "run": finished - compiled,
-        }
+        wall = {"compile": compiled - prepared - run, "run": run}
         rtol = solve.relative
         if walk.error is not None:
             rtol = walk.error.rtol
         elif solve.accuracy is not None:
-            rtol = ACCURACIES[solve.accuracy].rigid_walk
-        settings = {"name": "dopri8", "rtol": rtol}
-        return report_walk(self.output, scene, state, walk, settings, wall)
+            rtol = jb.ACCURACIES[solve.accuracy].rigid_walk
+        return walk, {"name": "dopri8", "rtol": rtol}, wall
 
 
 def _rigid_walk(

@@ -2,7 +2,7 @@
 
 import dataclasses
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import jax.tree_util as jtu
 import numpy as np
@@ -19,7 +19,6 @@ from jaxbiped.cli._walk_warnings import (
     walk_warnings,
 )
 from jaxbiped.constraints._constraint_methods import name_of
-from jaxbiped.dynamics._redundant_state import LegsState
 from jaxbiped.solve._error_estimate import error_numbers, error_sentence
 
 _MOST_ROWS = 24
@@ -248,7 +247,7 @@ def cost_sentence(cost: JsonObject) -> str:
 
 def _constraint_numbers(scene: "jb.RedundantScene", walk: "jb.Trajectory[Any]") -> JsonObject:
     """Largest violations at the ends of the steps and what was corrected at the start (SI)."""
-    off = jb.dynamics.violation(scene, cast(LegsState, walk.state))
+    off = jb.dynamics.violation(scene, walk.state)
     force = jb.dynamics.hip_force(scene, walk.state)
     correction = walk.correction
     return {

@@ -4,14 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from jaxbiped._ending import Ending
+import jaxbiped as jb
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._contact_forces import contacts
-from jaxbiped.measure._energy_ledger import EnergyLedger
+from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.measure._samples import at_steps
-from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.solve._accuracy import unresolved_slip
-from jaxbiped.solve._trajectory import Trajectory
 
 AIRBORNE = "airborne"
 """How a simulation ended whose time ran out before any foot touched the ground."""
@@ -21,16 +18,16 @@ _FAR = 1e3
 """How many times the relative tolerance it may be."""
 
 
-def ending_name(scene: Any, trajectory: Trajectory) -> str:
+def ending_name(scene: Any, trajectory: "jb.Trajectory[Any]") -> str:
     """How a walk ended, in words: its `Ending`, or that it never came to the ground."""
-    if trajectory.outcome is Ending.WALKING:
+    if trajectory.outcome is jb.Ending.WALKING:
         touching = at_steps(scene, trajectory, contacts).touching
         if not np.any(np.stack(touching)):
             return AIRBORNE
     return str(trajectory.outcome)
 
 
-def relative_residual(ledger: EnergyLedger) -> float | None:
+def relative_residual(ledger: "jb.measure.EnergyLedger") -> float | None:
     """The energy left open as a share of what gravity, losses and storage turned over.
 
     None where that is no number: nothing happened, or the solve failed.
@@ -42,9 +39,7 @@ def relative_residual(ledger: EnergyLedger) -> float | None:
     return share if np.isfinite(share) else None
 
 
-def walk_warnings(
-    scene: Scene | RedundantScene, numbers: JsonObject, *, rtol: float | None
-) -> list[str]:
+def walk_warnings(scene: Any, numbers: JsonObject, *, rtol: float | None) -> list[str]:
     """One sentence for each thing to know before relying on a walk's numbers."""
     found = []
     if numbers["ending"] == AIRBORNE:
@@ -81,7 +76,7 @@ def rigid_warnings(scene: Any, numbers: JsonObject, *, rtol: float | None) -> li
 
 def cut_short(ending: str, steps: int) -> list[str]:
     """A sentence where the cap on the solver's steps ended a walk."""
-    if ending != str(Ending.OUT_OF_STEPS):
+    if ending != str(jb.Ending.OUT_OF_STEPS):
         return []
     return [
         f"the walk was cut short at {steps} of the solver's steps: --max-solver-steps allows "
@@ -89,7 +84,7 @@ def cut_short(ending: str, steps: int) -> list[str]:
     ]
 
 
-def friction_warnings(scene: Scene | RedundantScene) -> list[str]:
+def friction_warnings(scene: Any) -> list[str]:
     """A sentence where friction grows with slip instead of falling."""
     law = scene.friction
     static, kinetic = (getattr(law, name, None) for name in ("mu_static", "mu_kinetic"))

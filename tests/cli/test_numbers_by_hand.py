@@ -145,10 +145,12 @@ HEAD = "hip_x,hip_z,theta_1,theta_2,hip_vx,hip_vz,omega_1,omega_2"
 @pytest.mark.parametrize(
     ("text", "said"),
     [
+        ("", "has the header ''"),
         ("hip_x,hip_z\n1,2\n", "has the header 'hip_x,hip_z'"),
         (f"{HEAD}\n", "holds no starts"),
         (f"{HEAD}\n1,2,3,4,5,6,7,8\n1,2,3,4,5,6,7\n", "line 3: 7 numbers instead of 8"),
         (f"{HEAD}\n1,2,3,4,5,6,7,8,9\n", "line 2: 9 numbers instead of 8"),
+        (f"{HEAD}\n1,2,3\n", "line 2: 3 numbers instead of 8"),
         (f"{HEAD}\n1,2,3,x,5,6,7,8\n", "line 2: '1,2,3,x,5,6,7,8' is not all numbers"),
     ],
 )

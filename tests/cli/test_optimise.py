@@ -39,23 +39,9 @@ def test_numbers_and_tables(capsys, tmp_path):
     assert json.loads((tmp_path / "best.json").read_text()) == numbers
 
 
-@pytest.mark.parametrize(
-    ("arguments", "sentence"),
-    [
-        (["--vary", "q"], "vary = 'q' is not known"),
-        (["--vary", "d=0.2:0.1"], "bounds of d = (0.2, 0.1) are empty"),
-        (["--vary", "d=0.2"], "write d=low:high"),
-        (["--vary", "hip_mass"], "hip_mass needs bounds"),
-        (["--vary", "d", "--minimise", "period"], "either maximise or minimise"),
-        (["--vary", "d", "--subject-to", "speed<0.1", "speed>0.2"], "contradict"),
-        (["--vary", "d", "--subject-to", "slip_distance<1"], "roll without slip"),
-        (["--vary", "d", "--optimiser", "magic"], "optimiser = 'magic'"),
-        (["--vary", "d", "--slope", "-0.1"], "the design to start from has no gait"),
-    ],
-)
-def test_refusals_are_one_sentence_and_exit_with_2(arguments, sentence, capsys):
-    assert run(*RIGID, *arguments) == 2
+def test_a_design_without_a_gait_is_refused(capsys):
+    assert run(*RIGID, "--vary", "d", "--slope", "-0.1") == 2
     said = capsys.readouterr()
-    assert sentence in said.err
+    assert "the design to start from has no gait" in said.err
     assert len(said.err.strip().splitlines()[-1:]) == 1
     assert not said.out

@@ -117,6 +117,26 @@ REFUSED = [
     ("trade --duration -1", "duration = -1"),
     ("trade --repeats 0", "repeats = 0"),
     ("trade --out /proc/nowhere", "--out"),
+    ("optimise --maximise speed --model rigid --vary q", "vary = 'q' is not known"),
+    (
+        "optimise --maximise speed --model rigid --vary d=0.2:0.1",
+        "bounds of d = (0.2, 0.1) are empty",
+    ),
+    ("optimise --maximise speed --model rigid --vary d=0.2", "write d=low:high"),
+    ("optimise --maximise speed --model rigid --vary hip_mass", "hip_mass needs bounds"),
+    (
+        "optimise --maximise speed --model rigid --vary d --minimise period",
+        "either maximise or minimise",
+    ),
+    (
+        "optimise --maximise speed --model rigid --vary d --subject-to 'speed<0.1' 'speed>0.2'",
+        "contradict",
+    ),
+    (
+        "optimise --maximise speed --model rigid --vary d --subject-to 'slip_distance<1'",
+        "roll without slip",
+    ),
+    ("optimise --vary d --optimiser magic", "optimiser = 'magic'"),
     ("fit none.json --vary J", "none.json"),
 ]
 """Command lines, and words that stand in the sentence that refuses each."""
