@@ -8,8 +8,8 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 import jaxbiped as jb
-from jaxbiped._cached_jit import cached_jit
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 
 _DEEPEST = 0.1
 """The deepest that a foot begins in a soft ground, in units of l."""

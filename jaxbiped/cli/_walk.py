@@ -121,7 +121,7 @@ class Walk(Command):
         state = self.start.state(scene)
         walked = self._roll if isinstance(scene, jb.RigidScene) else self._walk
         walk, settings, wall = walked(scene, state)
-        wall["import"] = imported - _clock.IMPORT_BEGAN
+        wall["import"] = imported - _import_time.IMPORT_BEGAN
         return report_walk(self.output, scene, state, walk, settings, wall)
 
     def _walk(self, scene: Any, state: Any) -> _Walked:
