@@ -160,7 +160,7 @@ print(walk.engine, walk.outcome, float(walk.t[-1]).hex(), float(gait.measures.pe
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_another_process_runs_what_one_compiled(tmp_path, monkeypatch):
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
 

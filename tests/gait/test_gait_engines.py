@@ -20,11 +20,12 @@ def gait():
     return jb.find_gait(jb.seed_scene(), engine="lanes")
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "scene",
     [
         pytest.param(jb.ladder()["rigid"], id="rigid"),
-        pytest.param(jb.seed_scene(), id="seed", marks=pytest.mark.nightly),
+        pytest.param(jb.seed_scene(), id="seed"),
     ],
 )
 def test_both_find_the_same_gait_and_the_same_derivatives(scene):

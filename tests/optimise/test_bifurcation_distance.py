@@ -49,6 +49,7 @@ def test_derivatives_are_those_of_central_differences(which, kind, varied):
         assert told.slopes[place] == pytest.approx(way * told.value_slopes[place])
 
 
+@pytest.mark.nightly
 def test_the_bifurcations_are_those_of_the_branch():
     scene = jb.ladder()["stribeck"]
     branch = jb.continue_gait(scene, "slope", bounds=(0.0025, 0.16))

@@ -82,6 +82,7 @@ def test_the_nearest_bifurcation_is_where_searches_lose_stability(best):
     assert found.walk is None
 
 
+@pytest.mark.nightly
 def test_the_other_engine_finds_the_same_gait(best):
     found = jb.optimise.certify(
         best, starts=0, footsteps=0, bifurcations_along=(), other_engine=True

@@ -65,6 +65,7 @@ def leaning(scene):
     return first
 
 
+@pytest.mark.nightly
 def test_a_rigid_walker_is_pushed_and_steps_down():
     scene = jb.ladder()["rigid"]
     gait = tight_gait(scene)

@@ -223,6 +223,7 @@ def test_what_is_not_finite_comes_back_from_a_store(tmp_path):
     jtu.tree_map(np.testing.assert_array_equal, kept, some)
 
 
+@pytest.mark.nightly
 def test_a_front_keeps_the_evaluations_of_all_its_points(tmp_path):
     options = {"vary": {"d": (0.05, 0.2)}, "maximise": "speed", "subject_to": "step_length<0.3",
                "against": "spectral_radius", "bounds": [0.5, 0.45]}  # fmt: skip

@@ -98,7 +98,9 @@ def test_extremes_by_both_engines_agree():
     [
         dict(engine="lanes"),
         dict(engine="xla"),
-        dict(solver="kvaerno3", accuracy="draft", duration=0.3),
+        pytest.param(
+            dict(solver="kvaerno3", accuracy="draft", duration=0.3), marks=pytest.mark.nightly
+        ),
         dict(solver="euler", dt=1e-6, duration=0.05, max_solver_steps=1 << 16),
     ],
     ids=["lanes", "xla", "kvaerno3", "dt"],

@@ -75,6 +75,7 @@ def test_lanes_agree_with_an_independent_solution():
     np.testing.assert_allclose(np.stack(found, axis=1), exact, atol=1e-6)
 
 
+@pytest.mark.nightly
 def test_saved_times_and_footsteps_agree():
     times = jnp.linspace(0.0, 2.5, 6)
     options = dict(duration=2.5, footsteps=3, save=times, accuracy="tight")

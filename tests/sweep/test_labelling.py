@@ -30,6 +30,7 @@ def _seed_batch(labelling):
     return stacked([rows(part.batch(labelling, 0, 1).states, 0) for part in parts])
 
 
+@pytest.mark.nightly
 def test_the_seed_by_radau(seed):
     states = _seed_batch(seed)
     found = seed(states)

@@ -127,7 +127,7 @@ def test_exchanging_legs_exchanges_bristles():
     assert swapped == [0.0, 1.0, 3.0, 2.0, 4.0, 5.0, 7.0, 6.0, 9.0, 8.0]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_engines_agree_and_bristles_straighten_in_the_swing():
     scene = with_law(LUGRE)
     lanes, xla = (
