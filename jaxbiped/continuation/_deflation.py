@@ -11,10 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxbiped._checks import (
-    check_choice,
-    check_count,
-)
+from jaxbiped._checks import check_choice, check_count
 from jaxbiped._progress import stage
 from jaxbiped.continuation._branch_point import NO_WALK, BranchPoint, axis_of
 from jaxbiped.continuation._continuation_setup import (

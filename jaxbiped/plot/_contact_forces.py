@@ -9,14 +9,7 @@ from jaxbiped.dynamics._contact_forces import Contacts
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.plot._samples import sampled_forces
 from jaxbiped.plot._symbols import NORMAL_FORCE, TANGENTIAL_FORCE, TIME
-from jaxbiped.plot.style import (
-    LEG_NAMES,
-    SHADE_COLOUR,
-    dress,
-    leg_line,
-    legend_above,
-    new_figure,
-)
+from jaxbiped.plot.style import LEG_NAMES, SHADE_COLOUR, dress, leg_line, legend_above, new_figure
 from jaxbiped.scene._scene import Scene
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory

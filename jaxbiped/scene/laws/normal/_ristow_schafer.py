@@ -16,10 +16,7 @@ from jaxbiped.scene.laws._abstract_laws import (
     pushing,
     smooth_ramp,
 )
-from jaxbiped.scene.laws.normal._weight_on_law import (
-    AbstractHertzianLaw,
-    Standing,
-)
+from jaxbiped.scene.laws.normal._weight_on_law import AbstractHertzianLaw, Standing
 
 
 class RistowSchafer(AbstractHertzianLaw):
