@@ -22,8 +22,6 @@ from jaxbiped.solve._failure_events import FALL_ANGLE
 from jaxbiped.solve._step_polynomials import Quintic
 
 _TABLEAU = diffrax.Dopri8.tableau
-ORDER = 8
-
 Rates = tuple[Scalar, Scalar, Scalar, Scalar]
 """Rates of the angles and of their rates."""
 _INTERPOLATED = 2.0

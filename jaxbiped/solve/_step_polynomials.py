@@ -107,11 +107,6 @@ class Quintic(NamedTuple):
             )
         )
 
-    def plus(self, other: "Quintic", factor: float = 1.0) -> "Quintic":
-        """The sum with another one, times a factor."""
-        pairs = zip(self.control, other.control, strict=True)
-        return Quintic(tuple(a + factor * b for a, b in pairs))
-
     def sign_changes(self, shift: Scalar, *, from_second: Scalar) -> Scalar:
         """How often the control values change sign, all but both ends' higher by `shift`.
 

@@ -19,7 +19,7 @@ from jaxbiped.compiler.runtime._cuda_driver import CudaDriver, CudaError, load_l
 from jaxbiped.compiler.runtime._kernel import Kernel
 
 _MULTIPROCESSORS, _MAJOR, _MINOR = 16, 75, 76
-_LOCAL_BYTES, _REGISTERS = 3, 4
+_REGISTERS = 4
 _NON_BLOCKING, _OUT_OF_MEMORY = 1, 2
 _POLL = 2e-4
 """How long to wait before looking whether a kernel is over [s]."""
@@ -47,13 +47,12 @@ class LoadedKernel(NamedTuple):
 
     Attributes:
         function: the driver's handle.
-        registers, local_bytes: of each thread.
+        registers: of each thread.
         blocks: that one multiprocessor runs at once.
     """
 
     function: ctypes.c_void_p
     registers: int
-    local_bytes: int
     blocks: int
 
 
@@ -91,12 +90,9 @@ class CudaDevice:
         driver.call("cuCtxSetCurrent", self._context)
         module = driver.handle("cuModuleLoadData", ptx.encode())
         function = driver.handle("cuModuleGetFunction", module, entry.encode())
-        registers, local = (
-            driver.number("cuFuncGetAttribute", which, function)
-            for which in (_REGISTERS, _LOCAL_BYTES)
-        )
+        registers = driver.number("cuFuncGetAttribute", _REGISTERS, function)
         blocks = driver.number("cuOccupancyMaxActiveBlocksPerMultiprocessor", function, THREADS, 0)
-        return LoadedKernel(function, registers, local, blocks)
+        return LoadedKernel(function, registers, blocks)
 
     def run(self, kernel: LoadedKernel, part: DevicePart, stop: np.ndarray) -> None:
         """Launches a kernel over a part and waits for its end; `stop` not zero ends it early.
