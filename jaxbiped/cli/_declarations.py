@@ -9,6 +9,7 @@ import contextlib
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import jaxbiped
@@ -51,18 +52,19 @@ def signature(name: str) -> dict[str, Argument]:
     return found
 
 
-def parameters(name: str) -> dict[str, Argument]:
-    """The fields of a public class that are declared by `parameter`, units in what is said."""
+def fields(name: str) -> dict[str, Argument]:
+    """The fields of a public class; those that `parameter` declares with their units."""
     _, part = _definition(name)
     assert isinstance(part, ast.ClassDef)
     said, found = _entries(part), {}
     for node in part.body:
-        call = node.value if isinstance(node, ast.AnnAssign) else None
-        if isinstance(call, ast.Call) and ast.unparse(call.func) == "parameter":
-            default, info = _declared(call)
-            own = ast.unparse(node.target)  # type: ignore[attr-defined]
+        if isinstance(node, ast.AnnAssign) and "ClassVar" not in ast.unparse(node.annotation):
+            own, default, info = ast.unparse(node.target), None, None
+            if isinstance(node.value, ast.Call):
+                expression = compile(ast.Expression(node.value), name, "eval")
+                default, info = eval(expression, _DECLARING)
             words = _UNIT.sub("", said.get(own, "")).removesuffix(".")
-            unit = f" [{info.quantity.unit}]" if info.quantity.unit else ""
+            unit = f" [{info.quantity.unit}]" if info and info.quantity.unit else ""
             found[own] = Argument(default, f"{words}{unit}.", info)
     return found
 
@@ -87,19 +89,6 @@ def registered(namespace: str, *packages: str) -> dict[str, str]:
                 kind = each or kind
                 if name and kind == own:
                     found[name] = f"{namespace}.{own}"
-    return found
-
-
-def fields(name: str) -> dict[str, Any]:
-    """The fields of a public class and their defaults, None for what has none."""
-    _, part = _definition(name)
-    assert isinstance(part, ast.ClassDef)
-    found = {}
-    for node in part.body:
-        if isinstance(node, ast.AnnAssign) and "ClassVar" not in ast.unparse(node.annotation):
-            said = {each.arg: each.value for each in getattr(node.value, "keywords", ())}
-            default = said.get("default")
-            found[ast.unparse(node.target)] = default and ast.literal_eval(default)
     return found
 
 
@@ -166,13 +155,6 @@ def _entries(node: ast.FunctionDef | ast.ClassDef) -> dict[str, str]:
     return found
 
 
-def _declared(call: ast.Call) -> tuple[Any, ParameterInfo]:
-    """Default and metadata of a field that a call of `parameter` declares."""
-    expression = compile(ast.Expression(call), "parameter", "eval")
-    declared: tuple[Any, ParameterInfo] = eval(expression, {"parameter": _parameter, "math": math})
-    return declared
-
-
 def _parameter(
     words: str,
     symbol: str = "",
@@ -186,3 +168,11 @@ def _parameter(
 ) -> tuple[Any, ParameterInfo]:
     """What `jaxbiped.laws.parameter` keeps of its arguments."""
     return default, ParameterInfo(Quantity(words, symbol, unit), positive, minimum, size_below)
+
+
+_DECLARING = {
+    "parameter": _parameter,
+    "eqx": SimpleNamespace(field=lambda default=None, **_: (default, None)),
+    "math": math,
+}
+"""What stands in the right-hand sides of fields."""

@@ -11,7 +11,6 @@ from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_pa
 from jaxbiped.cli._declarations import (
     Argument,
     fields,
-    parameters,
     registered,
     signature,
 )
@@ -29,7 +28,7 @@ def _seed_parameters() -> dict[str, Argument]:
     """The parameters of the seed's scene by their paper names, with their values there."""
     declared: dict[str, Argument] = {}
     for part in ("Walker", "Ground", "laws.RistowSchafer", "laws.BengisuAkay"):
-        declared |= parameters(part)
+        declared |= fields(part)
     return {
         name: declared[name]._replace(default=keyword.default)
         for name, keyword in signature("seed_scene").items()
@@ -48,9 +47,8 @@ def _parameter_fields() -> Iterator[tuple[str, Field]]:
 
 def _actuator_fields() -> Iterator[tuple[str, Field]]:
     for name, part in registered("actuation").items():
-        known, said = parameters(part), []
-        for own, default in fields(part).items():
-            info = known[own].info if own in known else None
+        said = []
+        for own, (default, _, info) in fields(part).items():
             words = f" {info.quantity.words} [{info.quantity.unit}]" if info else ""
             said.append(f"{own}={'…' if default is None else default}{words}")
         checked = Annotated[
