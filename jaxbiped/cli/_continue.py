@@ -46,6 +46,7 @@ class ContinueGait(Command, of=("continue_gait",)):
     footsteps: CycleFootsteps
     log: bool | None
     largest_step: Annotated[float, positive()]
+    """Largest arclength of a step, in which the range counts 1."""
     max_points: Count
     accuracy: GaitAccuracy
     engine: Engine

@@ -22,6 +22,7 @@ _NAMED = re.compile(r'^class (\w+)|^    name: ClassVar.* = "(.+)"$', re.MULTILIN
 _FIELD = re.compile(r'^(?:class (\w+)|(\S)|    (\w+): |    """(.*?)""")', re.MULTILINE | re.DOTALL)
 _ENTRY = re.compile(r"^ {4}((?:\w+, )*\w+): (.+(?:\n {8}.+)*)", re.MULTILINE)
 _SENTENCE_END = re.compile(r"\. (?=[A-Z])")
+_SYMBOL = re.compile(r" [^\x00-\x7f]+\b")
 _UNIT = re.compile(r" \[[^]]*\]")
 _OPENINGS = (("def ", "("), ("class ", "("), ("class ", ":"), ("", ": "), ("", " = "))
 """What stands before and after a name where a statement binds it."""
@@ -146,10 +147,14 @@ def _source(module: str) -> str:
 
 
 def _entries(node: ast.FunctionDef | ast.ClassDef) -> dict[str, str]:
-    """The first sentence of what a docstring says of each argument or attribute."""
+    """The first sentence of what a docstring says of each argument or attribute.
+
+    Without Greek symbols: help is printed where there are only ASCII characters, too.
+    """
     found = {}
     for owners, text in _ENTRY.findall(ast.get_docstring(node) or ""):
-        first = _SENTENCE_END.split(" ".join(text.replace("`", "").split()))[0].removesuffix(".")
+        words = _SYMBOL.sub("", " ".join(text.replace("`", "").split()))
+        first = _SENTENCE_END.split(words)[0].removesuffix(".")
         for own in owners.split(", "):
             found[own] = first[:1].upper() + first[1:] + "."
     return found

@@ -50,7 +50,7 @@ def _actuator_fields() -> Iterator[tuple[str, Field]]:
         said = []
         for own, (default, _, info) in fields(part).items():
             words = f" {info.quantity.words} [{info.quantity.unit}]" if info else ""
-            said.append(f"{own}={'…' if default is None else default}{words}")
+            said.append(f"{own}={'...' if default is None else default}{words}")
         checked = Annotated[
             tuple[str, ...], arg(help="; ".join(said) + "."), Check(_named_text, each=True)
         ]

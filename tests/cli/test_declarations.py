@@ -11,6 +11,7 @@ import jaxbiped as jb
 from jaxbiped._parameter_declaration import parameter_infos
 from jaxbiped.cli._declarations import documentation, fields, names, registered, signature
 from jaxbiped.cli._gait import _SECTIONS
+from jaxbiped.cli._options import Command, Options
 from jaxbiped.cli._scene_options import SEED
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES
 from jaxbiped.solve._solvers import SOLVERS
@@ -89,6 +90,15 @@ def test_help_tells_the_seed_s_start():
     said = documentation("jaxbiped.cli._scene_options", "StartOptions")
     for name, value in jb.seed_state()._asdict().items():
         assert f"the seed's is {float(value):g}" in said[name]
+
+
+def test_help_is_ascii():
+    """Where a terminal can print nothing else, help is help all the same."""
+    kinds = [*Options.__subclasses__(), *Command.__subclasses__()]
+    assert len(kinds) > 15
+    for field in (field for kind in kinds for field in dataclasses.fields(kind)):
+        (said,) = (each.help for each in field.type.__metadata__ if getattr(each, "help", None))
+        assert said.isascii(), said
 
 
 _ASK = """
