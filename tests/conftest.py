@@ -10,7 +10,6 @@ from pathlib import Path
 import hypothesis
 import jax
 import pytest
-from reference.walks import reference_states
 
 import jaxbiped as jb
 from jaxbiped.caching._disk_cache import CACHE_VARIABLE
@@ -129,6 +128,8 @@ def seed_walk():
 @pytest.fixture(scope="session")
 def reference():
     """The seed's walk by an independent program and integrator: (times, states (n, 8))."""
+    from reference.walks import reference_states  # numba takes a second
+
     return reference_states()
 
 
