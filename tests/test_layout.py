@@ -80,3 +80,10 @@ def test_what_outlives_a_call_is_kept_by_the_caches(path):
 def test_experiments_use_the_public_interface(path):
     for name in imports_of(path):
         assert not (name.startswith("jaxbiped.") and "._" in name), name
+
+
+def test_the_reference_is_independent():
+    """What results are held against shares no code with the package, nor with JAX."""
+    for path in (PACKAGE.parent / "experiments" / "reference").glob("*.py"):
+        for name in imports_of(path):
+            assert name.partition(".")[0] not in ("jaxbiped", "jax", "diffrax"), (path, name)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from extreme_cases.case import check_numbers
-from reference.driven import driven_derivative
+from reference.actuation import actuated_derivative
 from reference.rigid import rigid_walker
 from scipy.integrate import solve_ivp
 
@@ -76,7 +76,7 @@ def test_accelerations_are_those_of_equations_written_again():
     in_contact = 0
     for state in _states(30):
         y = np.array(state, dtype=float)
-        expected = driven_derivative(0.0, y, NUMBERS, torques, extension)[4:]
+        expected = actuated_derivative(0.0, y, NUMBERS, torques, extension)[4:]
         found = np.array(jb.dynamics.accelerations(DRIVEN, state))
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
         forces = jb.dynamics.foot_forces(DRIVEN, state)
@@ -108,7 +108,7 @@ def test_a_driven_walk_is_scipys():
     scene = dataclasses.replace(jb.seed_scene(), actuation=(*AT_HIP, PRELOAD))
     start, end = jb.seed_state(), 0.5
     solved = solve_ivp(
-        driven_derivative, (0.0, end), np.array(start, dtype=float), "Radau",
+        actuated_derivative, (0.0, end), np.array(start, dtype=float), "Radau",
         args=(check_numbers(scene), torques, extension), rtol=1e-9, atol=1e-11,
     )  # fmt: skip
     assert solved.success

@@ -10,7 +10,7 @@ LIGHT = 0.01
 """Share of the weight in the denominator of the loads' shares."""
 
 
-def driven_derivative(
+def actuated_derivative(
     t: float,
     y: np.ndarray,
     p: np.ndarray,
