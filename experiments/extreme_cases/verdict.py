@@ -110,7 +110,7 @@ def _wrong_ending(outcome: jb.Ending, check: Checked, p: np.ndarray) -> str:
     y = check.state
     depth = p[4] - y[1] + (p[2] - p[4]) * np.cos(y[2:4])
     if outcome == jb.Ending.STOPPED:
-        slow = np.sqrt(p[6] / p[2]) * 0.11
+        slow = np.sqrt(np.hypot(p[6], p[7]) / p[2]) * 0.11
         if not np.any((depth > -margin * p[2]) & (np.abs(y[6:8]) < slow)):
             return "no leg rests where it ended as stopped"
     if outcome == jb.Ending.STUMBLED and not np.any(depth > -margin * p[2]):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from extreme_cases import verdict as verdicts
-from extreme_cases.case import Case
+from extreme_cases.case import Case, check_numbers
 from extreme_cases.verdict import judge
 from reference.scipy_solves import Checked
 
@@ -45,3 +45,13 @@ def test_a_verdict_is_by_the_error_that_was_asked_for(
         assert (found.told, found.outcome) == (1e-5, "walking")
     if not met:
         assert found.reason == "accuracy not met: it is too stiff"
+
+
+@pytest.mark.parametrize(
+    ("rate", "said"), [(0.1, ""), (-1.0, "no leg rests where it ended as stopped")]
+)
+def test_a_walker_that_stopped_has_a_leg_that_rests(rate, said):
+    """Slower than 0.11 √(g/l), which is 0.54 rad/s on any slope."""
+    still = np.array([*STATE[:6], rate, rate])
+    numbers = check_numbers(jb.seed_scene(slope=-0.1))
+    assert verdicts._wrong_ending(jb.Ending.STOPPED, Checked(still, 0.0, 0.1), numbers) == said
