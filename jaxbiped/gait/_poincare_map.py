@@ -20,14 +20,10 @@ from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import recurring_inverse_units
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._hybrid_system import AbstractSystem
-from jaxbiped.variational._section_by_lanes import solve_to_section_by_lanes
-from jaxbiped.variational._solve_to_section import (
-    Nodes,
-    SectionArrival,
-    solve_to_section,
-)
+from jaxbiped.variational._solve_to_section import Nodes, SectionArrival, solve_to_section
 from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
-from jaxbiped.variational._watch import Watch
+from jaxbiped.variational._variational_problem import Watch
+from jaxbiped.variational._variational_solve import solve_to_section_by_lanes
 
 STATE_FLOOR = 0.1
 """Size below which errors of derivatives with respect to the state are absolute, in the scene's

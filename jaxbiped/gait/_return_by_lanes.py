@@ -18,8 +18,8 @@ from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._variational_problem import VariationalSolution
 from jaxbiped.variational._variational_solve import solve_variational
-from jaxbiped.variational._variational_types import VariationalSolution
 
 
 @eqx.filter_custom_jvp

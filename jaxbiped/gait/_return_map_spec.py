@@ -12,7 +12,7 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.scene._scene import AbstractScene, RedundantScene
 from jaxbiped.solve._projected_solver import with_projection
 from jaxbiped.variational._hybrid_system import AbstractSystem, RedundantWalking, system_of
-from jaxbiped.variational._watch import Watch
+from jaxbiped.variational._variational_problem import Watch
 
 _PATIENCE = 50.0
 """Time allowed to the next arrival, in units of √(l/g)."""

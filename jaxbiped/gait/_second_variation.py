@@ -13,10 +13,8 @@ from jaxbiped._types import Scalar
 from jaxbiped.compiler import LANES, XLA
 from jaxbiped.gait._poincare_map import LinearisedReturn, recurring_indices
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.variational._adjoint_solve import carry_tangents, pull_back
-from jaxbiped.variational._adjoint_step import Adjoints
-from jaxbiped.variational._flow import Flow
-from jaxbiped.variational._section_tangents import tangent_on_section
+from jaxbiped.variational._adjoint_solve import Adjoints, carry_tangents, pull_back
+from jaxbiped.variational._flow import Flow, tangent_on_section
 from jaxbiped.variational._tangents import Seeded, active_leaves
 
 

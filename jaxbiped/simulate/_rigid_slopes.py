@@ -18,10 +18,14 @@ from jaxbiped.simulate._slopes import LOOSER, Slopes
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._failure_events import FALL_ANGLE
 from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
-from jaxbiped.variational._event_motion import EventMotion, follow_event
 from jaxbiped.variational._tangents import Tangents, along_columns, as_columns
-from jaxbiped.variational._tangents_at_times import seeded_directions, tangents_after
-from jaxbiped.variational._watch import Watch
+from jaxbiped.variational._tangents_at_times import (
+    EventMotion,
+    follow_event,
+    seeded_directions,
+    tangents_after,
+)
+from jaxbiped.variational._variational_problem import Watch
 
 _WATCH = Watch(field=rolling_field, switches=lambda args, y: ())
 

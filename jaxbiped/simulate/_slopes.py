@@ -20,14 +20,15 @@ from jaxbiped.solve._failure_events import ending_surface
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._event_motion import EventMotion, follow_event
 from jaxbiped.variational._tangents import Seeded, Tangents
 from jaxbiped.variational._tangents_at_times import (
+    EventMotion,
     TangentsAtTimes,
+    follow_event,
     seeded_directions,
     tangents_at_times,
 )
-from jaxbiped.variational._watch import Watch
+from jaxbiped.variational._variational_problem import Watch
 
 LOOSER = 10.0
 """Tolerance of derivatives, in units of the state's."""

@@ -1,6 +1,10 @@
-"""Collocated step: the vector field about one step by Radau IIA.
+"""Collocated step: the vector field about one known step by Radau IIA.
 
-Components whose rate is a component are eliminated by hand.
+Points lie evenly in the root of the time since the last switch: after a switch second derivatives
+of the rates may be as singular as the inverse root of that time (Hertz's law after touchdown); in
+the root itself the motion is smooth. Components whose rate is a component are eliminated by hand.
+
+Source: Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.5, order five.
 """
 
 from collections.abc import Callable, Sequence
@@ -8,14 +12,59 @@ from typing import NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import AbstractEngine
 from jaxbiped.linalg._elimination import BlockFactors, factorise
 from jaxbiped.solve.rosenbrock._linearisation import linearise
-from jaxbiped.variational._radau_collocation import RADAU, KnownStep
-from jaxbiped.variational._switch_crossings import SIDES, jump_of
+from jaxbiped.variational._flow import SIDES, jump_of
 from jaxbiped.variational._switch_locator import MARGIN
+
+_ROOT = 6.0**0.5
+_NODES = np.array([(4 - _ROOT) / 10, (4 + _ROOT) / 10, 1.0])
+RADAU = np.array(
+    [
+        [(88 - 7 * _ROOT) / 360, (296 - 169 * _ROOT) / 1800, (-2 + 3 * _ROOT) / 225],
+        [(296 + 169 * _ROOT) / 1800, (88 + 7 * _ROOT) / 360, (-2 - 3 * _ROOT) / 225],
+        [(16 - _ROOT) / 36, (16 + _ROOT) / 36, 1 / 9],
+    ]
+)
+"""Weights of the rates at the nodes."""
+
+
+class KnownStep(NamedTuple):
+    """A step of a solved motion.
+
+    Attributes:
+        before, after: states where it starts and ends, shape (c,).
+        start, span: time of its start and duration [s].
+        switched: time of the last switch before it [s].
+        fresh: whether it starts on a switch.
+        crossed: whether it ends on one.
+    """
+
+    before: Scalar
+    after: Scalar
+    start: Scalar
+    span: Scalar
+    switched: Scalar
+    fresh: Scalar
+    crossed: Scalar
+
+    def clock(self) -> tuple[Scalar, Scalar]:
+        """Of the collocation points: the part of the step before each, and its share of time, (3,).
+
+        A share is the derivative of time in the step's own variable, which runs evenly in the root
+        of the time since the last switch.
+        """
+        since = self.start - self.switched
+        first, last = jnp.sqrt(since), jnp.sqrt(since + self.span)
+        width = jnp.where(self.span > 0.0, self.span / (first + last), 0.0)
+        root = first + width * _NODES
+        elapsed = width * _NODES * (root + first)
+        return elapsed / jnp.where(self.span > 0.0, self.span, 1.0), 2.0 * root * width
+
 
 Field = Callable[[Sequence[Scalar], Sequence[Scalar]], list[Scalar]]
 """Rates of all components, of components and active parameters."""

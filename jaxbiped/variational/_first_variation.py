@@ -18,10 +18,15 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.compiler import AbstractEngine, Program
-from jaxbiped.variational._collocated_step import Order, Rows, Stages, collocate_step, order_of
-from jaxbiped.variational._flow import Flow
-from jaxbiped.variational._radau_collocation import KnownStep
-from jaxbiped.variational._switch_crossings import crossing_of
+from jaxbiped.variational._collocated_step import (
+    KnownStep,
+    Order,
+    Rows,
+    Stages,
+    collocate_step,
+    order_of,
+)
+from jaxbiped.variational._flow import Flow, crossing_of
 from jaxbiped.variational._tangents import active_leaves
 
 LONG_AGO = 1.0

@@ -1,11 +1,13 @@
-"""Flow of a system: rates, switches, section and reset map of components and parameters.
+"""Flow of a system in components and parameters, and what its switches, section and reset do to it.
 
 The second variation differentiates with respect to both, which here are one vector.
 """
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple, cast
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree, PyTreeDef
@@ -18,6 +20,10 @@ from jaxbiped.variational._tangents import Seeded, with_active
 
 Arrival = Callable[[PyTree, PyTree], tuple[Scalar, Scalar]]
 """Of (args, state): a section's value, and whether a crossing counts."""
+SIDES = tuple(1e-10 * side for side in (1.0, 4.0, 16.0, -1.0, -4.0, -16.0))
+"""When the two sides of a switch are looked at [s]: first the new one. Nearer, penetrations are all
+rounding; a thousand times the margin away, Jacobians have changed by more than their jump's error.
+"""
 
 
 class Flow(eqx.Module):
@@ -74,3 +80,137 @@ class Flow(eqx.Module):
         c = self.structure.num_leaves
         state = jtu.tree_unflatten(self.structure, list(z[:c]))
         return state, with_active(self.args, list(z[c:]))
+
+
+class Crossing(NamedTuple):
+    """The switch that a step ends just past, if any. No step is taken to cross two at once.
+
+    Attributes:
+        which: its number, counted from one; 0 where there is none.
+        past: time from the switch to the step's end [s]; 0 where there is none.
+        landed: the state on the switch, or the step's end where there is none, shape (c,).
+    """
+
+    which: Scalar
+    past: Scalar
+    landed: Scalar
+
+    @property
+    def crossed(self) -> Scalar:
+        """Whether there is one."""
+        return self.which > 0
+
+
+def crossing_of(flow: Flow, before: Scalar, after: Scalar, parameters: Scalar) -> Crossing:
+    """The crossing of one step: the first in the switches' order, where there are several."""
+    old, new = (jnp.concatenate([y, parameters]) for y in (before, after))
+    rate = _rate(flow, parameters)
+
+    def values(z: Scalar) -> list[Scalar]:
+        return [surface.value for surface in flow.surfaces(z)]
+
+    def live(z: Scalar) -> list[Scalar | bool]:
+        return [surface.live for surface in flow.surfaces(z)]
+
+    velocity = rate(new)
+    beyond, slopes = jax.jvp(values, (new,), (velocity,))
+    changed = [(a > 0.0) != (b > 0.0) for a, b in zip(values(old), beyond, strict=True)]
+    which = jnp.asarray(0)
+    for number, (change, was, is_) in enumerate(zip(changed, live(old), live(new), strict=True)):
+        which = jnp.where(change & (was | is_) & (which == 0), 1 + number, which)
+
+    def back(past: Scalar) -> Scalar:
+        return new - past * rate(new - 0.5 * past * velocity)
+
+    def crossed() -> tuple[Scalar, Scalar]:
+        slope = _pick(which, slopes, 1.0)
+        first = _pick(which, beyond, 0.0) / slope
+        # The switch's rate changes fast: once more from there.
+        past = first + _pick(which, values(back(first)), 0.0) / slope
+        return past, back(past)
+
+    past, z = jax.lax.cond(which > 0, crossed, lambda: (jnp.zeros(()), new))
+    return Crossing(which, past, z[: after.shape[0]])
+
+
+def earlier_at(flow: Flow, landed: Scalar, which: Scalar, parameters: Scalar) -> Scalar:
+    """How much earlier a change of components and parameters makes a crossing, shape (c + p,).
+
+    Of the switch of number `which` at `landed`; zeros where there is none.
+    """
+    z = jnp.concatenate([landed, parameters])
+
+    def values(z: Scalar) -> Scalar:
+        return jnp.stack([jnp.zeros(()), *(surface.value for surface in flow.surfaces(z))])
+
+    gradient = _pick(which, list(jax.jacrev(values)(z)[1:]), jnp.zeros_like(z))
+    return gradient / jnp.where(which > 0, gradient @ _rate(flow, parameters)(z), 1.0)
+
+
+def _rate(flow: Flow, parameters: Scalar) -> Callable[[Scalar], Scalar]:
+    """The rate of components and parameters, which do not change."""
+    return lambda z: jnp.concatenate([flow.velocity(z), jnp.zeros_like(parameters)])
+
+
+def _pick(which: Scalar, each: Sequence[Scalar], value: Scalar | float) -> Scalar:
+    """That of the switch of this number, or `value` where there is none."""
+    for number, candidate in enumerate(each):
+        value = jnp.where(which == 1 + number, candidate, value)
+    return cast(Scalar, value)
+
+
+def jump_of(at_sides: Scalar) -> Scalar:
+    """J₊ − J₋ from its values on the `SIDES` of a switch, shape (c, n).
+
+    Extrapolated to the switch itself, in the root of time: that is how Hertz's law leaves it.
+    """
+    new, old = (8.0 * at_sides[k] - 6.0 * at_sides[k + 1] + at_sides[k + 2] for k in (0, 3))
+    return (new - old) / 3.0
+
+
+def on_section(
+    flow: Flow, jacobian: Scalar, z: Scalar, v: Scalar, q: Scalar, second: Scalar
+) -> tuple[Scalar, Scalar, Scalar]:
+    """Tangents at a fixed time made tangents on the section g = 0 that `z` lies on.
+
+    A tangent V moves the arrival by τ_V = −dg·V/ġ and becomes V + f τ_V. Differentiated once more,
+    the mixed tangent C becomes C + (J V) τ_Q + (J Q) τ_V + (J f) τ_V τ_Q + f τ_VQ, where τ_VQ keeps
+    it on the section.
+
+    Args:
+        flow: what moves.
+        jacobian: J of its rates, shape (c, c + p).
+        z: components and parameters, shape (c + p,), as `v` and `q`.
+        v, q: the tangents.
+        second: C, shape (c,).
+    """
+    c = len(second)
+    rate = flow.velocity(z)
+    velocity = jnp.concatenate([rate, jnp.zeros(len(z) - c)])
+    gradient, curve = jax.jvp(jax.grad(flow.section), (z,), (v,))
+    slope = gradient @ velocity
+    by_v, by_q = -(gradient @ v) / slope, -(gradient @ q) / slope
+    curve = curve + by_v * jax.jvp(jax.grad(flow.section), (z,), (velocity,))[1]
+    second = second + (jacobian @ v) * by_q + (jacobian @ (q + velocity * by_q)) * by_v
+    both = -(curve @ (q + velocity * by_q) + gradient[:c] @ second) / slope
+    return v + velocity * by_v, q + velocity * by_q, second + rate * both
+
+
+def tangent_on_section(flow: Flow, z: Scalar, v: Scalar) -> Scalar:
+    """A first tangent at a fixed time made one on the section, as `on_section` does; (c + p,)."""
+    rate = flow.velocity(z)
+    velocity = jnp.concatenate([rate, jnp.zeros(len(z) - len(rate))])
+    gradient = jax.grad(flow.section)(z)
+    return v - velocity * (gradient @ v) / (gradient @ velocity)
+
+
+def after_reset(
+    flow: Flow, z: Scalar, v: Scalar, q: Scalar, second: Scalar
+) -> tuple[Scalar, Scalar]:
+    """Of `q` and the mixed tangent what the reset map makes of them, shape (c,) each."""
+
+    def pushed(z: Scalar, along: Scalar) -> Scalar:
+        return jax.jvp(flow.reset, (z,), (along,))[1]
+
+    change = jnp.concatenate([second, jnp.zeros(len(z) - len(second))])
+    return jax.jvp(pushed, (z, q), (v, change))

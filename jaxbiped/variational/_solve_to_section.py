@@ -31,7 +31,7 @@ from jaxbiped.variational._tangents import (
     plain_args,
     plain_state,
 )
-from jaxbiped.variational._watch import Watch
+from jaxbiped.variational._variational_problem import Watch
 
 Along: TypeAlias = Callable[
     [Callable[[PyTree, PyTree], PyTree], Tangents, Seeded], tuple[PyTree, PyTree]

@@ -1,5 +1,6 @@
-"""Derivatives of a motion at given times, with respect to its start and to a scene's parameters."""
+"""Derivatives of a motion at given times and at events, with respect to its start and its scene."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
@@ -8,18 +9,20 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, select
+from jaxbiped._types import RealScalarLike, Scalar, select
 from jaxbiped.compiler import AbstractEngine
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
+from jaxbiped.variational._variational_problem import Watch
 from jaxbiped.variational._variational_solve import solve_variational
-from jaxbiped.variational._watch import Watch
 
 _FLOOR = 1e-4
 """Size below which a derivative's error is absolute, along a direction of its own size."""
 _MOST_ATTEMPTS = 1_000_000
+_NEAR = 1e-3
+"""Time from the event, in units of time, beyond which it is not known where that lies."""
 
 
 class TangentsAtTimes(NamedTuple):
@@ -109,3 +112,59 @@ def tangents_after(
         engine=engine,
     )
     return Tangents(found.state, jnp.where(found.undetermined, jnp.nan, found.columns.T))
+
+
+class EventMotion(NamedTuple):
+    """An event near a state, and how it moves in n directions.
+
+    Attributes:
+        delay: from the state to the event [s].
+        time, state: derivatives of its time, shape (n,), and of the state at it, (n, c).
+    """
+
+    delay: Scalar
+    time: Scalar
+    state: Scalar
+
+
+def follow_event(
+    surface: Callable[[PyTree, PyTree], Scalar],
+    field: Callable[[PyTree, PyTree], PyTree],
+    at: Tangents,
+    args: Seeded,
+    *,
+    rtol: RealScalarLike,
+    unit: RealScalarLike,
+) -> EventMotion:
+    """Derivatives of an event's time and of the state at it.
+
+    By the implicit function theorem: where g(y(t, p), p) = 0, dt = −(g' dy + g_p dp)/ġ, and the
+    state at the event moves by dy + f dt. NaN where the event is not near, or where it grazes: the
+    surface's rate is so small that an error of the state makes it turn back.
+
+    Args:
+        surface: g of (args, state), zero at the event.
+        field: f of (args, state).
+        at: the state there, and its columns at a fixed time.
+        args: the arguments, and their seeds.
+        rtol: relative error that the state may have.
+        unit: of time [s].
+    """
+
+    def value(y: PyTree, a: PyTree) -> Scalar:
+        return surface(a, y)
+
+    def rate(y: PyTree) -> Scalar:
+        return jax.jvp(lambda s: surface(args.args, s), (y,), (field(args.args, y),))[1]
+
+    here, along = along_columns(value, at, args)
+    velocity = field(args.args, at.state)
+    speed, turning = jax.jvp(rate, (at.state,), (velocity,))
+    normal = jax.grad(lambda y: surface(args.args, y))(at.state)
+    sizes = jtu.tree_map(lambda n, y: jnp.abs(n * y), normal, at.state)
+    known_to = rtol * sum(jtu.tree_leaves(sizes))
+    grazes = speed * speed <= 2.0 * jnp.abs(turning) * known_to
+    is_near = jnp.abs(here) <= _NEAR * unit * jnp.abs(speed)
+    time = jnp.where(grazes | ~is_near, jnp.nan, -along / speed)
+    state = at.columns.T + time[:, None] * as_columns(velocity)[None]
+    return EventMotion(-here / speed, time, state)

@@ -20,13 +20,12 @@ from jaxbiped.solve.controllers._first_and_last_step import clip_step, first_ste
 from jaxbiped.solve.controllers._tangent_step_size import step_control
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._column_step import Differentiated, column_step, differentiate_step
+from jaxbiped.variational._saltation import at_fixed_time, has_field_switches, meet, meeting_at
 from jaxbiped.variational._solve_to_section import onto_section, peak_of
 from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState
-from jaxbiped.variational._switch_meeting import at_fixed_time, has_field_switches, meet, meeting_at
 from jaxbiped.variational._tangent_solver import SHARE
 from jaxbiped.variational._tangents import Seeded, Tangents, along_columns_in_turn
-from jaxbiped.variational._variational_types import VariationalProblem, VariationalSolution
-from jaxbiped.variational._watch import Watch
+from jaxbiped.variational._variational_problem import VariationalProblem, VariationalSolution, Watch
 
 
 class _Now(NamedTuple):

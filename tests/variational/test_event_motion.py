@@ -5,8 +5,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.variational._event_motion import follow_event
 from jaxbiped.variational._tangents import Seeded, Tangents
+from jaxbiped.variational._tangents_at_times import follow_event
 
 GRAVITY, SPEED, TIME = 9.8, 5.0, 0.3
 

@@ -11,16 +11,15 @@ import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve.controllers._tangent_step_size import step_control
-from jaxbiped.variational._flow import Flow
+from jaxbiped.variational._collocated_step import RADAU, KnownStep
+from jaxbiped.variational._flow import Flow, after_reset, on_section, tangent_on_section
 from jaxbiped.variational._grazing import turns_of
 from jaxbiped.variational._hybrid_system import RedundantWalking, Rolling, Walking
-from jaxbiped.variational._radau_collocation import RADAU, KnownStep
 from jaxbiped.variational._saltation import saltation_at
-from jaxbiped.variational._section_tangents import after_reset, on_section, tangent_on_section
 from jaxbiped.variational._switch_locator import SwitchLocator
 from jaxbiped.variational._tangent_solver import TangentSolver, VariationalField
 from jaxbiped.variational._tangents import Seeded, Tangents
-from jaxbiped.variational._watch import Watch
+from jaxbiped.variational._variational_problem import Watch
 
 BEFORE, AFTER = -9.8, 14.0
 """Accelerations above the level and below [m/s²]."""
