@@ -7,13 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError
 from jaxbiped.gait._explain_search import grazing_sentence
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
@@ -21,7 +19,7 @@ from jaxbiped.gait._solver import orbit_solver
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision
-from jaxbiped.solve._error_estimate import Judged, refine
+from jaxbiped.solve._error_estimate import Judged, check_untraced, refine
 from jaxbiped.solve._units import relative_to_scene
 from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
 
@@ -63,11 +61,7 @@ def accurate_gait(
             Rodas4P where that is the method itself.
         radius: whether derivatives of the spectral radius are wanted.
     """
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves((scene, guess))):
-        raise ArgumentError(
-            f"accuracy = {wanted:g} is not allowed under jit, vmap or differentiation: name one of "
-            f"{', '.join(GAIT_ACCURACIES)} there."
-        )
+    check_untraced(wanted, (scene, guess), GAIT_ACCURACIES)
     fifth = isinstance(orbit_solver(solver, rigid=not scene.compliant), Rodas5P)
     other = "rodas4p" if fifth else "rodas5p"
     near = guess

@@ -9,8 +9,12 @@ from jaxtyping import Array, PyTree
 from jaxbiped._debug_switches import without_switches
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.scene._scene import RedundantScene, Scene
-from jaxbiped.simulate._accurate_walk import accurate_walk, check_accurate_walk
-from jaxbiped.simulate._fixed_steps import warn_of_long_steps, warn_of_missed_contacts
+from jaxbiped.simulate._error_witnesses import (
+    accurate_walk,
+    check_accurate_walk,
+    warn_of_long_steps,
+    warn_of_missed_contacts,
+)
 from jaxbiped.simulate._simulation import Simulation
 from jaxbiped.solve._accuracy import warn_of_unresolved_slip
 from jaxbiped.solve._failure_events import WATCHES

@@ -30,14 +30,11 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import BristleState, State
 from jaxbiped.scene._scene import RedundantScene, Scene
 from jaxbiped.scene._scene_checks import check_scene, where_allowed
-from jaxbiped.simulate._by_lanes import able_request, by_lanes, prepare_lanes
-from jaxbiped.simulate._by_xla import by_xla, trim
 from jaxbiped.simulate._derivatives import with_derivatives
-from jaxbiped.simulate._engine_choice import choose_engine
-from jaxbiped.simulate._saved_times import check_times
+from jaxbiped.simulate._lane_backend import able_request, by_lanes, choose_engine, prepare_lanes
 from jaxbiped.simulate._slopes import Slopes, slopes_of
-from jaxbiped.simulate._start import check_steps, start_for
-from jaxbiped.simulate._start_height import check_start_height
+from jaxbiped.simulate._start import check_start_height, check_steps, check_times, start_for
+from jaxbiped.simulate._xla_backend import by_xla, trim
 from jaxbiped.solve._accuracy import check_precision, tolerances
 from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._projected_solver import check_adjoint

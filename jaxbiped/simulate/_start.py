@@ -1,25 +1,35 @@
-"""Checks of how a simulation starts and steps."""
+"""Start of a simulation, and the steps and saved times that are asked for, checked."""
+
+import math
+from collections.abc import Sequence
 
 import diffrax
+import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import PyTree
+from jaxtyping import ArrayLike, PyTree
 
 from jaxbiped._checks import ArgumentError, check_positive, check_unbatched, holds_somewhere
 from jaxbiped._types import Scalar
+from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.constraints._projection import check_independent
 from jaxbiped.dynamics._consistent_state import Consistent, consistent_state
 from jaxbiped.dynamics._redundant_motion import coordinates_of
-from jaxbiped.dynamics._state import state_for
-from jaxbiped.scene._ground import Ground
+from jaxbiped.dynamics._state import BristleState, State, state_for
+from jaxbiped.scene._ground import AbstractClearance, Ground
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._walker import Walker
 from jaxbiped.scene.actuation._catalogue import ACTUATORS
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS
 
 _PRECISIONS = (np.float16, np.float32, np.float64)
 """Of NumPy's, those that JAX has."""
+_DEEPEST = 0.25
+"""Penetration of a foot that touches, in units of l, from which it starts below the ground."""
+_HIGHEST = 100.0
+"""Energy stored in a foot's contact, in units of m g l, from which it does."""
 
 
 def start_for(scene: Scene | RedundantScene, state: PyTree) -> tuple[PyTree, Consistent | None]:
@@ -95,4 +105,73 @@ def check_steps(
         raise ArgumentError(
             f"dt = {float(dt):g} is not allowed: {float(duration):g} s of such steps are more than "
             f"max_solver_steps = {most_steps}; simulate less time, or allow more."
+        )
+
+
+def check_start_height(scene: Scene | RedundantScene, state: State | BristleState) -> None:
+    """Refuses a start below the ground, where all values are known.
+
+    The deepest that is allowed is l/4, and so deep that the contact stores what would throw the
+    walker a hundred legs high, 100 m g l: contact so stiff is to be started near its surface.
+
+    Raises:
+        ArgumentError: a deeper start.
+    """
+    leaves = jtu.tree_leaves((scene, state))
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+        return
+    # Plain numbers: operations of JAX by themselves would be compiled one by one.
+    walker, g = jtu.tree_map(float, scene.walker), float(scene.ground.g)
+    lift, hip_z = walker.total_mass * g * walker.l, float(state.hip_z)
+    if hip_z <= 0.0:
+        raise ArgumentError(
+            f"state.hip_z = {hip_z:g} is not allowed: the walker starts below the ground, its hip "
+            "under the surface; start higher."
+        )
+    angles, rates = (state.theta_1, state.theta_2), (state.omega_1, state.omega_2)
+    depths = [walker.r - hip_z + walker.hip_to_foot * math.cos(float(angle)) for angle in angles]
+    if max(depths) <= 0.0:
+        return
+    given = scene.clearance, scene.normal, depths, rates
+    energies = _contact_energies(*jtu.tree_map(np.asarray, given))
+    stored, depth, leg = max(zip(map(float, energies), depths, (1, 2), strict=True))
+    if stored > 0.0 and (depth > _DEEPEST * walker.l or stored > _HIGHEST * lift > 0.0):
+        raise ArgumentError(
+            f"state.hip_z = {hip_z:g} is not allowed: foot {leg} starts {depth:.3g} m below the "
+            f"ground, where its contact stores {stored:.3g} J (m g l is {lift:.3g} J); it just "
+            f"touches at hip_z = {hip_z + depth:.9g}."
+        )
+
+
+@cached_jit
+def _contact_energies(
+    clearance: AbstractClearance,
+    law: AbstractNormalLaw,
+    depths: Sequence[Scalar],
+    rates: Sequence[Scalar],
+) -> list[Scalar]:
+    """The energy in the contact of each foot, 0 where it does not touch [J]."""
+
+    def stored(leg: int, depth: Scalar, rate: Scalar) -> Scalar:
+        admitted = clearance.admits(leg, rate)
+        touches = (depth > 0.0) & (True if admitted is None else admitted)
+        return jnp.where(touches, law.elastic_energy(depth), 0.0)
+
+    return [stored(1, depths[0], rates[0]), stored(2, depths[1], rates[1])]
+
+
+def check_times(times: ArrayLike, duration: Scalar | float) -> None:
+    """Raises `ArgumentError` unless they increase and lie within the duration [s]."""
+    if isinstance(times, jax.core.Tracer) or isinstance(duration, jax.core.Tracer):
+        return
+    try:
+        values = np.asarray(times, dtype=float)
+    except (TypeError, ValueError):
+        raise ArgumentError(
+            f'save = {times!r} is not allowed: give "steps", "end", a section or increasing times.'
+        ) from None
+    allowed = values.ndim == 1 and np.all(np.diff(values) >= 0.0)
+    if not allowed or not np.all((values >= 0.0) & (values <= float(duration))):
+        raise ArgumentError(
+            f"save = {values} is not allowed: it must be increasing times from 0 to {duration} s."
         )

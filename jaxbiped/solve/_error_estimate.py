@@ -1,10 +1,12 @@
 """Error estimate of a result: its error bars, and what was done to have them."""
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 import equinox as eqx
+import jax
+import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
@@ -67,6 +69,15 @@ def check_wanted(accuracy: object, **replaced: object) -> None:
                 f"{name} = {value!r} is not allowed beside accuracy = {accuracy!r}: a number "
                 "chooses the tolerances itself."
             )
+
+
+def check_untraced(accuracy: float, given: PyTree, names: Iterable[str]) -> None:
+    """Raises `ArgumentError` for a number, unlike a name, where what is given is traced."""
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(given)):
+        raise ArgumentError(
+            f"accuracy = {accuracy:g} is not allowed under jit, vmap or differentiation: name one "
+            f"of {', '.join(names)} there."
+        )
 
 
 def refine(

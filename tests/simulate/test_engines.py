@@ -12,7 +12,7 @@ from reference.walks import reference_states
 
 import jaxbiped as jb
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
-from jaxbiped.simulate._recorded_steps import recorded_steps
+from jaxbiped.simulate._lane_backend import recorded_steps
 from tests.unknown_to_lanes import ErrorFunction
 
 pytestmark = pytest.mark.slow

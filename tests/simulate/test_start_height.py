@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.simulate._start_height import check_start_height
+from jaxbiped.simulate._start import check_start_height
 
 SEED = jb.seed_scene()
 

@@ -1,20 +1,23 @@
-"""Simulation by lanes, or by what runs their programs on devices."""
+"""Lane backend of simulations: when lanes can do what is asked, and how they do it."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import diffrax
 import jax
 import jax.numpy as jnp
+import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, ArrayLike, PyTree
 
+from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import LaneEngine, Request
+from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
-from jaxbiped.simulate._recorded_steps import recorded_steps
 from jaxbiped.solve._adaptive_program import Solve, Solved
+from jaxbiped.solve._engine_names import ENGINES, engine_for
 from jaxbiped.solve._lane_solve import (
     Setting,
     lane_engine,
@@ -31,9 +34,67 @@ from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 if TYPE_CHECKING:
     from jaxbiped.simulate._simulation import Simulation
 
-
 _QUICK = 100_000
 """Attempted steps that take less than a second."""
+
+
+def choose_engine(
+    engine: str,
+    *,
+    solver: diffrax.AbstractSolver[PyTree],
+    save_steps: bool,
+    adjoint: diffrax.AbstractAdjoint | None,
+    leaves: PyTree,
+    times: str | ArrayLike | AbstractSection,
+    section: AbstractSection | None,
+    dt: ArrayLike | None = None,
+    redundant: bool = False,
+) -> str:
+    """The engine that "auto" stands for, or the one that is asked for.
+
+    Raises:
+        ArgumentError: an unknown name, or lanes or CUDA for what they cannot do.
+    """
+    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(leaves))
+    obstacle = _hindrance(solver, save_steps, adjoint, leaves, times, traced=traced)
+    if redundant and not (isinstance(times, str) and times == "end"):
+        obstacle = 'redundant coordinates are diffrax\'s, but for save="end"'
+    if dt is not None:
+        obstacle = "steps of one size (dt) are diffrax's"
+    if section is None:
+        return engine_for(engine, obstacle=obstacle, prefers_xla=redundant, by_device=True)
+    check_choice("engine", engine, ENGINES)
+    if engine == "xla" or obstacle is not None:
+        why = f"here {obstacle}" if obstacle is not None else 'engine = "xla" was chosen'
+        raise ArgumentError(
+            f"save = {type(section).__name__}() is not allowed here: only lanes do that, and {why}."
+        )
+    return engine_for("cuda", obstacle=None, by_device=True) if engine == "cuda" else "lanes"
+
+
+def _hindrance(
+    solver: diffrax.AbstractSolver[PyTree],
+    save_steps: bool,
+    adjoint: diffrax.AbstractAdjoint | None,
+    leaves: PyTree,
+    times: str | ArrayLike | AbstractSection,
+    *,
+    traced: bool,
+) -> str | None:
+    """Why lanes cannot do what is asked."""
+    if not isinstance(solver, AbstractRosenbrock):
+        return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
+    if save_steps and traced:
+        return 'under jit, vmap or derivatives it does not save every step (save="steps")'
+    if adjoint is not None:
+        return "an adjoint is diffrax's"
+    if isinstance(times, jax.core.Tracer):
+        return "the times to save at must be known beforehand"
+    if isinstance(times, AbstractSection) and jtu.tree_leaves(times):
+        return f"the section {type(times).__name__} holds numbers of its own"
+    if any(jnp.result_type(leaf) != jnp.float64 for leaf in jtu.tree_leaves(leaves)):
+        return "it computes in 64 bits"
+    return None
 
 
 def by_lanes(run: "Simulation", request: Request | None = None) -> Trajectory:
@@ -136,3 +197,38 @@ def _solve(run: "Simulation") -> Solve:
         patience=as_float(PATIENCE * footsteps),
         max_attempts=as_float(run.max_solver_steps),
     )
+
+
+class RecordedSteps(NamedTuple):
+    """The times [s] of a start and of n steps' ends, (n + 1,), the states there, and the rest."""
+
+    t: Array
+    state: State
+    dense: diffrax.DenseInterpolation
+
+
+def recorded_steps(start: State, rows: np.ndarray, solver: AbstractRosenbrock) -> RecordedSteps:
+    """From the records of `Saved(steps=True)`, shape (n, numbers), as diffrax would have them."""
+    kind: Callable[..., State] = type(start)
+    size = len(start)
+    first = np.array([0.0, *(float(leaf) for leaf in start)])
+    ends = np.vstack([first, rows[:, : 1 + size]]).T.copy()
+    # One step more than there are: where there are none, diffrax looks into one all the same.
+    times = np.append(ends[0], np.inf)
+    infos = np.vstack([ends[1:, :-1], rows[:, 1:].T])
+    infos = np.pad(infos, ((0, 0), (0, 1)), constant_values=np.inf)
+    groups = [kind(*infos[k : k + size]) for k in range(0, len(infos), size)]
+    # One transfer for all of them: each costs as much as several steps.
+    counts = len(rows) + 1, 1  # of a weak type, as a number in diffrax's own would be
+    parts = times, groups, ends[0], kind(*ends[1:]), np.float64(0.0), counts
+    times, groups, t, states, zero, (count, one) = jax.device_put(parts)
+    dense = diffrax.DenseInterpolation(
+        ts=times,
+        ts_size=count,
+        infos=dict(y0=groups[0], y1=groups[1], coefficients=tuple(groups[2:])),
+        interpolation_cls=solver.interpolation_cls,
+        direction=one,
+        t0_if_trivial=zero,
+        y0_if_trivial=start,
+    )
+    return RecordedSteps(t, states, dense)
