@@ -28,7 +28,7 @@ def default_start(scene: Any) -> Any:
         own.walker, own.normal, own.ground.g
     ):
         return seed
-    from jaxbiped.gait._default_guess import default_guess
+    from jaxbiped.gait._search_starts import default_guess
 
     start: Any = default_guess(scene)
     if not scene.compliant:

@@ -16,7 +16,7 @@ from jaxbiped.continuation._branch_point import Axis, BranchPoint
 from jaxbiped.continuation._trace import BranchStop
 from jaxbiped.dynamics._state import BristleState, RigidState, State, WalkerState
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
-from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene

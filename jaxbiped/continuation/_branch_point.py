@@ -6,9 +6,9 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_choice, check_finite, check_positive
 from jaxbiped.continuation._cycle import Cycle, CycleProblem
-from jaxbiped.gait._orbit import CLOSENESS
+from jaxbiped.gait._orbit_derivatives import CLOSENESS
 from jaxbiped.gait._pseudo_arclength import Change, Curve, CurvePoint
-from jaxbiped.gait._settled_walks import component_sizes
+from jaxbiped.gait._search_starts import component_sizes
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._parameter_access import (
     parameter_names,

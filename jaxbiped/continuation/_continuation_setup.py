@@ -12,18 +12,15 @@ from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point,
 from jaxbiped.continuation._cycle import CycleProblem
 from jaxbiped.continuation._trace import Trace, limit_cause
 from jaxbiped.dynamics._state import RigidState, WalkerState, check_state, state_for
-from jaxbiped.gait._continuation import BranchEnd
-from jaxbiped.gait._default_guess import default_guess
-from jaxbiped.gait._engine import orbit_engine
+from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._pseudo_arclength import Attempt, Curve, CurvePoint, correct
-from jaxbiped.gait._return_map_spec import walking_spec
-from jaxbiped.gait._solver import orbit_solver
+from jaxbiped.gait._return_map_spec import return_map_spec
+from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import ACCURACIES, precision_of
-from jaxbiped.variational._hybrid_system import section_of
 
 _TOLD_BY_CONTACT = (BranchEnd.BREAKS_OFF, BranchEnd.WALK_ENDS)
 _BEYOND = 5e-3
@@ -109,12 +106,9 @@ def continuation_setup(
     """The setup for a scene; raises `ArgumentError` for an engine that cannot."""
     scene = check_scene(scene, Scene, RigidScene)
     like = default_guess(scene)
-    solver = orbit_solver(None, rigid=not scene.compliant)
-    section = section_of(scene, None)
-    runs_on = orbit_engine(engine, solver=solver, section=section, leaves=(scene, like))
     # A branch may come to gaits that are costlier than those of a search.
     most = max(each.max_solver_steps for each in ACCURACIES.values())
-    spec = walking_spec(scene, section, solver, runs_on, steps=1, most=most)
+    spec = return_map_spec(scene, like, solver=None, engine=engine, max_solver_steps=most)
     problem = CycleProblem(spec, scene, like, precision_of(accuracy, scene))
     return ContinuationSetup(scene, axis, footsteps, accuracy, problem)
 

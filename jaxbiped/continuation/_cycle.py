@@ -14,10 +14,9 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.gait._fixed_point_search import LOOSER
+from jaxbiped.gait._fixed_point_search import LOOSER, is_sound
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.gait._soundness import is_sound
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import Precision
 

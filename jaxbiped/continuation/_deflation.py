@@ -24,7 +24,7 @@ from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._pseudo_arclength import Change
-from jaxbiped.gait._rolling_starts import rolling_starts
+from jaxbiped.gait._search_starts import rolling_starts
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES

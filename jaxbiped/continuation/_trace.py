@@ -17,7 +17,7 @@ from jaxbiped.continuation._bifurcations import (
 from jaxbiped.continuation._branch_point import NO_WALK, Axis, BranchPoint, branch_point
 from jaxbiped.dynamics._contact_forces import contacts
 from jaxbiped.dynamics._state import State, WalkerState
-from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, correct, follow
 from jaxbiped.scene._scene import Scene
 from jaxbiped.simulate._simulate import simulate

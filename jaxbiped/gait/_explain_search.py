@@ -5,9 +5,9 @@ import warnings
 import numpy as np
 
 from jaxbiped._ending import Ending
-from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import AbstractScene
 

@@ -22,16 +22,14 @@ from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import RigidState, WalkerState, check_state, state_for
 from jaxbiped.gait._accurate_gait import accurate_gait
-from jaxbiped.gait._default_guess import default_guess
-from jaxbiped.gait._engine import orbit_engine
 from jaxbiped.gait._explain_search import warn_of_grazing
 from jaxbiped.gait._fixed_point_search import Found, Search, SearchArguments, search, walks_only
 from jaxbiped.gait._gait import Described, Gait, summarise_gait
 from jaxbiped.gait._newton import Method
-from jaxbiped.gait._origin import FoundBy, Origin, single_stage_origin
-from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes, walking_spec
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, return_map_spec, runs_by_lanes
 from jaxbiped.gait._search_along import search_along
-from jaxbiped.gait._solver import orbit_solver
+from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin
+from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.gait._staged_search import is_whole, origin_of, search_in_stages, spectral_radius
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import AbstractScene, RedundantScene, RigidScene, Scene
@@ -145,21 +143,15 @@ def find_gait(
     modelled = scene.minimal  # a redundant scene's leaves begin with those of what it models
     names, active = select_parameters(modelled, parameters)
     precision = precision_of(accuracy, scene) if isinstance(accuracy, str) else accuracy
-    method_of_steps = orbit_solver(solver, rigid=not scene.compliant)
-    runs_on = orbit_engine(
-        engine,
-        solver=method_of_steps,
-        section=section,
-        leaves=(scene, start),
-        redundant=scene.redundant,
-    )
-    spec = walking_spec(
+    named = accuracy if isinstance(accuracy, str) else "tight"
+    spec = return_map_spec(
         scene,
-        section,
-        method_of_steps,
-        runs_on,
+        start,
+        section=section,
+        solver=solver,
+        engine=engine,
         steps=int(footsteps),
-        most=ACCURACIES[accuracy if isinstance(accuracy, str) else "tight"].max_solver_steps,
+        max_solver_steps=ACCURACIES[named].max_solver_steps,
     )
     how = Method(
         optimiser=None if method == "newton" else (_adam() if optimiser is None else optimiser),
@@ -168,7 +160,7 @@ def find_gait(
         patience=np.asarray(int(most)),
     )
     # One program of lanes serves every search, whatever it is asked for, and what follows it.
-    columns = select_parameters(modelled, None)[1] if runs_on == "lanes" else ()
+    columns = select_parameters(modelled, None)[1] if runs_by_lanes(spec) else ()
     searching = (spec, scene, columns, start, precision, how)
     describing = (names, active, radius_sensitivities)
     by = FoundBy.GUESS if guess is not None else FoundBy.START
@@ -201,13 +193,13 @@ def _search_on(
 ) -> tuple[Found, Origin]:
     """The stages of a search beyond the first."""
     spec, scene, columns, start, precision, how = searching
-    solver = orbit_solver(None, rigid=not modelled.compliant)
-    section = section_of(modelled, None)
-    if scene.redundant:
-        engine = "auto"
-    scout_engine = orbit_engine(engine, solver=solver, section=section, leaves=(modelled, start))
-    most = ACCURACIES["balanced"].max_solver_steps
-    scout = walking_spec(modelled, section, solver, scout_engine, steps=1, most=most)
+    scout = return_map_spec(
+        modelled,
+        start,
+        solver=None,
+        engine="auto" if scene.redundant else engine,
+        max_solver_steps=ACCURACIES["balanced"].max_solver_steps,
+    )
 
     def search_from(spec: ReturnMapSpec, scene: PyTree, start: PyTree, patience: int) -> Found:
         hasty = dataclasses.replace(how, patience=np.asarray(min(patience, how.max_evaluations)))

@@ -1,4 +1,9 @@
-"""Fixed points of the return map: the search for a periodic orbit."""
+"""Fixed-point search of the return map, and whether what it came to is a walk at all.
+
+The return map has fixed points that no walk reaches: under the clearance rule a foot may swing
+deep underground and be caught there. Stability does not tell them from gaits, so depth does. And
+the return map of n footsteps also has the gaits of every divisor of n as fixed points.
+"""
 
 import enum
 from collections.abc import Callable
@@ -9,14 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, by_numpy
-from jaxbiped.gait._newton import (
-    Method,
-    Progress,
-    Stage,
-    initial_progress,
-    newton_iteration,
-)
+from jaxbiped._types import RealScalarLike, Scalar, by_numpy
+from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.gait._newton import Method, Progress, Stage, initial_progress, newton_iteration
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
     linearised_return,
@@ -25,13 +26,19 @@ from jaxbiped.gait._poincare_map import (
     state_with,
 )
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.gait._soundness import is_sound
+from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import Precision
 
 LOOSER = 10.0
 """How much looser the search is solved before its end, and the witness of its error."""
 ROUGH = Precision(3e-6, 3e-4)
 """How exactly the search is solved until it is near."""
+_SHORTEST = 0.1
+"""Duration of a cycle in units of √(l/g), about 2 for a footstep: a foot may also chatter."""
+_DEEPEST = 3.0
+"""Elastic force of a standing foot, in units of the walker's weight: about 1 where it stands."""
+_ERRORS, _TOLERANCES = 4.0, 30.0
+"""Distance of two crossings that are one: in units of the fixed point's error, and of rtol."""
 
 
 class Search(enum.IntEnum):
@@ -202,3 +209,69 @@ def _iterate(run: Run, begin: Progress, method: Method) -> Progress:
         return newton_iteration(now, latest, method)
 
     return jax.lax.while_loop(goes_on, advance, begin)
+
+
+def is_sound(scene: object, state: PyTree, step_length: Scalar, period: Scalar) -> Scalar:
+    """Whether an orbit through a state on its section steps downhill and on the ground (boolean).
+
+    Args:
+        scene: the walker; what is none has nothing to be held to.
+        state: on the section, where a foot stands or comes down.
+        step_length: advance along the slope in a cycle [m].
+        period: duration of a cycle [s].
+    """
+    if not isinstance(scene, AbstractScene):
+        return jnp.asarray(True)
+    pace = jnp.sqrt(scene.walker.l / scene.ground.g)
+    forward = (step_length > 0.0) & (period > _SHORTEST * pace)
+    if not scene.compliant:
+        return forward
+    modelled = scene.minimal
+    weight = modelled.walker.total_mass * modelled.ground.g
+
+    def deep(foot: Foot) -> Scalar:
+        return touches(foot) & (modelled.normal.elastic_force(foot.penetration) > _DEEPEST * weight)
+
+    both = feet(modelled, minimal_state(scene, state))
+    return forward & ~deep(both.foot_1) & ~deep(both.foot_2)
+
+
+def minimal_cycle(last: LinearisedReturn, error: Scalar, rtol: RealScalarLike) -> Scalar:
+    """The least divisor k of n such that the crossing after k footsteps is the first one.
+
+    Args:
+        last: the n returns of the cycle, with their nodes.
+        error: estimated errors of the m components that it begins at, shape (m,).
+        rtol: the solve's relative tolerance.
+    """
+    crossings = crossings_of(last)
+    n = crossings.shape[0]
+    if n == 1:
+        return jnp.asarray(1)
+
+    def least(numpy: Any, crossings: Any, error: Any, rtol: Any) -> Any:
+        allowed = _ERRORS * numpy.max(numpy.abs(error)) + _TOLERANCES * rtol
+        found = numpy.asarray(n)
+        for k in range(n - 1, 0, -1):
+            if n % k == 0:
+                off = numpy.max(numpy.abs(crossings[k] - crossings[0]))
+                found = numpy.where(off <= allowed, k, found)
+        return found
+
+    return by_numpy(least, crossings, error, rtol)
+
+
+def cycle_of(found: Found, rtol: float) -> int:
+    """The same of a fixed point that is known, its error that of Newton's next correction."""
+    last, m = found.last, found.recurring.shape[0]
+    change = np.asarray(last.recurring) - np.asarray(crossings_of(last))[0]
+    error, *_ = np.linalg.lstsq(np.eye(m) - np.asarray(last.jacobian)[:, :m], change)
+    return int(minimal_cycle(last, error, rtol))
+
+
+def crossings_of(last: LinearisedReturn) -> Scalar:
+    """The m recurring components at the beginning of each of the n returns, shape (n, m)."""
+    assert last.nodes is not None
+    m = last.recurring.shape[0]
+    # A row is time, hip_x and then all that must return.
+    return last.nodes.start.reshape(-1, 2 + m)[:, 2:]

@@ -15,12 +15,11 @@ from jaxbiped._summary import summary
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._state import WalkerState
-from jaxbiped.gait._fixed_point_search import Found, Search
-from jaxbiped.gait._minimal_cycle import crossings_of, minimal_cycle
-from jaxbiped.gait._orbit import Orbit, Slopes, orbit_of, with_parameter_columns
-from jaxbiped.gait._origin import FoundBy, Origin, OtherGait
+from jaxbiped.gait._fixed_point_search import Found, Search, crossings_of, minimal_cycle
+from jaxbiped.gait._orbit_derivatives import Orbit, Slopes, orbit_of, with_parameter_columns
 from jaxbiped.gait._poincare_map import LinearisedReturn
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
+from jaxbiped.gait._search_provenance import FoundBy, Origin, OtherGait
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.scene._parameter_access import parameter_quantities

@@ -1,4 +1,4 @@
-"""The return map as a function that JAX can differentiate."""
+"""The return map as a function that JAX can differentiate, and one return with its derivatives."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,29 +8,33 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive
+from jaxbiped._checks import ArgumentError, check_choice, check_count, check_positive, check_type
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._types import Scalar, Time, as_float, select
 from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state, redundant_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import check_leaves
-from jaxbiped.gait._engine import check_holds_none, orbit_engine
 from jaxbiped.gait._gradient_modes import AbstractGradient, Forward, Reverse, check_anywhere
-from jaxbiped.gait._return_by_lanes import forward_by_lanes, reverse_by_lanes
-from jaxbiped.gait._return_by_xla import forward_by_xla, reverse_by_xla
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.gait._solver import orbit_solver
-from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene, is_rigid
-from jaxbiped.scene._scene_checks import check_scene
-from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, precision_of
-from jaxbiped.solve._projected_solver import with_projection
-from jaxbiped.variational._hybrid_system import (
-    AbstractSystem,
-    RedundantWalking,
-    section_of,
-    system_of,
-    with_leg_names_of,
+from jaxbiped.gait._poincare_map import LinearisedReturn, linearised_return, seed_directions
+from jaxbiped.gait._return_derivatives import (
+    forward_by_lanes,
+    forward_by_xla,
+    reverse_by_lanes,
+    reverse_by_xla,
 )
+from jaxbiped.gait._return_map_spec import check_holds_none, return_map_spec
+from jaxbiped.scene._parameter_access import select_parameters
+from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene_checks import check_scene
+from jaxbiped.solve._accuracy import ACCURACIES, GAIT_ACCURACIES, Precision, precision_of
+from jaxbiped.variational._hybrid_system import AbstractSystem, section_of, with_leg_names_of
+
+_FOLLOW: dict[tuple[str, type[AbstractGradient]], Callable[..., tuple[PyTree, Scalar, Scalar]]] = {
+    ("xla", Forward): forward_by_xla,
+    ("xla", Reverse): reverse_by_xla,
+    ("lanes", Forward): forward_by_lanes,
+    ("lanes", Reverse): reverse_by_lanes,
+}
 
 
 class Return(NamedTuple):
@@ -102,35 +106,25 @@ def return_map(
             raise ArgumentError(f"state = {state!r} is not allowed: give a State.")
         state = check_leaves(state, "state")
     args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
-    redundant = isinstance(args, RedundantScene) and system is None
-    enters = redundant and not is_redundant(state)
+    enters = system is None and isinstance(args, RedundantScene) and not is_redundant(state)
     if enters:
         state = redundant_state(args, state)
     section = section_of(args, section)
     if system is None:
         state = with_leg_names_of(section, args, state)
     check_holds_none(gradient, system, section)
-    method = orbit_solver(solver, rigid=is_rigid(args))
-    by = orbit_engine(
-        engine,
-        solver=method,
+    spec = return_map_spec(
+        args,
+        state,
         section=section,
-        leaves=(args, state),
+        solver=solver,
+        engine=engine,
         system=system,
-        redundant=redundant,
-    )
-    if redundant:
-        system, method = RedundantWalking(), with_projection(args, method)
-    spec = ReturnMapSpec(
-        system=system_of(args) if system is None else system,
-        section=section,
-        solver=method,
         max_time=max_time,
-        steps=1,
         max_solver_steps=ACCURACIES[accuracy].max_solver_steps,
-        engine=by,
+        in_minimal=False,
     )
-    follow = _FOLLOW[by, type(gradient)]
+    follow = _FOLLOW[spec.engine, type(gradient)]
     precision = precision_of(accuracy, args)
     time, code = jnp.zeros(()), jnp.asarray(0)
     for _ in range(int(footsteps)):
@@ -141,9 +135,75 @@ def return_map(
     return Return(minimal_state(args, state) if enters else state, time, code)
 
 
-_FOLLOW: dict[tuple[str, type[AbstractGradient]], Callable[..., tuple[PyTree, Scalar, Scalar]]] = {
-    ("xla", Forward): forward_by_xla,
-    ("xla", Reverse): reverse_by_xla,
-    ("lanes", Forward): forward_by_lanes,
-    ("lanes", Reverse): reverse_by_lanes,
-}
+def linearise_return_map(
+    args: PyTree,
+    state: PyTree,
+    *,
+    rtol: float,
+    tangent_rtol: float,
+    parameters: tuple[str, ...] | None = None,
+    section: AbstractSection | None = None,
+    footsteps: int = 1,
+    system: AbstractSystem | None = None,
+    solver: str | diffrax.AbstractAdaptiveSolver[PyTree] | None = None,
+    max_time: Time = 10.0,
+    max_solver_steps: int = 32768,
+    engine: str = "auto",
+) -> LinearisedReturn:
+    """Follows a motion for one cycle, with derivatives with respect to its start and parameters.
+
+    It is what `find_gait` evaluates, and its multipliers and sensitivities are read off (see
+    `stability_of`, `slopes_of`), for studies of the derivatives themselves. Tolerances are traced:
+    any of them are solved by one compiled program.
+
+    Args:
+        args: the scene, compliant or rigid, or the parameters of another `system`.
+        state: start, on the section or not.
+        rtol: relative tolerance of the state; the absolute one (SI, for a walker of the seed's
+            size) is a hundredth of it.
+        tangent_rtol: relative tolerance of the derivatives; a very large one leaves the choice of
+            steps to the state alone.
+        parameters: names of the parameters to differentiate with respect to (see
+            `parameter_names`), of other `args` those of their leaves; all of them unless given,
+            none for ().
+        section: `MidStance()` unless given, `HeelStrike()` for a rigid walker.
+        footsteps: how many a cycle has.
+        system: the walker unless given.
+        solver: a name (see `SOLVERS`) or any diffrax solver that estimates its errors; unless
+            given "rodas4", for a rigid walker "rodas5p".
+        max_time: longest time to an arrival [s].
+        max_solver_steps: cap on the attempted steps to an arrival.
+        engine: "xla", "lanes" or "auto" (see `ENGINES`), which here is "xla" for a system of your
+            own.
+
+    Returns:
+        The state that returns, period, advance and largest load with their derivatives, those with
+        respect to a parameter in units of its size.
+
+    Raises:
+        ArgumentError: an argument that is not allowed, before anything is compiled.
+    """
+    if system is None:
+        check_type("args", args, Scene, RigidScene)
+    for name, tolerance in (("rtol", rtol), ("tangent_rtol", tangent_rtol)):
+        check_positive(name, tolerance)
+    check_positive("max_time", max_time, "s")
+    check_count("footsteps", footsteps)
+    check_count("max_solver_steps", max_solver_steps)
+    _, active = select_parameters(args, parameters)
+    args, state = (jtu.tree_map(as_float, tree) for tree in (args, state))
+    spec = return_map_spec(
+        args,
+        state,
+        section=section,
+        solver=solver,
+        engine=engine,
+        system=system,
+        steps=int(footsteps),
+        max_time=as_float(max_time),
+        max_solver_steps=int(max_solver_steps),
+    )
+    recurring = len(jtu.tree_leaves(state)) - len(spec.system.cyclic_coordinates)
+    seeds, _ = seed_directions(args, active, recurring)
+    precision = Precision(as_float(rtol), as_float(tangent_rtol))
+    return linearised_return(spec, seeds, state, precision, jnp.asarray(False))

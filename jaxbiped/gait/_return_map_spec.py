@@ -1,17 +1,29 @@
 """Specification of a return map: whose it is, and how it is solved."""
 
-from typing import cast
-
 import diffrax
 import equinox as eqx
+import jax
+import jax.numpy as jnp
+import jax.tree_util as jtu
+import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, Time, by_numpy
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.scene._scene import AbstractScene, RedundantScene
+from jaxbiped.gait._gradient_modes import AbstractGradient, Reverse
+from jaxbiped.scene._scene import AbstractScene, RedundantScene, is_rigid
+from jaxbiped.solve._engine_names import engine_for
 from jaxbiped.solve._projected_solver import with_projection
-from jaxbiped.variational._hybrid_system import AbstractSystem, RedundantWalking, system_of
+from jaxbiped.solve._solvers import solver_named
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.variational._hybrid_system import (
+    AbstractSystem,
+    RedundantWalking,
+    section_of,
+    system_of,
+)
 from jaxbiped.variational._variational_problem import Watch
 
 _PATIENCE = 50.0
@@ -66,29 +78,110 @@ def runs_by_lanes(spec: ReturnMapSpec, *_: object, **__: object) -> bool:
     return spec.engine == "lanes"
 
 
-def walking_spec(
-    scene: AbstractScene,
-    section: AbstractSection,
-    solver: diffrax.AbstractAdaptiveSolver[PyTree],
-    engine: str,
+def return_map_spec(
+    args: PyTree,
+    state: PyTree,
     *,
-    steps: int,
-    most: int,
+    solver: str | diffrax.AbstractSolver[PyTree] | None,
+    engine: str,
+    max_solver_steps: int,
+    section: AbstractSection | None = None,
+    system: AbstractSystem | None = None,
+    steps: int = 1,
+    max_time: Time | None = None,
+    in_minimal: bool = True,
 ) -> ReturnMapSpec:
-    """The return map of a walker, of cycles of so many footsteps."""
-    within = None
-    if scene.redundant:
-        solver, within = with_projection(cast("RedundantScene", scene), solver), RedundantWalking()
+    """Checks how a return map is to be solved, and forms it.
+
+    Args:
+        args: the scene, or the parameters of another `system`.
+        state: on its orbits.
+        section: the scene's own unless given.
+        solver: by name, as it is, or the usual one.
+        engine: one of `ENGINES`.
+        system: the user's own, where it is: nobody knows if lanes can express it.
+        steps, max_time, max_solver_steps: of the spec; `max_time` is a walker's unless given.
+        in_minimal: whether the returns of a redundant scene are told in minimal coordinates.
+
+    Raises:
+        ArgumentError: a section, solver or engine that is unknown or cannot do this.
+    """
+    section = section_of(args, section)
+    method = orbit_solver(solver, rigid=is_rigid(args))
+    obstacle = _hindrance(method, section, (args, state))
+    own, within = system_of(args) if system is None else system, None
+    if system is None and isinstance(args, RedundantScene):
+        obstacle = "redundant coordinates are diffrax's"
+        method, within = with_projection(args, method), RedundantWalking()
+        if not in_minimal:
+            own, within = within, None
+    elif holds_arrays(system):
+        obstacle = f"the system {type(system).__name__} holds arrays, which belong in args"
     return ReturnMapSpec(
-        system=system_of(scene),
+        system=own,
         section=section,
-        solver=solver,
-        max_time=_patience(scene.walker.l, scene.ground.g),
+        solver=method,
+        max_time=patience_of(args) if max_time is None else max_time,
         steps=steps,
-        max_solver_steps=most,
-        engine=engine,
+        max_solver_steps=max_solver_steps,
+        engine=engine_for(engine, obstacle=obstacle, prefers_xla=system is not None),
         within=within,
     )
+
+
+def patience_of(scene: AbstractScene) -> Scalar:
+    """Time that a walker's next arrival may take [s]."""
+    found: Scalar = by_numpy(
+        lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.walker.l, scene.ground.g
+    )
+    return found
+
+
+def orbit_solver(
+    solver: str | diffrax.AbstractSolver[PyTree] | None, *, rigid: bool
+) -> diffrax.AbstractAdaptiveSolver[PyTree]:
+    """The solver of that name, the one given, or the usual one: "rodas4", and "rodas5p" if rigid.
+
+    Raises:
+        ArgumentError: an unknown name, or a solver that does not estimate its errors.
+    """
+    usual = "rodas5p" if rigid else "rodas4"
+    found = solver_named(usual if solver is None else solver)
+    if not isinstance(found, diffrax.AbstractAdaptiveSolver):
+        raise ArgumentError(
+            f"solver = {type(found).__name__} is not allowed: it does not estimate its errors, by "
+            "which steps are chosen."
+        )
+    return found
+
+
+def check_holds_none(
+    gradient: AbstractGradient, system: AbstractSystem | None, section: AbstractSection
+) -> None:
+    """Raises `ArgumentError` for reverse mode where a system or section holds arrays."""
+    holder = next((each for each in (system, section) if holds_arrays(each)), None)
+    if isinstance(gradient, Reverse) and holder is not None:
+        raise ArgumentError(
+            f"gradient = Reverse() is not allowed here: {type(holder).__name__} holds arrays, "
+            "which belong in args."
+        )
+
+
+def holds_arrays(tree: PyTree) -> bool:
+    """Whether there are arrays, known or traced, among the leaves."""
+    return any(isinstance(leaf, jax.Array | np.ndarray) for leaf in jtu.tree_leaves(tree))
+
+
+def _hindrance(
+    solver: diffrax.AbstractSolver[PyTree], section: AbstractSection, leaves: PyTree
+) -> str | None:
+    if not isinstance(solver, AbstractRosenbrock):
+        return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
+    if jtu.tree_leaves(section):
+        return f"the section {type(section).__name__} holds numbers of its own"
+    if any(jnp.result_type(leaf) != jnp.float64 for leaf in jtu.tree_leaves(leaves)):
+        return "it computes in 64 bits"
+    return None
 
 
 class _Arrival(eqx.Module):
@@ -100,8 +193,3 @@ class _Arrival(eqx.Module):
     def __call__(self, args: PyTree, y: PyTree) -> tuple[Scalar, Scalar]:
         after_reset = minimal_state(args, self.system.reset_map(args, y))
         return self.section.value(args, after_reset), self.section.counts(args, after_reset)
-
-
-def _patience(length: Scalar, g: Scalar) -> Scalar:
-    found: Scalar = by_numpy(lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), length, g)
-    return found

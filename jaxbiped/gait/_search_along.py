@@ -11,14 +11,13 @@ import jax.numpy as jnp
 
 from jaxbiped._types import Scalar, select
 from jaxbiped.dynamics._state import WalkerState
-from jaxbiped.gait._continuation import BranchEnd
-from jaxbiped.gait._default_guess import default_guess
 from jaxbiped.gait._fixed_point_search import Found, Search, search, walks_only
-from jaxbiped.gait._homotopy import Homotopy, homotopy_to
+from jaxbiped.gait._homotopy import BranchEnd, Homotopy, homotopy_to
 from jaxbiped.gait._newton import Method
-from jaxbiped.gait._origin import FoundBy, Origin
 from jaxbiped.gait._poincare_map import recurring_components, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
+from jaxbiped.gait._search_provenance import FoundBy, Origin
+from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.linalg._small_matrices import eigenpairs
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import Precision

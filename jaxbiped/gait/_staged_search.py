@@ -12,12 +12,12 @@ from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._state import WalkerState
-from jaxbiped.gait._continuation import BranchEnd, FollowedBranch, follow_branch
-from jaxbiped.gait._default_guess import default_guess
-from jaxbiped.gait._fixed_point_search import ROUGH, Found, Search
-from jaxbiped.gait._homotopy import Homotopy, homotopy_to
-from jaxbiped.gait._minimal_cycle import cycle_of
-from jaxbiped.gait._origin import (
+from jaxbiped.gait._fixed_point_search import ROUGH, Found, Search, cycle_of
+from jaxbiped.gait._homotopy import BranchEnd, FollowedBranch, Homotopy, follow_branch, homotopy_to
+from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
+from jaxbiped.gait._pseudo_arclength import Change
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
+from jaxbiped.gait._search_provenance import (
     MOST_OTHERS,
     FoundBy,
     Origin,
@@ -25,15 +25,12 @@ from jaxbiped.gait._origin import (
     code_array,
     single_stage_origin,
 )
-from jaxbiped.gait._poincare_map import (
-    linearised_return,
-    seed_directions,
-    state_with,
+from jaxbiped.gait._search_starts import (
+    component_sizes,
+    default_guess,
+    rolling_starts,
+    settle_walks,
 )
-from jaxbiped.gait._pseudo_arclength import Change
-from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
-from jaxbiped.gait._rolling_starts import rolling_starts
-from jaxbiped.gait._settled_walks import component_sizes, settle_walks
 from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
 from jaxbiped.solve._accuracy import Precision
 

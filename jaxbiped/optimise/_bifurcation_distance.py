@@ -13,19 +13,14 @@ import numpy as np
 from jaxbiped._checks import check_choice
 from jaxbiped._types import as_float
 from jaxbiped.continuation._bifurcation_sensitivities import fold_forcing
-from jaxbiped.continuation._bifurcations import (
-    BifurcationPoint,
-    BranchEvent,
-    advance,
-    locate_near,
-)
+from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent, advance, locate_near
 from jaxbiped.continuation._branch_point import Axis, axis_of, start_of
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
 from jaxbiped.continuation._nearest_bifurcation import range_of
 from jaxbiped.continuation._trace import LIMITS, Trace, trace
-from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import LOOSER
 from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import CurvePoint
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._jacobian_weights import MODULI

@@ -6,12 +6,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import PyTree
 
-from jaxbiped._types import Scalar, as_float, by_numpy
+from jaxbiped._types import Scalar, as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._fixed_point_search import LOOSER
-from jaxbiped.gait._orbit import slopes_of
+from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
     linearised_return,
@@ -19,8 +19,7 @@ from jaxbiped.gait._poincare_map import (
     seed_directions,
     state_with,
 )
-from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.gait._solver import orbit_solver
+from jaxbiped.gait._return_map_spec import ReturnMapSpec, orbit_solver, patience_of
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.optimise._augmented_state import MotionSection
 from jaxbiped.optimise._cycle_integrals import AbstractIntegrals, integrals_of
@@ -36,8 +35,6 @@ errors of derivatives of the spectral radius, of slip and of losses are then bel
 elasticity, as those of the gait's own measures are; it doubles what an evaluation costs."""
 _DRIVEN, _BOUND = 0.3, 0.1
 """Shares of these tolerances that keep the motors' work, and the bound of the radius, to 1e-5."""
-_PATIENCE = 50.0
-"""Time allowed to the next arrival, in units of √(l/g)."""
 
 
 class Functionals(NamedTuple):
@@ -99,9 +96,7 @@ def cycle_spec(
         system=system,
         section=section,
         solver=orbit_solver(None, rigid=not scene.compliant),
-        max_time=by_numpy(
-            lambda numpy, l, g: _PATIENCE * numpy.sqrt(l / g), scene.walker.l, scene.ground.g
-        ),
+        max_time=patience_of(scene),
         steps=footsteps,
         max_solver_steps=max(each.max_solver_steps for each in ACCURACIES.values()),
         engine=engine,

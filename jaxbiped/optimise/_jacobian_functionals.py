@@ -12,7 +12,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import WalkerState
-from jaxbiped.gait._orbit import slopes_of
+from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
     linearised_return,
@@ -38,11 +38,7 @@ from jaxbiped.optimise._jacobian_weights import (
     leading_multipliers,
     weighed,
 )
-from jaxbiped.optimise._lowest_swing import (
-    LowestSwingSection,
-    through_lowest_swing,
-    with_clearance,
-)
+from jaxbiped.optimise._lowest_swing import LowestSwingSection, through_lowest_swing, with_clearance
 from jaxbiped.optimise._stepped_cycle import SteppedSection, stepped, unstepped
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RigidScene, Scene

@@ -17,10 +17,10 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
-from jaxbiped.gait._continuation import BranchEnd
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.gait._origin import FoundBy
+from jaxbiped.gait._homotopy import BranchEnd
+from jaxbiped.gait._search_provenance import FoundBy
 from jaxbiped.sweep._store_files import (
     SETTINGS,
     check_same,

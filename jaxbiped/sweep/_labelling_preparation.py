@@ -8,7 +8,7 @@ from jaxtyping import PyTree
 
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._labels import Label
-from jaxbiped.gait._default_guess import default_guess
+from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._gait_family import find_family, with_gaits

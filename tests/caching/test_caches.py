@@ -21,7 +21,7 @@ from jaxbiped.compiler.runtime._lane_engine import LaneEngine
 from jaxbiped.compiler.runtime._machine_code import _LOADED
 from jaxbiped.compiler.runtime._primitive import call_recording
 from jaxbiped.compiler.runtime._program import Program
-from jaxbiped.gait._default_guess import default_guess
+from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.solve._failure_events import WATCHES, ending_events
 from jaxbiped.solve._rigid_program import rigid_program
 from jaxbiped.solve._rigid_steps import RigidWalk

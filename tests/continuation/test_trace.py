@@ -7,7 +7,7 @@ from jaxbiped._ending import Ending
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch_point import NO_WALK, is_stable
 from jaxbiped.continuation._trace import passed_before, trace
-from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._homotopy import BranchEnd
 from tests.continuation.maps import (
     begin_at,
     curve_of,

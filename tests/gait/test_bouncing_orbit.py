@@ -13,7 +13,7 @@ from jaxbiped._types import Scalar
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._fixed_point_search import search
 from jaxbiped.gait._newton import Method
-from jaxbiped.gait._orbit import orbit_of, with_parameter_columns
+from jaxbiped.gait._orbit_derivatives import orbit_of, with_parameter_columns
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import precision_of
 

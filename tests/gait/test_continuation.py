@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxbiped.gait._continuation import BranchEnd, follow_branch
+from jaxbiped.gait._homotopy import BranchEnd, follow_branch
 from jaxbiped.gait._pseudo_arclength import Change
 
 

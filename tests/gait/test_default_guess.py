@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait._default_guess import default_guess
+from jaxbiped.gait._search_starts import default_guess
 from tests.solve.test_units import sized
 
 

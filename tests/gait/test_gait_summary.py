@@ -8,10 +8,10 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.gait import _gait
 from jaxbiped.gait._fixed_point_search import Found
-from jaxbiped.gait._orbit import Orbit, Slopes
-from jaxbiped.gait._origin import FoundBy, single_stage_origin
+from jaxbiped.gait._orbit_derivatives import Orbit, Slopes
 from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.gait._return_map_spec import walking_spec
+from jaxbiped.gait._return_map_spec import return_map_spec
+from jaxbiped.gait._search_provenance import FoundBy, single_stage_origin
 from jaxbiped.gait._stability import Stability
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.solve._accuracy import Precision
@@ -27,7 +27,7 @@ RADIUS = np.array([0.3, 0.7])
 def summary():
     """The gait of one footstep with given ending; of 0.5 s and 0.2 m, and slopes of its own."""
     scene, start = jb.seed_scene(), jb.seed_state()
-    spec = walking_spec(scene, jb.MidStance(), jb.solvers.Rodas4(), "lanes", steps=1, most=9)
+    spec = return_map_spec(scene, start, solver="rodas4", engine="lanes", max_solver_steps=9)
     _, active = select_parameters(scene, NAMES)
     slopes = Slopes(np.arange(14.0).reshape(7, 2), np.array([0.1, 2.0]), np.array([[0.4, -1.0]]),
                     np.array([50.0, 8.0]))  # fmt: skip

@@ -10,16 +10,15 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._types import Scalar
-from jaxbiped.gait import _orbit
+from jaxbiped.gait import _orbit_derivatives
 from jaxbiped.gait._accurate_gait import judge_gait
-from jaxbiped.gait._fixed_point_search import Found, walks_only
+from jaxbiped.gait._fixed_point_search import Found, is_sound, walks_only
 from jaxbiped.gait._gait import Gait, Measures, _by_parameter, _elasticities, _measure_errors
 from jaxbiped.gait._gait_measures import _by_correction
 from jaxbiped.gait._newton import Method, Stage, initial_progress, newton_iteration
-from jaxbiped.gait._orbit import slopes_of
+from jaxbiped.gait._orbit_derivatives import slopes_of
 from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.gait._return_map_spec import walking_spec
-from jaxbiped.gait._soundness import is_sound
+from jaxbiped.gait._return_map_spec import return_map_spec
 from jaxbiped.variational._solve_to_section import Nodes
 
 P = np.array([0.7, -0.4])
@@ -100,13 +99,13 @@ def test_sensitivities_are_differences_of_fixed_points(linear, monkeypatch):
         )
         return jnp.einsum("vi,kij,vj->k", weights, along, leading)
 
-    monkeypatch.setattr(_orbit, "second_variation", second_variation)
+    monkeypatch.setattr(_orbit_derivatives, "second_variation", second_variation)
     zero = jb.State(*[0.0] * 8)
 
     @jax.jit
     def told(last):
         slopes, length = slopes_of(last), last.advance[0]
-        radius = _orbit._radius_slopes(None, tuple(P), (0, 1), None, last)
+        radius = _orbit_derivatives._radius_slopes(None, tuple(P), (0, 1), None, last)
         measured = Measures(last.period, length, length / last.period, last.peak, None, zero)
         seven = slopes._replace(recurring=jnp.concatenate([slopes.recurring, jnp.zeros((4, 2))]))
         found = _by_parameter(SimpleNamespace(), measured, seven, radius)
@@ -270,7 +269,9 @@ def test_an_orbit_uphill_hasty_or_deep_underground_is_no_walk():
 @pytest.mark.parametrize("length", [0.1, 1.6])
 def test_an_arrival_may_take_fifty_swings(length):
     scene = jb.with_parameters(jb.seed_scene(), {"l": length, "d": 0.05, "r": 0.01})
-    spec = walking_spec(scene, jb.MidStance(), jb.solvers.Rodas4(), "xla", steps=1, most=9)
+    spec = return_map_spec(
+        scene, jb.seed_state(), solver="rodas4", engine="xla", max_solver_steps=9
+    )
     assert float(spec.max_time) == pytest.approx(50.0 * np.sqrt(length / 9.8))
 
 

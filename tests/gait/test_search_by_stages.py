@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait import _settled_walks, _staged_search
-from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait import _search_starts, _staged_search
 from jaxbiped.gait._fixed_point_search import Found
-from jaxbiped.gait._origin import FoundBy
+from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.gait._settled_walks import component_sizes, settle_walks
+from jaxbiped.gait._search_provenance import FoundBy
+from jaxbiped.gait._search_starts import component_sizes, settle_walks
 from jaxbiped.gait._staged_search import origin_of, search_in_stages, spectral_radius
 
 SCENE = jb.ladder()["rigid"]
@@ -125,7 +125,7 @@ def test_walks_are_settled_that_hardly_move_any_more(monkeypatch):
     zero = np.zeros_like(angle)
     states = jb.dynamics.RigidState(zero, angle, zero, zero, zero)
     counts = np.array([40, 40, 40, 39, 40])
-    monkeypatch.setattr(_settled_walks, "_rigid_arrivals", lambda *_: (counts, states))
+    monkeypatch.setattr(_search_starts, "_rigid_arrivals", lambda *_: (counts, states))
     chosen = settle_walks(SCENE, START)
     # The third is where the first one is; the fourth fell.
     assert [float(point[0]) for point in chosen] == pytest.approx([0.5, 0.2400001, 0.3])

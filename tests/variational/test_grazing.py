@@ -8,7 +8,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.gait._fixed_point_search import Found
-from jaxbiped.gait._orbit import orbit_of, slopes_of
+from jaxbiped.gait._orbit_derivatives import orbit_of, slopes_of
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 
 pytestmark = pytest.mark.slow

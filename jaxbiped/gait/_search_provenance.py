@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._state import WalkerState
-from jaxbiped.gait._continuation import BranchEnd
+from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.scene._scene import AbstractScene
 
 MOST_OTHERS = 4
