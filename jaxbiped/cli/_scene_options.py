@@ -1,7 +1,7 @@
 """Options that describe a scene and a start: the model, its laws, their parameters, actuators."""
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import arg
@@ -222,23 +222,19 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
 
 def minimal(sentence: str) -> Check:
     """Refuses redundant coordinates with this sentence."""
-    return _check_scene(lambda scene: scene.formulation == "minimal", sentence)
+    return Check(lambda _, scene: _require(scene.formulation == "minimal", sentence))
 
 
 def compliant_and_minimal(what: str) -> Check:
     """Refuses rigid feet and redundant coordinates: what others are, such as "compared"."""
-    return _check_scene(
-        lambda scene: scene.formulation == "minimal" and scene.model == "compliant",
-        f"model or formulation is not allowed here: compliant and minimal are {what}.",
-    )
+    sentence = f"model or formulation is not allowed here: compliant and minimal are {what}."
+    usual = ("compliant", "minimal")
+    return Check(lambda _, scene: _require((scene.model, scene.formulation) == usual, sentence))
 
 
-def _check_scene(allowed: Callable[[SceneOptions], bool], sentence: str) -> Check:
-    def check(_: str, scene: SceneOptions) -> None:
-        if not allowed(scene):
-            raise ArgumentError(sentence)
-
-    return Check(check)
+def _require(holds: bool, sentence: str) -> None:
+    if not holds:
+        raise ArgumentError(sentence)
 
 
 class StartOptions(Options):
