@@ -6,7 +6,6 @@ import warnings
 from typing import Annotated, Any, TypeAlias
 
 import jaxbiped as jb
-from jaxbiped import _clock
 from jaxbiped._checks import ArgumentError
 from jaxbiped._progress import stage
 from jaxbiped.caching import _import_time
