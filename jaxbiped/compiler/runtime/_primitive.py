@@ -15,6 +15,7 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, PyTree
 
+from jaxbiped._checks import ArgumentError
 from jaxbiped._host_call import host_call, lower_host_call
 from jaxbiped._types import Numbers, as_array
 from jaxbiped.compiler.host_code._host_jit import register_rule
@@ -217,9 +218,9 @@ def _write_on_host(writer: HostWriter, op: Operation) -> Sequence[Value]:
 
 
 def _refuse_derivative(primals: object, tangents: object, **params: object) -> NoReturn:
-    raise TypeError(
-        'JAX cannot differentiate what the lane engine computes here: use engine="xla", or a '
-        "function that brings its own derivatives, such as gait_measures."
+    raise ArgumentError(
+        "Programs of lanes cannot be differentiated: take differences, or first derivatives of a "
+        "function that brings its own, such as gait_measures."
     )
 
 
