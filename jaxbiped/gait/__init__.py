@@ -1,6 +1,5 @@
 """Periodic gaits: search, return map, stability, sensitivities, continuation."""
 
-from jaxbiped.gait._explain_search import explain_search as explain_search
 from jaxbiped.gait._find_gaits import Gaits as Gaits
 from jaxbiped.gait._fixed_point_search import Search as Search
 from jaxbiped.gait._gait import Measures as Measures
@@ -14,6 +13,7 @@ from jaxbiped.gait._return_map import linearise_return_map as linearise_return_m
 from jaxbiped.gait._search_provenance import FoundBy as FoundBy
 from jaxbiped.gait._search_provenance import Origin as Origin
 from jaxbiped.gait._search_provenance import OtherGait as OtherGait
+from jaxbiped.gait._search_provenance import explain_search as explain_search
 from jaxbiped.gait._search_starts import rolling_starts as rolling_starts
 from jaxbiped.gait._stability import Bifurcation as Bifurcation
 from jaxbiped.gait._stability import Stability as Stability

@@ -12,10 +12,10 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped.gait._explain_search import grazing_sentence
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait, Measures
 from jaxbiped.gait._return_map_spec import orbit_solver
+from jaxbiped.gait._search_provenance import grazing_sentence
 from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import AbstractScene
 from jaxbiped.solve._accuracy import GAIT_ACCURACIES, Precision

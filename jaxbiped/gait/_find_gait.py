@@ -22,13 +22,12 @@ from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import RigidState, WalkerState, check_state, state_for
 from jaxbiped.gait._accurate_gait import accurate_gait
-from jaxbiped.gait._explain_search import warn_of_grazing
 from jaxbiped.gait._fixed_point_search import Found, Search, SearchArguments, search, walks_only
 from jaxbiped.gait._gait import Described, Gait, summarise_gait
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, return_map_spec, runs_by_lanes
 from jaxbiped.gait._search_along import search_along
-from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin
+from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origin, warn_of_grazing
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.gait._staged_search import is_whole, origin_of, search_in_stages, spectral_radius
 from jaxbiped.scene._parameter_access import select_parameters

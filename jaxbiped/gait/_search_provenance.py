@@ -1,19 +1,35 @@
-"""Origin of a gait: how a search came to it, and what else it saw."""
+"""Provenance of a gait: how a search came to it and what else it saw, also in a sentence."""
 
 import enum
-from typing import NamedTuple
+import warnings
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._state import WalkerState
+from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._homotopy import BranchEnd
+from jaxbiped.scene._parameter_access import parameter_values
 from jaxbiped.scene._scene import AbstractScene
+
+if TYPE_CHECKING:
+    from jaxbiped.gait._gait import Gait
 
 MOST_OTHERS = 4
 """Other gaits that there is room for."""
+_MOST_NAMED = 4
+"""Parameters that are named; of more, how many there are."""
+_HOW = {
+    Ending.TIMED_OUT: "makes no more footsteps",
+    Ending.FELL_FORWARD: "falls forward",
+    Ending.FELL_BACK: "falls back",
+    Ending.STOPPED: "stops",
+    Ending.STUMBLED: "stumbles",
+}
 
 
 class FoundBy(enum.IntEnum):
@@ -88,3 +104,94 @@ def single_stage_origin(scene: AbstractScene, start: WalkerState, found_by: Foun
 def code_array(code: int) -> PyTree:
     """A code as an array, made by NumPy: JAX would take longer."""
     return np.asarray(int(code))
+
+
+def explain_search(scene: AbstractScene, gait: "Gait") -> str:
+    """How a gait was found, which others were seen, or where the seed's gait ended on the way.
+
+    Args:
+        scene: the scene that was searched, whole numbers and all; not a batch.
+        gait: what `find_gait` returned for it.
+
+    Returns:
+        One sentence, without a full stop.
+    """
+    if gait.outcome is not Search.FOUND:
+        return f"no gait found: {_search_sentence(gait)}{_branch(scene, gait)}"
+    text = f"found by {gait.found_by}"
+    asked, least = np.shape(gait.orbit[0])[0], int(gait.cycle_footsteps)
+    if least < asked:
+        text += f"; it closes after {least} of the {asked} footsteps, and no longer cycle was seen"
+    if gait.others:
+        seen = ", ".join(
+            f"{each.period:.6g} s (spectral radius {each.spectral_radius:.4g})"
+            for each in gait.others
+        )
+        text += f"; other gaits seen: {seen}"
+    if int(gait.origin.branch_end) != int(BranchEnd.NOT_FOLLOWED) and not bool(gait.stable):
+        text += f"; no stable one was seen{_branch(scene, gait)}"
+    if int(gait.grazes):
+        text += f"; {grazing_sentence(gait)}"
+    return text
+
+
+def grazing_sentence(gait: "Gait") -> str:
+    """What a grazed switch makes of a gait's derivatives, without a full stop."""
+    return (
+        f"the gait grazes a switch {int(gait.grazes)} times, as a foot that barely touches the "
+        "ground or misses it, by less than the tolerance resolves: its multipliers are those of "
+        "one side, its sensitivities not known"
+    )
+
+
+def warn_of_grazing(gait: "Gait") -> None:
+    """Warns of a gait whose derivatives are not determined."""
+    if gait.outcome is Search.FOUND and int(gait.grazes):
+        warnings.warn(grazing_sentence(gait) + ".", RuntimeWarning, stacklevel=3)
+
+
+def _search_sentence(gait: "Gait") -> str:
+    if gait.outcome is Search.NO_RETURN:
+        return f"the walk from the start ends ({gait.walk_outcome})"
+    if gait.outcome is Search.NO_WALK:
+        return "an orbit that returns has a foot deep underground, or steps uphill"
+    return "the search from the start does not converge"
+
+
+def _branch(scene: AbstractScene, gait: "Gait") -> str:
+    """Where the branch of the seed's gait ended, after a semicolon; nothing where it came here."""
+    end = BranchEnd(int(gait.origin.branch_end))
+    modelled = scene.minimal
+    if end is BranchEnd.NOT_FOLLOWED or (end is BranchEnd.REACHED and gait.outcome is Search.FOUND):
+        return ""
+    if end is BranchEnd.REACHED:
+        return (
+            "; the branch of the seed's gait comes to this scene, but a finer search from there "
+            'does not converge: try accuracy="tight"'
+        )
+    if end is BranchEnd.NO_BEGINNING:
+        return "; the seed's walker has no gait under these laws, from which one could be followed"
+    place = _differing_parameters(modelled, gait.origin.nearest)
+    if end is BranchEnd.FOLD:
+        return f"; the branch of the seed's gait turns back at a fold at {place}, which has one"
+    if end is BranchEnd.WALK_ENDS:
+        walk = Ending(int(gait.origin.branch_walk_ending))
+        return (
+            f"; the branch of the seed's gait ends at {place}, which has one: beyond, the walk "
+            f"{_HOW.get(walk, f'ends ({walk})')}"
+        )
+    if end is BranchEnd.BREAKS_OFF:
+        return (
+            f"; the branch of the seed's gait breaks off at {place}, which has one: beyond, the "
+            "return map is not smooth"
+        )
+    return f"; the branch of the seed's gait was followed as far as {place}, which has one"
+
+
+def _differing_parameters(scene: AbstractScene, nearest: AbstractScene) -> str:
+    """The parameters of `nearest` that are not those of `scene`."""
+    asked, there = parameter_values(scene), parameter_values(nearest)
+    different = [name for name in asked if float(asked[name]) != float(there[name])]
+    named = ", ".join(f"{name} = {float(there[name]):.6g}" for name in different[:_MOST_NAMED])
+    more = len(different) - _MOST_NAMED
+    return named + (f" and {more} more" if more > 0 else "")

@@ -1,8 +1,6 @@
 """Optimisation of gaits: objectives, optimisers, certificates of an optimum."""
 
-from jaxbiped.optimise._bifurcation_distance import (
-    BifurcationDistance as BifurcationDistance,
-)
+from jaxbiped.optimise._bifurcation_distance import BifurcationDistance as BifurcationDistance
 from jaxbiped.optimise._bifurcation_distance import Sought as Sought
 from jaxbiped.optimise._bifurcation_distance import bifurcation_distance as bifurcation_distance
 from jaxbiped.optimise._certificate import Certificate as Certificate
@@ -11,9 +9,9 @@ from jaxbiped.optimise._objectives import OBJECTIVES as OBJECTIVES
 from jaxbiped.optimise._objectives import Evaluation as Evaluation
 from jaxbiped.optimise._optimality import Held as Held
 from jaxbiped.optimise._optimality import Optimality as Optimality
+from jaxbiped.optimise._optimise_gait import ParetoFront as ParetoFront
+from jaxbiped.optimise._optimise_gait import pareto_front as pareto_front
 from jaxbiped.optimise._optimisers import OPTIMISERS as OPTIMISERS
-from jaxbiped.optimise._optimum import Optimum as Optimum
-from jaxbiped.optimise._pareto_front import ParetoFront as ParetoFront
-from jaxbiped.optimise._pareto_front import pareto_front as pareto_front
 from jaxbiped.optimise._runs import Iteration as Iteration
+from jaxbiped.optimise._runs import Optimum as Optimum
 from jaxbiped.optimise._runs import Outcome as Outcome

@@ -21,7 +21,7 @@ from jaxbiped.gait._poincare_map import (
 )
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, orbit_solver, patience_of
 from jaxbiped.linalg._small_matrices import solve
-from jaxbiped.optimise._augmented_state import MotionSection
+from jaxbiped.optimise._augmented_cycles import MotionSection
 from jaxbiped.optimise._cycle_integrals import AbstractIntegrals, integrals_of
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RigidScene, Scene

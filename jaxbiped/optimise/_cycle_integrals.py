@@ -17,7 +17,7 @@ from jaxbiped.dynamics._impact import impact, push_off_work
 from jaxbiped.dynamics._rolling import inertia_of, rolling_hip_motion, support_of
 from jaxbiped.dynamics._state import RigidState, WalkerState, whole_state
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.optimise._augmented_state import augment, joined, motion_of
+from jaxbiped.optimise._augmented_cycles import augment, joined, motion_of
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.variational._hybrid_system import AbstractSystem, Rolling, Walking
 

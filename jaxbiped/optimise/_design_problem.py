@@ -12,10 +12,11 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._state import state_type
-from jaxbiped.gait._explain_search import explain_search
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
+from jaxbiped.gait._search_provenance import explain_search
+from jaxbiped.optimise._design_variables import Requirement, Variables
 from jaxbiped.optimise._ensemble import (
     Ensemble,
     GaitSettings,
@@ -24,8 +25,6 @@ from jaxbiped.optimise._ensemble import (
 )
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._objectives import Evaluation, evaluate
-from jaxbiped.optimise._requirements import Requirement
-from jaxbiped.optimise._variables import Variables
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 

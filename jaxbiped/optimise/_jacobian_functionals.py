@@ -22,7 +22,14 @@ from jaxbiped.gait._poincare_map import (
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.linalg._small_matrices import singular_pairs
-from jaxbiped.optimise._augmented_state import MotionSection
+from jaxbiped.optimise._augmented_cycles import (
+    MotionSection,
+    SteppedSection,
+    disturbed,
+    stepped,
+    undisturbed,
+    unstepped,
+)
 from jaxbiped.optimise._cycle_functionals import (
     Functionals,
     corrected,
@@ -31,7 +38,6 @@ from jaxbiped.optimise._cycle_functionals import (
     functional_precision,
     with_errors,
 )
-from jaxbiped.optimise._disturbed_cycle import disturbed, undisturbed
 from jaxbiped.optimise._jacobian_weights import (
     CLEARANCE_NORMS,
     MODULI,
@@ -39,7 +45,6 @@ from jaxbiped.optimise._jacobian_weights import (
     weighed,
 )
 from jaxbiped.optimise._lowest_swing import LowestSwingSection, through_lowest_swing, with_clearance
-from jaxbiped.optimise._stepped_cycle import SteppedSection, stepped, unstepped
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import Precision

@@ -17,9 +17,13 @@ from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._feet import Foot, feet
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.optimise._augmented_state import augment, joined, motion_of
-from jaxbiped.optimise._disturbed_cycle import DisturbedCycle
-from jaxbiped.optimise._stepped_cycle import SteppedCycle
+from jaxbiped.optimise._augmented_cycles import (
+    DisturbedCycle,
+    SteppedCycle,
+    augment,
+    joined,
+    motion_of,
+)
 from jaxbiped.scene._scene import AbstractScene, Scene
 from jaxbiped.variational._hybrid_system import AbstractSystem
 

@@ -1,8 +1,10 @@
-"""Optimisation of a gait: the best design within bounds, from a scene alone."""
+"""Optimisation of a gait: the best design within bounds, and fronts of such designs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+
+import numpy as np
 
 from jaxbiped._checks import (
     ArgumentError,
@@ -16,15 +18,19 @@ from jaxbiped._files import user_path
 from jaxbiped._identity import DECISIVE, provenance
 from jaxbiped._types import JsonObject
 from jaxbiped.optimise._design_problem import DesignProblem
+from jaxbiped.optimise._design_variables import (
+    SubjectTo,
+    larger_is_worse,
+    requirements_of,
+    start_of,
+    variables_of,
+)
 from jaxbiped.optimise._ensemble import Ensemble, GaitSettings, ensemble_of
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._objectives import check_objective
 from jaxbiped.optimise._optimisers import OPTIMISERS, Ended
-from jaxbiped.optimise._optimum import Optimum, optimum_of
-from jaxbiped.optimise._requirements import Requirement, SubjectTo, requirements_of
-from jaxbiped.optimise._restarts import scattered_designs
-from jaxbiped.optimise._runs import Runs
-from jaxbiped.optimise._variables import start_of, variables_of
+from jaxbiped.optimise._runs import Optimum, Runs, optimum_of
+from jaxbiped.optimise._scattered_designs import scattered_designs
 from jaxbiped.scene._parameter_access import scene_identity
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
@@ -128,7 +134,7 @@ def optimise_gait(
         )
     ensemble = None
     if scatter:
-        worse = _larger_is_worse(told, sense, requirements) if criterion == "worst" else {}
+        worse = larger_is_worse(told, sense, requirements) if criterion == "worst" else {}
         ensemble = ensemble_of(scene, scatter, members, criterion, worse, seed)
     settings = GaitSettings(footsteps, accuracy, engine)
     measures = {*told, *(each.name for each in requirements)}
@@ -181,34 +187,6 @@ def _goal(
     return {name: float(w) for name, w in weights.items()}, -1.0 if what == "maximise" else 1.0
 
 
-def _larger_is_worse(
-    told: Mapping[str, float], sense: float, requirements: tuple[Requirement, ...]
-) -> dict[str, bool]:
-    """Of each measure, for the worst of several.
-
-    Raises:
-        ArgumentError: a measure of which both more and less would be worse.
-    """
-    sides: dict[str, set[bool]] = {}
-    for name, weight in told.items():
-        sides.setdefault(name, set()).add(sense * weight > 0.0)
-    for each in requirements:
-        sides.setdefault(each.name, set()).update(
-            [
-                larger
-                for larger, bound in ((True, each.high), (False, each.low))
-                if bound is not None
-            ]
-        )
-    for name, both in sides.items():
-        if len(both) > 1:
-            raise ArgumentError(
-                f"{name} is bounded and sought from both sides: its worst member is not defined; "
-                'choose criterion = "mean".'
-            )
-    return {name: both.pop() for name, both in sides.items()}
-
-
 def _problem_settings(
     scene: Scene | RigidScene,
     vary: Mapping[str, tuple[float, float]],
@@ -229,3 +207,70 @@ def _problem_settings(
         "ensemble": None if ensemble is None else ensemble._asdict(),
         "writer": {name: writer[name] for name in DECISIVE},
     }
+
+
+class ParetoFront(NamedTuple):
+    """Best values of one measure under bounds of another, n points.
+
+    Attributes:
+        bounds: of the other measure, in the order they were asked for, shape (n,).
+        optima: at each of them.
+    """
+
+    bounds: np.ndarray
+    optima: tuple[Optimum, ...]
+
+    def values(self, name: str) -> np.ndarray:
+        """A measure along the front, shape (n,)."""
+        return np.asarray([each.known.values[name] for each in self.optima])
+
+
+def pareto_front(
+    scene: Scene | RigidScene,
+    *,
+    vary: Mapping[str, tuple[float, float]],
+    against: str,
+    bounds: Sequence[float] | np.ndarray,
+    upper: bool = True,
+    maximise: str | None = None,
+    minimise: str | None = None,
+    subject_to: SubjectTo = None,
+    **options: Any,
+) -> ParetoFront:
+    """The trade between two measures: the best of one under each of several bounds of the other.
+
+    Each optimum is where the next search begins, so give the bounds in order.
+
+    Args:
+        scene: the walker to begin from.
+        vary: as for `optimise_gait`.
+        against: the other measure.
+        bounds: of it, shape (n,).
+        upper: whether they are upper bounds.
+        maximise, minimise: as for `optimise_gait`.
+        subject_to: what else must hold.
+        options: others of `optimise_gait`; a `store` keeps the evaluations of all points.
+
+    Returns:
+        The front.
+
+    Raises:
+        ArgumentError: an argument that is not allowed.
+    """
+    check_objective(against, scene, "against")
+    values = np.asarray(bounds, dtype=float)
+    if values.ndim != 1 or not values.size:
+        raise ArgumentError(f"bounds has the shape {values.shape}: it must be (n,), n at least 1.")
+    more = {each.name: (each.low, each.high) for each in requirements_of(scene, subject_to)}
+    if against in more:
+        raise ArgumentError(f"subject_to has {against!r} already: the front bounds it itself.")
+    optima: list[Optimum] = []
+    for bound in values.tolist():
+        held = {**more, against: (None, bound) if upper else (bound, None)}
+        begin = optima[-1].scene if optima else scene
+        optima.append(
+            optimise_gait(
+                begin, vary=vary, maximise=maximise, minimise=minimise, subject_to=held, **options
+            )
+        )
+    return ParetoFront(values, tuple(optima))

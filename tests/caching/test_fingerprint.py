@@ -14,7 +14,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.caching import _fingerprint
 from jaxbiped.caching._fingerprint import Leaf, as_leaves, fingerprint, settings
-from jaxbiped.optimise._augmented_state import augment
+from jaxbiped.optimise._augmented_cycles import augment
 from jaxbiped.solve._failure_events import WATCHES, ending_events
 
 SCENE = as_leaves(jb.seed_scene())

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.gait._explain_search import warn_of_grazing
+from jaxbiped.gait._search_provenance import warn_of_grazing
 
 pytestmark = pytest.mark.slow
 

@@ -19,6 +19,7 @@ from jaxbiped.optimise import _certificate, _ensemble
 from jaxbiped.optimise._cycle_functionals import _totals, with_errors
 from jaxbiped.optimise._cycle_integrals import integrals_of
 from jaxbiped.optimise._design_problem import DesignProblem
+from jaxbiped.optimise._design_variables import requirements_of, variables_of
 from jaxbiped.optimise._ensemble import (
     Ensemble,
     GaitSettings,
@@ -32,10 +33,8 @@ from jaxbiped.optimise._jacobian_weights import leading_multipliers, weighed
 from jaxbiped.optimise._local_model import Local
 from jaxbiped.optimise._objectives import Evaluation, _cost_of_transport, _root_of_squares, _Row
 from jaxbiped.optimise._optimality import optimality_of
-from jaxbiped.optimise._requirements import requirements_of
 from jaxbiped.optimise._runs import Outcome, Runs
 from jaxbiped.optimise._trust_region import _updated, run_trust_region
-from jaxbiped.optimise._variables import variables_of
 
 SCENE = jb.ladder()["rigid"]
 NAMES = jb.parameter_names(SCENE)

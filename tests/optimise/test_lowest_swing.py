@@ -9,7 +9,7 @@ from reference.scipy_solves import solution
 
 import jaxbiped as jb
 from jaxbiped.gait._poincare_map import linearised_return, recurring_components, seed_directions
-from jaxbiped.optimise._augmented_state import MotionSection
+from jaxbiped.optimise._augmented_cycles import MotionSection
 from jaxbiped.optimise._cycle_functionals import cycle_spec
 from jaxbiped.optimise._cycle_integrals import integrals_of
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals

@@ -6,14 +6,13 @@ from scipy.optimize import lsq_linear
 
 import jaxbiped as jb
 from jaxbiped.optimise._design_problem import DesignProblem
+from jaxbiped.optimise._design_variables import requirements_of, variables_of
 from jaxbiped.optimise._ensemble import GaitSettings
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._multiplier_cluster import conditions, radius_of
 from jaxbiped.optimise._objectives import Evaluation
 from jaxbiped.optimise._optimality import optimality_of
-from jaxbiped.optimise._requirements import requirements_of
 from jaxbiped.optimise._runs import Outcome, Runs
-from jaxbiped.optimise._variables import variables_of
 
 SCENE = jb.ladder()["rigid"]
 NAMES = jb.parameter_names(SCENE)

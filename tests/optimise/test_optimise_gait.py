@@ -10,11 +10,11 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.optimise._design_problem import DesignProblem
+from jaxbiped.optimise._design_variables import variables_of
 from jaxbiped.optimise._ensemble import GaitSettings
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._objectives import Evaluation
 from jaxbiped.optimise._optimise_gait import _problem_settings
-from jaxbiped.optimise._variables import variables_of
 
 pytestmark = pytest.mark.slow
 RIGID = jb.ladder()["rigid"]

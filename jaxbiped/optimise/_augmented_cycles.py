@@ -1,0 +1,202 @@
+"""Augmented cycles: a walker's state with further coordinates, and cycles disturbed by one of them.
+
+Further coordinates are what the walker itself does not know: integrals over a cycle, a clock, a
+disturbance. A disturbance rests during the cycle and is zero behind it, so that the response to it
+is a column of the return map's Jacobian, and the response's derivatives a second variation: a push
+along the slope for one cycle, or ground on which the next footstep comes down lower. Behind that
+step heights are those above the lower ground.
+"""
+
+import dataclasses
+from collections import namedtuple
+from typing import Any, ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import PyTree
+
+from jaxbiped._types import Scalar, Time, by_numpy
+from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._state import RigidState, WalkerState
+from jaxbiped.dynamics._switches import Switch
+from jaxbiped.scene._ground import SteppedGround
+from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.variational._hybrid_system import AbstractSystem, system_of
+
+_KINDS: dict[tuple[type, tuple[str, ...]], Any] = {}
+"""Of each walker's state the augmented ones: always the same types, or all would compile again."""
+_APART = 1e-2
+"""Sine of half the angle between the legs from which a rigid walker's foot can come down."""
+
+
+def _augmented(walker: Any, names: tuple[str, ...]) -> Any:
+    if (walker, names) not in _KINDS:
+        place, *recurring = walker._fields
+        fields: Any = namedtuple("_Augmented", (place, *names, *recurring))  # type: ignore[misc]
+        # By this other processes know it, see `jaxbiped.caching._fingerprint`.
+        made_by = (_augmented, walker, names)
+        own: dict[str, Any] = {"__slots__": (), "__made_by__": made_by, "__reduce__": _taken_apart}
+        # Whatever they are, their errors count in SI units.
+        own["own_units"] = getattr(walker, "own_units", {}) | dict.fromkeys(names, "")
+        _KINDS.setdefault((walker, names), type("_Augmented", (fields,), own))
+    return _KINDS[walker, names]
+
+
+def _taken_apart(y: Any) -> tuple[Any, ...]:
+    """An augmented state as `pickle` keeps it."""
+    _, _, names = type(y).__made_by__
+    return _put_together, (motion_of(y), {name: getattr(y, name) for name in names})
+
+
+def _put_together(motion: Any, coordinates: dict[str, Any]) -> Any:
+    return _augmented(type(motion), tuple(coordinates))(**coordinates, **motion._asdict())
+
+
+def augment(state: WalkerState, names: tuple[str, ...]) -> PyTree:
+    """A walker's state with coordinates of these names, which begin at zero."""
+    zero = by_numpy(lambda numpy, hip_x: numpy.zeros_like(hip_x), state.hip_x)
+    return _augmented(type(state), names)(**dict.fromkeys(names, zero), **state._asdict())
+
+
+def motion_of(y: PyTree) -> Any:
+    """The walker's own state."""
+    _, walker, _ = type(y).__made_by__
+    return walker(*(getattr(y, name) for name in walker._fields))
+
+
+def joined(like: PyTree, motion: PyTree, coordinates: dict[str, Scalar]) -> PyTree:
+    """A walker's state or rates, and those of the further coordinates, as one."""
+    return type(like)(**motion._asdict(), **coordinates)
+
+
+class MotionSection(AbstractSection):
+    """The walker's own section, of an augmented state.
+
+    Attributes:
+        section: of the walker.
+    """
+
+    section: AbstractSection
+
+    def value(self, args: PyTree, y: PyTree) -> Scalar:
+        return self.section.value(args, motion_of(y))
+
+    def counts(self, args: PyTree, y: PyTree) -> Scalar:
+        return self.section.counts(args, motion_of(y))
+
+
+def undisturbed(state: WalkerState) -> PyTree:
+    """A walker's state without a push, its clock at zero."""
+    return augment(state, ("clock", "push"))
+
+
+class DisturbedCycle(AbstractSystem):
+    """A walker whose weight leans downhill by a push, in units of the weight, for one cycle.
+
+    Attributes:
+        walker: the walker, undisturbed.
+    """
+
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = (0, 1)
+    walker: AbstractSystem
+
+    def vector_field(self, t: Time, y: PyTree, args: AbstractScene) -> PyTree:
+        leaning = dataclasses.replace(args.ground, slope=args.ground.slope + y.push)
+        pushed = eqx.tree_at(lambda scene: scene.ground, args, leaning)
+        rates = self.walker.vector_field(t, motion_of(y), pushed)
+        zero = jnp.zeros_like(y.push)
+        return joined(y, rates, {"clock": zero + 1.0, "push": zero})
+
+    def switches(self, args: AbstractScene, y: PyTree) -> tuple[Switch, ...]:
+        return self.walker.switches(args, motion_of(y))
+
+    def ending(self, args: AbstractScene, y: PyTree) -> Scalar:
+        return self.walker.ending(args, motion_of(y))
+
+    def reset_map(self, args: AbstractScene, y: PyTree) -> PyTree:
+        after = self.walker.reset_map(args, motion_of(y))
+        return joined(y, after, {"clock": y.clock, "push": jnp.zeros_like(y.push)})
+
+    def load(self, args: AbstractScene, y: PyTree) -> None:
+        return None
+
+
+def disturbed(scene: AbstractScene) -> DisturbedCycle:
+    """The walker of a scene, which can be pushed."""
+    return DisturbedCycle(system_of(scene))
+
+
+def unstepped(state: WalkerState) -> PyTree:
+    """A walker's state on even ground, its clock at zero."""
+    return augment(state, ("clock", "fallen", "drop"))
+
+
+class SteppedCycle(AbstractSystem):
+    """A walker whose leg 1 comes down on ground that lies lower by `drop`, in leg lengths.
+
+    Behind the arrival the coordinate is zero and its value is `fallen`: the hip is that much
+    higher above the ground. By then the leg behind has left the upper ground.
+
+    Attributes:
+        walker: the walker on even ground.
+    """
+
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = (0, 1, 2)
+    walker: AbstractSystem
+
+    def vector_field(self, t: Time, y: PyTree, args: AbstractScene) -> PyTree:
+        rates = self.walker.vector_field(t, motion_of(y), _stepped(args, y))
+        zero = jnp.zeros_like(y.drop)
+        return joined(y, rates, {"clock": zero + 1.0, "fallen": zero, "drop": zero})
+
+    def switches(self, args: AbstractScene, y: PyTree) -> tuple[Switch, ...]:
+        return self.walker.switches(_stepped(args, y), motion_of(y))
+
+    def ending(self, args: AbstractScene, y: PyTree) -> Scalar:
+        return self.walker.ending(_stepped(args, y), motion_of(y))
+
+    def reset_map(self, args: AbstractScene, y: PyTree) -> PyTree:
+        after = self.walker.reset_map(args, motion_of(y))
+        if not isinstance(after, RigidState):
+            after = after._replace(hip_z=after.hip_z + y.drop * args.walker.l)
+        return joined(
+            y, after, {"clock": y.clock, "fallen": y.drop, "drop": jnp.zeros_like(y.drop)}
+        )
+
+    def load(self, args: AbstractScene, y: PyTree) -> None:
+        return None
+
+
+class SteppedSection(AbstractSection):
+    """The walker's own section; a rigid walker's foot comes down where the ground now is.
+
+    Attributes:
+        section: of the walker.
+    """
+
+    section: AbstractSection
+
+    def value(self, args: PyTree, y: PyTree) -> Scalar:
+        if not isinstance(motion_of(y), RigidState):
+            return MotionSection(self.section).value(args, y)
+        # Feet differ in height by (l − r)(cos θ₁ − cos θ₂), which is a product of two sines.
+        apart = jnp.maximum(jnp.sin(0.5 * (y.theta_2 - y.theta_1)), _APART)
+        fall = y.fallen * args.walker.l / args.walker.hip_to_foot
+        return -2.0 * jnp.sin(0.5 * (y.theta_1 + y.theta_2)) - fall / apart
+
+    def counts(self, args: PyTree, y: PyTree) -> Scalar:
+        return MotionSection(self.section).counts(args, y)
+
+
+def _stepped(scene: AbstractScene, y: PyTree) -> AbstractScene:
+    """The scene with the step before the swinging leg; a rigid walker's section has it."""
+    if not scene.compliant:
+        return scene
+    ground = SteppedGround(scene.ground.slope, scene.ground.g, y.drop * scene.walker.l)
+    found: AbstractScene = eqx.tree_at(lambda each: each.ground, scene, ground)
+    return found
+
+
+def stepped(scene: AbstractScene) -> SteppedCycle:
+    """The walker of a scene, before which the ground can have a step."""
+    return SteppedCycle(system_of(scene))
