@@ -1,57 +1,14 @@
-"""Simulators of others on the bouncing ball, where installed: MuJoCo MJX, Brax, Warp and Newton.
+"""Simulators of others on the bouncing ball, where installed: MuJoCo MJX, Brax, Warp and Newton."""
 
-MuJoCo's soft constraints cancel the share `IMPEDANCE` of all other forces while they act: its ball
-has a truth of its own, in the same closed form.
-"""
-
-import dataclasses
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from _ball_brax import brax_law, by_brax
 from _ball_closed_form import Problem
-from _ball_mjcf import IMPEDANCE, RADIUS, ball_model
+from _ball_mujoco import IMPEDANCE, by_brax, by_mjx, constrained
 from _ball_newton import TIME_STEPS as NEWTON_STEPS
 from _ball_newton import by_newton, newton_law
-from _ball_ways import TIME_STEPS, differentiate
+from _ball_ways import TIME_STEPS
 from _gradient_ways import Answer, Run, Way
-
-
-def mujoco_law(problem: Problem) -> Problem | None:
-    """The ball as MuJoCo's constraint has it, or None where the two differ by more than numbers.
-
-    Under damping the constraint lets go elsewhere, where the ball would fall freely anyway.
-    """
-    if problem.c != 0.0:
-        return None
-    return dataclasses.replace(problem, weight_in_contact=1.0 - IMPEDANCE)
-
-
-def by_mjx(problem: Problem, dt: float) -> Run:
-    """MJX's step, its gravity and its solref differentiated forwards."""
-    import mujoco
-    from mujoco import mjx
-
-    text = ball_model(dt, contact='condim="1"', solver='solver="Newton" ')
-    model = mjx.put_model(mujoco.MjModel.from_xml_string(text))
-    data = mjx.make_data(model)
-
-    def final(problem: Problem, values: dict[str, Any]) -> jax.Array:
-        zero = jnp.zeros(())
-        own = model.tree_replace(
-            {
-                "opt.gravity": jnp.stack([zero, zero, -values["g"]]),
-                "geom_solref": jnp.broadcast_to(jnp.stack([-values["K"], zero]), (2, 2)),
-            }
-        )
-        begin = data.replace(qpos=values["height"][None] + RADIUS)
-        steps = round(problem.duration / dt)
-        end = jax.lax.fori_loop(0, steps, lambda _, each: mjx.step(own, each), begin)
-        return jnp.stack([end.qpos[0] - RADIUS, end.qvel[0]])
-
-    return differentiate(final, problem)
 
 
 def by_warp(problem: Problem, dt: float) -> Run:
@@ -113,8 +70,8 @@ def _warp_kernel(wp: Any) -> Any:
 
 
 PEERS = (
-    Way("MuJoCo MJX", "dt", TIME_STEPS, by_mjx, "mujoco", mujoco_law),
-    Way("Brax", "dt", TIME_STEPS, by_brax, "brax", brax_law),
+    Way("MuJoCo MJX", "dt", TIME_STEPS, by_mjx, "mujoco", constrained(1.0 - IMPEDANCE)),
+    Way("Brax", "dt", TIME_STEPS, by_brax, "brax", constrained(0.0)),
     Way("Warp", "dt", TIME_STEPS, by_warp, "warp"),
     Way("Newton", "dt", NEWTON_STEPS, by_newton, "newton", newton_law),
 )

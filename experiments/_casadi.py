@@ -1,12 +1,14 @@
-"""The seed's walker in CasADi's hands: CVODES with forward sensitivities to K, c and ξ."""
+"""The seed's walker in CasADi's hands: CVODES with forward sensitivities of walks and footsteps."""
 
 import importlib.util
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from _footstep_ways import UPRIGHT
+from _gradient_ways import Answer, Run
 from reference.compliant import SEED, START, numbers, on_numbers
-from reference.footstep import LAWS
+from reference.footstep import LAWS, MID_STANCE
 
 
 def sensitivities(duration: float, rtol: float) -> Callable[[], tuple[np.ndarray, np.ndarray]]:
@@ -66,3 +68,43 @@ def rates(casadi, y, laws):
         forces.append((-casadi.sign(slip) * share * normal, normal))
     moved = equations["accelerations"](y, p, *zip(*forces, strict=True), (0.0, 0.0))
     return casadi.vertcat(y[4], y[5], y[6], y[7], *moved)
+
+
+GUESS, ROUNDS = 0.44, 20
+"""Of a footstep's duration [s], and of Newton's method."""
+
+
+def by_cvodes(_: Answer, rtol: float) -> Run:
+    """A footstep differentiated, the derivative of its end by the implicit function theorem.
+
+    CVODES ends at a given time. As free end times are treated with it, time is scaled, and the
+    duration at which leg 1 is upright is found by Newton's method with its own sensitivity.
+    """
+    import casadi
+
+    y, logs, span = casadi.SX.sym("y", 8), casadi.SX.sym("logs", 4), casadi.SX.sym("span")
+    scaled = span * rates(casadi, y, laws(casadi, logs))
+    problem = dict(x=y, p=casadi.vertcat(logs, span), ode=scaled)
+    solver = casadi.integrator("footstep", "cvodes", problem, 0.0, 1.0, options(rtol))
+    end = solver.factory("end", ["x0", "p"], ["xf", "jac:xf:p"])
+    whole = solver.factory("whole", ["x0", "p"], ["xf", "jac:xf:x0", "jac:xf:p"])
+
+    def run() -> Answer:
+        duration = GUESS
+        for _ in range(ROUNDS):
+            state, slopes = map(np.array, end(MID_STANCE, [0.0] * 4 + [duration]))
+            change = state[UPRIGHT, 0] / slopes[UPRIGHT, -1]
+            duration -= change
+            if abs(change) < 1e-13:
+                break
+        found = whole(MID_STANCE, [0.0] * 4 + [duration])
+        return _at_upright(duration, *map(np.array, found))
+
+    return run
+
+
+def _at_upright(duration: float, state: Any, by_start: Any, by_laws: Any) -> Answer:
+    columns, velocity = np.hstack([by_start[:, 1:], by_laws[:, :-1]]), by_laws[:, -1]
+    later = -columns[UPRIGHT] / velocity[UPRIGHT]
+    rows = np.vstack([later, np.delete(columns + np.outer(velocity, later), UPRIGHT, 0)])
+    return Answer(np.append(duration, np.delete(state.ravel(), UPRIGHT)), rows)

@@ -8,7 +8,7 @@ from typing import Any
 
 import diffrax
 import numpy as np
-from _footstep_casadi import by_cvodes
+from _casadi import by_cvodes
 from _footstep_jax import KVAERNO5, by_diffrax, by_semi_implicit_euler
 from _footstep_ways import INPUTS, UPRIGHT
 from _gradient_ways import Answer, Run, Way, relative_error
