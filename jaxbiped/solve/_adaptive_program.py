@@ -187,7 +187,7 @@ class AdaptiveSolve:
             rejected=now.rejected + jnp.where(keep | ended, 0, 1),
             counted=counted,
             last=last,
-            extremes=self._widened(solve.scene, now, keep, state),
+            extremes=self._extremes_after(solve.scene, now, keep, state),
         )
         attempts = (after.accepted + after.rejected).astype(solve.max_attempts.dtype)
         over = (t >= solve.duration) | (attempts >= solve.max_attempts) | ended | counted
@@ -235,7 +235,7 @@ class AdaptiveSolve:
             solve.scene, now.last, now=(now.t, now.state), due=time, solver=self.solver
         )
 
-    def _widened(
+    def _extremes_after(
         self, scene: PyTree, now: _Now, keep: Scalar, state: PyTree
     ) -> tuple[PyTree, PyTree] | None:
         if now.extremes is None or self.saved.extremes is None:

@@ -103,7 +103,7 @@ def follow_starts(
         none = np.zeros(0)
         empty: dict[str, Any] = dict.fromkeys(Outcome._fields, none)
         empty |= {"final": (none,) * (len(states) - 1), "grazes": none if counted else None}
-        return _labelled(Outcome(**empty))
+        return _labels_of(Outcome(**empty))
 
     def same(value: npt.ArrayLike) -> np.ndarray:
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
@@ -131,7 +131,7 @@ def follow_starts(
     program = _program(scene.compliant, effort.solver, cycles, fenced, embedded, counted)
     engine = engine_named(effort.engine_of(count))
     given = jtu.tree_map(np.asarray, starts)
-    return _labelled(engine.run(Request(program, given, batch=True)).outputs)
+    return _labels_of(engine.run(Request(program, given, batch=True)).outputs)
 
 
 @bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
@@ -149,7 +149,7 @@ def _program(
     return Program(loop.begin, loop.attempt, loop.finish)
 
 
-def _labelled(outcome: Outcome[np.ndarray]) -> Labelled:
+def _labels_of(outcome: Outcome[np.ndarray]) -> Labelled:
     columns = outcome._asdict() | {"final": np.stack(outcome.final, axis=1)}
     found: dict[str, Any] = {}
     for name, column in columns.items():

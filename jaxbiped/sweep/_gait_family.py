@@ -188,7 +188,9 @@ def find_family(
         if not rows[k]:
             own = scene_with(scene, names, table[k])
             guesses = [*(near(k) or [guess]), None]
-            rows[k] = tuple(with_radius(own, gait, effort) for gait in _found(own, guesses, 1))
+            rows[k] = tuple(
+                with_radius(own, gait, effort) for gait in _stable_gaits(own, guesses, 1)
+            )
     return _family(scene, names, table, tuple(rows), guess)
 
 
@@ -206,8 +208,8 @@ def with_gaits(
             scales = family.scales[k]
             new = [
                 with_radius(own, gait, effort)
-                for gait in _found(own, [guess], length)
-                if not any(_same(gait, old, scales) for old in rows[k])
+                for gait in _stable_gaits(own, [guess], length)
+                if not any(_is_same_orbit(gait, old, scales) for old in rows[k])
             ]
             # Stable by the cycles' lengths, from which positions follow.
             rows[k] = tuple(sorted([*rows[k], *new], key=lambda gait: gait.cycle_footsteps))
@@ -221,7 +223,7 @@ def scene_with(scene: SomeScene, names: Sequence[str], values: np.ndarray) -> So
     return jtu.tree_map(as_float, changed)
 
 
-def _found(
+def _stable_gaits(
     scene: Scene | RigidScene, guesses: Sequence[PyTree], length: int
 ) -> tuple[Attractor, ...]:
     """The stable gait that the first successful guess leads to, of its minimal cycle, or none.
@@ -264,7 +266,7 @@ def _family(
     return Family(names, table, rows, tuple(states), np.stack(scales))
 
 
-def _same(a: Attractor, b: Attractor, scales: np.ndarray) -> bool:
+def _is_same_orbit(a: Attractor, b: Attractor, scales: np.ndarray) -> bool:
     """Whether two finds are of one orbit, which may begin at any of its crossings."""
     off = np.linalg.norm((a.point - b.crossings) / scales, axis=1)
     # Where hardly anything is left out of a cycle's change, Newton's residual says little.

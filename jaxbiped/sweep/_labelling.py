@@ -64,14 +64,14 @@ class Labelling(eqx.Module):
 
         def follow(places: np.ndarray, effort: Effort) -> Labelled:
             some = jtu.tree_map(lambda leaf: leaf[places], states)
-            return self._followed(some, {k: v[places] for k, v in given.items()}, effort)
+            return self._label_once(some, {k: v[places] for k, v in given.items()}, effort)
 
         every = np.arange(count)
         if self.effort.wanted is None:
             return follow(every, self.effort)
         return relabel_doubtful(follow, count, self.effort, self.scene)
 
-    def _followed(
+    def _label_once(
         self, states: PyTree, given: Mapping[str, np.ndarray], effort: Effort
     ) -> Labelled:
         """Labels of starts that are checked, by one solve of each."""

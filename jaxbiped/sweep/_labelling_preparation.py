@@ -126,7 +126,7 @@ def guesses_among(labelling: Labelling, starts: AbstractStarts, numbers: np.ndar
     guesses: Guesses = {}
     for row, length in sorted({(int(rows[i]), int(found.cycle_footsteps[i])) for i in open_}):
         among = open_[(rows[open_] == row) & (found.cycle_footsteps[open_] == length)]
-        for i in among[_apart(found.final[among] / family.scales[row])]:
+        for i in among[_distinct_points(found.final[among] / family.scales[row])]:
             guesses.setdefault(row, []).append((length, found.final[i].tolist()))
     return guesses
 
@@ -144,7 +144,7 @@ def with_guesses(labelling: Labelling, guesses: Guesses) -> Labelling:
     return Labelling(labelling.scene, more, labelling.effort)
 
 
-def _apart(points: np.ndarray) -> list[int]:
+def _distinct_points(points: np.ndarray) -> list[int]:
     """Positions of the first few of these points that are not alike, shape (n, m)."""
     chosen: list[int] = []
     for i, point in enumerate(points):

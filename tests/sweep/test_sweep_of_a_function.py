@@ -33,7 +33,7 @@ def by_formula(monkeypatch):
         return Labelled(label, whole - 1, whole, whole, column, 10.0 * column, column, column,
                         whole + 7, np.zeros((count, 4)))  # fmt: skip
 
-    monkeypatch.setattr(jb.Labelling, "_followed", follow)
+    monkeypatch.setattr(jb.Labelling, "_label_once", follow)
     return asked
 
 
