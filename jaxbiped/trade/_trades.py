@@ -90,9 +90,12 @@ class WalkTrade(NamedTuple):
         _, sizes = sizes_of(self.scene, self.start if state is None else state)
         return np.array(sizes)
 
+    def time_unit(self) -> float:
+        """√(l/g) [s]."""
+        return sizes_of(self.scene, self.start)[0]
+
     def _books(self, walk: Trajectory) -> dict[str, np.ndarray]:
         ledger = energy_ledger(self.scene, walk)
-        time_unit, _ = sizes_of(self.scene, walk.final)
         shares = (
             ledger.gravity_work,
             ledger.damper_loss,
@@ -100,7 +103,7 @@ class WalkTrade(NamedTuple):
             ledger.stored_change,
         )
         return {
-            "step_time": heel_strikes(self.scene, walk).time_s / time_unit,
+            "step_time": heel_strikes(self.scene, walk).time_s / self.time_unit(),
             "energy": np.array([float(each[0]) for each in shares]),
         }
 
