@@ -12,8 +12,14 @@ PACKAGES = (
 
 def say_rows(options: Options, rows: list[dict[str, Any]]) -> None:
     """Prints one line for each way and setting, or why it has no answer."""
+    told = []
+    for row in rows:
+        if row["outcome"] == "answered":
+            said = "nothing" if row["said"] is None else f"{row['said']:.1e}"
+            row = row | {"cpu_time": f"{1e3 * row['cpu_s']:.1f} ms", "says": said}
+        told.append(row)
     formats = dict(problem="", way="", setting="", value=".0e", outcome="", state_error=".1e")
-    options.table(rows, **formats, gradient_error=".1e", cpu_s=".2e", said=".1e")
+    options.table(told, **formats, gradient_error=".1e", cpu_time="", says="")
 
 
 def versions() -> dict[str, str | None]:
