@@ -174,10 +174,10 @@ def gait_numbers(gait: "jb.Gait") -> "JsonObject":
 def _by_parameter(
     parameters: tuple[str, ...], values: "jb.gait.Measures"
 ) -> dict[str, dict[str, float]]:
-    columns = {name: getattr(values, field) for field, name in _UNITS.items()}
-    columns |= {f"state.{name}": column for name, column in values.state._asdict().items()}
+    columns = {name: getattr(values, field).tolist() for field, name in _UNITS.items()}
+    columns |= {f"state.{name}": each.tolist() for name, each in values.state._asdict().items()}
     return {
-        parameter: {name: float(column[k]) for name, column in columns.items()}
+        parameter: {name: column[k] for name, column in columns.items()}
         for k, parameter in enumerate(parameters)
     }
 
