@@ -21,8 +21,7 @@ from jaxbiped.solve._units import recurring_inverse_units
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._hybrid_system import AbstractSystem
 from jaxbiped.variational._solve_to_section import Nodes, SectionArrival, solve_to_section
-from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
-from jaxbiped.variational._variational_problem import Watch
+from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
 from jaxbiped.variational._variational_solve import solve_to_section_by_lanes
 
 STATE_FLOOR = 0.1

@@ -22,8 +22,7 @@ from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import SectionArrival, solve_to_section
-from jaxbiped.variational._tangents import Seeded, Tangents
-from jaxbiped.variational._variational_problem import VariationalSolution
+from jaxbiped.variational._tangents import Seeded, Tangents, VariationalSolution
 from jaxbiped.variational._variational_solve import solve_variational
 
 NO_REVERSE = (

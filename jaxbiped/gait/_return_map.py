@@ -122,7 +122,6 @@ def return_map(
         system=system,
         max_time=max_time,
         max_solver_steps=ACCURACIES[accuracy].max_solver_steps,
-        in_minimal=False,
     )
     follow = _FOLLOW[spec.engine, type(gradient)]
     precision = precision_of(accuracy, args)

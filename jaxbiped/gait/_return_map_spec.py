@@ -10,7 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, Time, by_numpy
-from jaxbiped.dynamics._redundant_state import minimal_state
+from jaxbiped.dynamics._redundant_state import is_redundant, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.gait._gradient_modes import AbstractGradient, Reverse
 from jaxbiped.scene._scene import AbstractScene, RedundantScene, is_rigid
@@ -24,7 +24,7 @@ from jaxbiped.variational._hybrid_system import (
     section_of,
     system_of,
 )
-from jaxbiped.variational._variational_problem import Watch
+from jaxbiped.variational._tangents import Watch
 
 _PATIENCE = 50.0
 """Time allowed to the next arrival, in units of √(l/g)."""
@@ -89,19 +89,18 @@ def return_map_spec(
     system: AbstractSystem | None = None,
     steps: int = 1,
     max_time: Time | None = None,
-    in_minimal: bool = True,
 ) -> ReturnMapSpec:
     """Checks how a return map is to be solved, and forms it.
 
     Args:
         args: the scene, or the parameters of another `system`.
-        state: on its orbits.
+        state: on its orbits; of a redundant scene minimal, unless its returns are to be told in
+            coordinates of each leg.
         section: the scene's own unless given.
         solver: by name, as it is, or the usual one.
         engine: one of `ENGINES`.
         system: the user's own, where it is: nobody knows if lanes can express it.
         steps, max_time, max_solver_steps: of the spec; `max_time` is a walker's unless given.
-        in_minimal: whether the returns of a redundant scene are told in minimal coordinates.
 
     Raises:
         ArgumentError: a section, solver or engine that is unknown or cannot do this.
@@ -113,7 +112,7 @@ def return_map_spec(
     if system is None and isinstance(args, RedundantScene):
         obstacle = "redundant coordinates are diffrax's"
         method, within = with_projection(args, method), RedundantWalking()
-        if not in_minimal:
+        if is_redundant(state):
             own, within = within, None
     elif holds_arrays(system):
         obstacle = f"the system {type(system).__name__} holds arrays, which belong in args"

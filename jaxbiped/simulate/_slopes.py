@@ -24,7 +24,7 @@ from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
+from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
 from jaxbiped.variational._tangents_at_times import (
     EventMotion,
     TangentsAtTimes,
@@ -33,7 +33,6 @@ from jaxbiped.variational._tangents_at_times import (
     tangents_after,
     tangents_at_times,
 )
-from jaxbiped.variational._variational_problem import Watch
 
 LOOSER = 10.0
 """Tolerance of derivatives, in units of the state's."""

@@ -10,8 +10,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
 from jaxbiped.solve._fusion_barrier import fusion_barrier
-from jaxbiped.variational._tangents import Seeded, active_leaves, with_active
-from jaxbiped.variational._variational_problem import Watch
+from jaxbiped.variational._tangents import Seeded, Watch, active_leaves, with_active
 
 _BEYOND = 1e-3
 """How far across a surface its other side is looked at, as a share of the distance to it."""

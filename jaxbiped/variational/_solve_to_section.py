@@ -26,12 +26,12 @@ from jaxbiped.variational._tangent_solver import (
 from jaxbiped.variational._tangents import (
     Seeded,
     Tangents,
+    Watch,
     along_columns,
     as_columns,
     plain_args,
     plain_state,
 )
-from jaxbiped.variational._variational_problem import Watch
 
 Along: TypeAlias = Callable[
     [Callable[[PyTree, PyTree], PyTree], Tangents, Seeded], tuple[PyTree, PyTree]

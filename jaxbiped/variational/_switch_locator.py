@@ -23,8 +23,7 @@ from jaxbiped.solve.controllers._wrapped_control import (
     try_again,
 )
 from jaxbiped.variational._grazing import turns_of
-from jaxbiped.variational._tangents import plain_args, plain_state
-from jaxbiped.variational._variational_problem import Watch, surfaces_of
+from jaxbiped.variational._tangents import Watch, plain_args, plain_state, surfaces_of
 
 _OVERSHOOT = 1e-4
 """Largest part of a step that may lie past a switch."""

@@ -27,8 +27,7 @@ from jaxbiped.solve.controllers._wrapped_control import (
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._rosenbrock_tangents import rosenbrock_tangents
 from jaxbiped.variational._saltation import has_saltation, jump_surface_values, saltation_at
-from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
-from jaxbiped.variational._variational_problem import Watch
+from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
 
 SHARE = 0.1
 """Of a column's largest entry: what its smaller entries' errors are measured against."""

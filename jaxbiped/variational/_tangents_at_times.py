@@ -14,8 +14,7 @@ from jaxbiped.compiler import AbstractEngine
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._tangents import Seeded, Tangents, along_columns, as_columns
-from jaxbiped.variational._variational_problem import Watch
+from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
 from jaxbiped.variational._variational_solve import solve_variational
 
 _FLOOR = 1e-4

@@ -24,8 +24,14 @@ from jaxbiped.variational._saltation import at_fixed_time, has_field_switches, m
 from jaxbiped.variational._solve_to_section import onto_section, peak_of
 from jaxbiped.variational._switch_locator import NEAR, SwitchLocator, SwitchLocatorState
 from jaxbiped.variational._tangent_solver import SHARE
-from jaxbiped.variational._tangents import Seeded, Tangents, along_columns_in_turn
-from jaxbiped.variational._variational_problem import VariationalProblem, VariationalSolution, Watch
+from jaxbiped.variational._tangents import (
+    Seeded,
+    Tangents,
+    VariationalProblem,
+    VariationalSolution,
+    Watch,
+    along_columns_in_turn,
+)
 
 
 class _Now(NamedTuple):

@@ -12,8 +12,13 @@ from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._first_and_last_step import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import Nodes, SectionArrival
-from jaxbiped.variational._tangents import Seeded, Tangents
-from jaxbiped.variational._variational_problem import VariationalProblem, VariationalSolution, Watch
+from jaxbiped.variational._tangents import (
+    Seeded,
+    Tangents,
+    VariationalProblem,
+    VariationalSolution,
+    Watch,
+)
 from jaxbiped.variational._variational_program import AdaptiveColumns
 
 _QUICK = 50_000

@@ -18,8 +18,7 @@ from jaxbiped.variational._hybrid_system import RedundantWalking, Rolling, Walki
 from jaxbiped.variational._saltation import saltation_at
 from jaxbiped.variational._switch_locator import SwitchLocator
 from jaxbiped.variational._tangent_solver import TangentSolver, VariationalField
-from jaxbiped.variational._tangents import Seeded, Tangents
-from jaxbiped.variational._variational_problem import Watch
+from jaxbiped.variational._tangents import Seeded, Tangents, Watch
 
 BEFORE, AFTER = -9.8, 14.0
 """Accelerations above the level and below [m/s²]."""
