@@ -148,6 +148,7 @@ def cases() -> list[Case]:
     times, strikes = jnp.array([0.2, 0.5, 0.9]), jb.HeelStrike()
     rate = float(START.omega_1)
     down = jb.Section(lambda args, y: -y[0])
+    still = jb.dynamics.BristleState(*START, 0.0, 0.0)
 
     def started(like: Any) -> Callable[[Any], Any]:
         return lambda rate: like._replace(omega_1=rate)
@@ -167,7 +168,7 @@ def cases() -> list[Case]:
         Case("bristle", "duration", _walk(bristles, START, duration=0.9), rate),
         Case("bristle", "footsteps", _walk(bristles, START, footsteps=2), rate),
         Case("bristle", "arrivals", _walk(bristles, START, duration=0.9, save=strikes), rate),
-        Case("bristle", "return map", _returns(bristles, started(START)), rate),
+        Case("bristle", "return map", _returns(bristles, started(still)), rate),
         Case("rigid", "duration", _rolls(rigid, duration=0.9), rate),
         Case("rigid", "footsteps", _rolls(rigid, footsteps=2), rate),
         Case("rigid", "arrivals", _rolls(rigid, duration=0.9, max_arrivals=2), rate),

@@ -20,7 +20,6 @@ PRIVATE = {
     ("_jax_versions.py", "jax._src.interpreters.batching.BatchTracer"),
     ("_jax_versions.py", "jaxlib.lapack"),
     ("_jax_versions.py", "jaxlib.mlir.ir"),
-    ("gait/_gait_measures.py", "equinox.internal"),
     ("gait/_return_derivatives.py", "equinox.internal"),
     ("gait/_return_derivatives.py", "equinox.internal"),
     ("solve/_fusion_barrier.py", "equinox.internal"),

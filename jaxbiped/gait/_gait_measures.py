@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 import equinox as eqx
-import equinox.internal as eqxi
 import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -20,6 +19,7 @@ from jaxbiped.gait._return_map import Return, return_map
 from jaxbiped.linalg._elimination import solution
 from jaxbiped.scene._parameter_access import select_parameters
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
+from jaxbiped.simulate._derivatives import first_derivatives_only
 
 
 def gait_measures(
@@ -50,7 +50,7 @@ def gait_measures(
 
     Raises:
         ArgumentError: an argument that is not allowed, before anything is compiled.
-        RuntimeError: a second derivative through `Implicit()`, or reverse mode through `Forward()`.
+        RuntimeError: reverse mode through `Forward()`.
         TypeError: forward mode through `Reverse()`.
     """
     gradient = Implicit() if gradient is None else gradient
@@ -110,11 +110,8 @@ def _attach_derivatives_jvp(
     values, slopes, _ = primals
     state_dot = tangents[2]
     # A second derivative would need slopes that are themselves differentiated.
-    slopes, _ = eqxi.nondifferentiable((slopes, primals[2]), name=_SECOND)
+    slopes, _ = first_derivatives_only((slopes, primals[2]), "gait_measures by Implicit()")
     return values, jtu.tree_map(lambda slope: slope @ state_dot, slopes)
-
-
-_SECOND = "gait_measures by Implicit(), which has first derivatives only; a second"
 
 
 def _by_correction(gait: Gait, once_from: Callable[[PyTree], Return]) -> Measures:

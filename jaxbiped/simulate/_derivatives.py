@@ -76,7 +76,7 @@ def with_derivatives(
         known = not _is_traced(primals)
         with untraced() if known else contextlib.nullcontext():
             found = compute(whole(primals)) if known else function(*primals)
-            once = whole(primals if known else _once(primals))
+            once = whole(primals if known else first_derivatives_only(primals, "a simulation"))
             at = slopes(once, found, tuple(state_dots), tuple(scene_dots))
         along = [*state_dots.values(), *scene_dots.values()]
         return found, _tangent_of(found, *_contract(at, along, *clock_dots.values()))
@@ -85,17 +85,25 @@ def with_derivatives(
     return function(*(leaves[i] for i in traced))
 
 
-@jax.custom_jvp
-def _once(leaves: Sequence[Scalar]) -> Sequence[Scalar]:
-    """The same, of which there are no derivatives."""
-    return leaves
+def first_derivatives_only(leaves: PyTree, function: str) -> PyTree:
+    """The same numbers, of which there are no derivatives: what has first ones refuses second ones.
 
+    Args:
+        leaves: those on which first derivatives depend.
+        function: whose they are.
+    """
 
-@_once.defjvp
-def _refuse(primals: object, tangents: object) -> NoReturn:
-    raise ArgumentError(
-        "Second derivatives of a simulation are not offered: take differences of first ones."
-    )
+    @jax.custom_jvp
+    def once(leaves: PyTree) -> PyTree:
+        return leaves
+
+    @once.defjvp
+    def refuse(primals: object, tangents: object) -> NoReturn:
+        raise ArgumentError(
+            f"Second derivatives of {function} are not offered: take differences of first ones."
+        )
+
+    return once(leaves)
 
 
 @cached_jit

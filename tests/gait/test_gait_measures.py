@@ -51,3 +51,21 @@ def test_all_gradient_modes_agree_on_random_scenes(changes):
 def test_gradient_must_be_a_mode():
     with pytest.raises(jb.ArgumentError, match="gradient"):
         jb.gait_measures(jb.seed_scene(), gradient="forward")
+
+
+def test_second_derivatives_are_refused():
+    rigid = jb.ladder()["rigid"]
+    start = jb.dynamics.rigid_state(jb.seed_state())
+
+    def period(slope):
+        return jb.gait_measures(jb.with_parameters(rigid, {"slope": slope})).period
+
+    def time(rate):
+        return jb.return_map(rigid, start._replace(omega_1=rate)).time
+
+    for function, at, said in (
+        (period, 0.02, "Second derivatives of gait_measures"),
+        (time, 1.5, "cannot be differentiated"),
+    ):
+        with pytest.raises(jb.ArgumentError, match=said):
+            jax.hessian(function)(at)
