@@ -41,7 +41,7 @@ def test_a_fold_moves_so_that_its_forcing_stays_zero():
 def branch(*values, kinds=None):
     kinds = [BranchEvent.FOLD] * len(values) if kinds is None else kinds
     points = [
-        SimpleNamespace(value=v, kind=k, multiplier=1.0 + 0j, error=0.01)
+        SimpleNamespace(value=v, kind=k, multiplier=1.0 + 0j, error=0.01, beyond=np.nan)
         for v, k in zip(values, kinds, strict=True)
     ]
     return SimpleNamespace(bifurcations=points)
@@ -70,6 +70,15 @@ def test_the_nearest_is_that_of_the_smallest_factor(slope, values, first, monkey
     else:
         assert np.isnan(found.ratio)
         assert asked["bounds"] == (-0.1, 0.1)
+
+
+def test_where_one_was_not_located_the_nearer_end_counts(monkeypatch):
+    found = branch(0.04, 0.08, kinds=[BranchEvent.FOLD, BranchEvent.NOT_LOCATED])
+    found.bifurcations[1].beyond = 0.025
+    monkeypatch.setattr(nearest, "continue_gait", lambda *_, **__: found)
+    gait = SimpleNamespace(orbit=(np.zeros((1, 3)), None))
+    scene = jb.with_parameters(SCENE, {"slope": 0.02})
+    assert nearest.nearest_bifurcation(scene, gait).kind is BranchEvent.NOT_LOCATED
 
 
 @pytest.mark.parametrize("value", [OWN + 0.01, OWN - 0.004])

@@ -31,9 +31,9 @@ def test_starts_whose_walk_grazes_are_counted(states, solver):
     label = jb.labelling(jb.seed_scene(), accuracy=1e-3)
     label = dataclasses.replace(label, scene=SCENE)
     effort = effort_of(SCENE, accuracy=1e-3, solver=solver, footsteps=1)
-    told = label._followed(states, {}, effort)
+    told = label._label_once(states, {}, effort)
     assert np.array_equal(told.grazes > 0, np.abs(DEPTHS) < 1e-6)
-    plain = label._followed(states, {}, effort._replace(wanted=None))
+    plain = label._label_once(states, {}, effort._replace(wanted=None))
     assert plain.grazes is None
     for name in ("label", "footsteps", "time", "distance", "attempted"):
         np.testing.assert_array_equal(getattr(told, name), getattr(plain, name))
