@@ -86,9 +86,9 @@ class ParameterInfo(NamedTuple):
     """
 
     quantity: Quantity
-    positive: bool
-    minimum: float | None
-    size_below: float | None
+    positive: bool = False
+    minimum: float | None = None
+    size_below: float | None = None
 
     def check(self, name: str, value: object) -> None:
         """Raises `ArgumentError` unless every entry is a finite number that is allowed."""

@@ -165,14 +165,13 @@ def _parameter(
     symbol: str = "",
     unit: str = "",
     *,
-    positive: bool = False,
-    minimum: float | None = None,
-    size_below: float | None = None,
-    several: bool = False,
     default: float | None = None,
+    several: bool = False,
+    **limits: Any,
 ) -> tuple[Any, ParameterInfo]:
     """What `jaxbiped.laws.parameter` keeps of its arguments."""
-    return default, ParameterInfo(Quantity(words, symbol, unit), positive, minimum, size_below)
+    del several
+    return default, ParameterInfo(Quantity(words, symbol, unit), **limits)
 
 
 _DECLARING = {
