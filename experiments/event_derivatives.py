@@ -75,16 +75,19 @@ def _slips(name: str) -> Any:
     return jb.laws.friction_law_like(name, **numbers)
 
 
+def _moments(found: Any, count: int | None = None) -> Any:
+    """Times and states of a walk or of its first arrivals, one behind the other."""
+    at = (found.t, found.state.hip_x, found.state.theta_1, found.state.omega_1)
+    return jnp.concatenate([leaf[:count] for leaf in at])
+
+
 def _walk(scene: Any, start: jb.State, **how: Any) -> Simulated:
     """Times and states of a walk by the rate of the swing leg."""
 
     def run(rate: Any, by: How) -> Any:
         state, given = start._replace(omega_1=rate), {"save": "end"} | how
         walk = jb.simulate(scene, state, accuracy=by.accuracy, engine=by.engine, **given)
-        found = walk if walk.arrivals is None else walk.arrivals
-        count = 2 if walk.arrivals is not None else None
-        at = (found.t, found.state.hip_x, found.state.theta_1, found.state.omega_1)
-        return jnp.concatenate([leaf[:count] for leaf in at])
+        return _moments(walk) if walk.arrivals is None else _moments(walk.arrivals, 2)
 
     return run
 
@@ -95,9 +98,7 @@ def _rolls(start: Any, **how: Any) -> Simulated:
     def run(rate: Any, by: How) -> Any:
         state, strikes = start._replace(omega_1=rate), how.get("max_arrivals", 0)
         walk = jb.rigid_walk(RIGID, state, accuracy=by.accuracy, engine=by.engine, **how)
-        found = walk.arrivals if strikes else walk
-        at = (found.t, found.state.hip_x, found.state.theta_1, found.state.omega_1)
-        return jnp.concatenate([leaf[: strikes or None] for leaf in at])
+        return _moments(walk.arrivals, strikes) if strikes else _moments(walk)
 
     return run
 
