@@ -15,7 +15,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import RealScalarLike, Scalar, choose
 from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.linalg._small_matrices import solve
+from jaxbiped.linalg._elimination import solution
 
 if TYPE_CHECKING:
     import optax
@@ -127,7 +127,7 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
         forward = jnp.asarray(True)
         simplified = jnp.zeros_like(change)
     else:
-        simplified = -solve(now.slope, change)
+        simplified = -solution(now.slope, change)
         forward = jnp.isinf(now.base_residual) | (_size(simplified) < _size(now.step))
     better = returned & ~approaching & forward
 
@@ -148,7 +148,7 @@ def newton_iteration(now: Progress, latest: LinearisedReturn, method: Method) ->
         step, optimiser = _descent_step(now, base, change, slope, better, method.optimiser)
         damping = jnp.asarray(1.0)
     else:
-        step = jnp.where(better, -solve(slope, change), now.step)
+        step = jnp.where(better, -solution(slope, change), now.step)
         damping, optimiser = _damping_factor(now, step, simplified, returned, better), now.optimiser
     damping = jnp.where(refined | approaching, 1.0, damping)
     stuck = (damping < _SMALLEST_DAMPING) | (better & ~jnp.all(jnp.isfinite(step)))
