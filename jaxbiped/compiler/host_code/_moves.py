@@ -5,8 +5,6 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from jaxbiped.compiler.host_code._host_writer import (
     HostWriter,
     Operation,
@@ -14,6 +12,7 @@ from jaxbiped.compiler.host_code._host_writer import (
     UnwrittenError,
     Value,
 )
+from jaxbiped.compiler.ir._array_primitives import iota
 
 
 def single_number(value: Value, shape: tuple[int, ...]) -> Value:
@@ -190,11 +189,7 @@ def _single(value: Value) -> bool:
 
 
 def _iota(w: HostWriter, op: Operation) -> list[Value]:
-    p = op.params
-    places = [1] * len(p["shape"])
-    places[p["dimension"]] = -1
-    numbers = np.arange(p["shape"][p["dimension"]], dtype=p["dtype"]).reshape(places)
-    return [w.constant(np.broadcast_to(numbers, p["shape"]))]
+    return [w.constant(iota(**op.params))]
 
 
 def _pad(w: HostWriter, op: Operation) -> list[Value]:
