@@ -244,11 +244,11 @@ def _compile(searching: SearchArguments, describing: Described, origin: Origin) 
     with told, ThreadPoolExecutor() as meanwhile:
         with deferred_checks() as programs:
             # What takes lanes longest begins first.
-            ready = [meanwhile.submit(_search.begin(*searching))]
-            no_result = _empty_arrays(_search.result_shape(*searching))
+            begun = _search.begin(*searching)
+            ready = [meanwhile.submit(begun.finish)]
+            no_result = _empty_arrays(begun.result)
             given = (spec, scene, start, precision, no_result, *describing, origin)
-            finish = summarise_gait.begin(*given)
-            ready.append(meanwhile.submit(finish))
+            ready.append(meanwhile.submit(summarise_gait.begin(*given).finish))
         try:
             for program in programs:
                 program.check()

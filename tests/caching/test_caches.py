@@ -187,7 +187,7 @@ def test_the_environment_bounds_records_and_buffers(monkeypatch, limit):
 
     number = jax.ShapeDtypeStruct((), jnp.float64)
     program = Program(jnp.zeros_like, attempt, lambda given, carried: carried, record=record)
-    program = _compiled_program.CompiledProgram(program, number)
+    program = _compiled_program.CompiledProgram.of(program, number)
     jb.clear_caches()
     monkeypatch.setenv("JAXBIPED_CACHE_BYTES", limit)
     _, recording = call_recording(program, jnp.asarray(1.0), room=6, quick=True)

@@ -16,7 +16,7 @@ def compiled(function, *shapes):
         attempt=lambda inputs, carried: (carried, jnp.asarray(True)),
         finish=lambda inputs, carried: function(*inputs),
     )
-    return CompiledProgram(program, inputs)
+    return CompiledProgram.of(program, inputs)
 
 
 def evaluate(function, *columns, **options):

@@ -22,7 +22,7 @@ from jaxbiped.compiler.host_code._host_jit import register_rule
 from jaxbiped.compiler.host_code._host_writer import HostWriter, Operation, Value
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._lane_call import LaneCall, LaneRun, Part, Schedule
-from jaxbiped.compiler.runtime._program import Recorded, leaves_of
+from jaxbiped.compiler.runtime._program import Recorded, outputs_of
 from jaxbiped.compiler.runtime._record_cache import Recorder
 
 _UNTRACED: contextvars.ContextVar[list[CompiledProgram] | None] = contextvars.ContextVar(
@@ -139,19 +139,16 @@ def _bind(given: list[Numbers], how: LaneRun) -> list[Any]:
 
 
 def _outputs(compiled: CompiledProgram, table: Array) -> PyTree:
-    shapes, structure = jtu.tree_flatten(compiled.kernel.outline.outputs)
+    shapes, convert = compiled.kernel.outline.outputs, jax.lax.convert_element_type
     if not _is_traced(table):
         # By NumPy: JAX would compile a program for each of these.
-        parts = leaves_of(compiled.kernel.outline.outputs, np.asarray(table))
-        leaves = [as_array(p.astype(s.dtype)) for p, s in zip(parts, shapes, strict=True)]
-        return jtu.tree_unflatten(structure, leaves)
-    if all(s.ndim == 0 for s in shapes):
+        own = np.asarray(table)
+        return outputs_of(shapes, own, lambda part, dtype: as_array(part.astype(dtype)))
+    if all(leaf.ndim == 0 for leaf in jtu.tree_leaves(shapes)):
         # The same as what follows, by one operation.
-        parts = list(jnp.unstack(table))
-    else:
-        parts = leaves_of(compiled.kernel.outline.outputs, table)
-    leaves = [jax.lax.convert_element_type(p, s.dtype) for p, s in zip(parts, shapes, strict=True)]
-    return jtu.tree_unflatten(structure, leaves)
+        numbers = iter(jnp.unstack(table))
+        return jtu.tree_map(lambda leaf: convert(next(numbers), leaf.dtype), shapes)
+    return outputs_of(shapes, table, convert)
 
 
 def _implementation(*leaves: Array, how: LaneRun) -> list[Array]:

@@ -135,7 +135,7 @@ def test_a_loop_computes_once_what_is_the_same_in_each_run():
         attempt=lambda x, carried: (_partly_the_same(carried), jnp.asarray(True)),
         finish=lambda x, carried: carried,
     )
-    block = CompiledProgram(program, shape).kernel.graph.body
+    block = CompiledProgram.of(program, shape).kernel.graph.body
     (loop,) = (value for value in block.values if value.op == "map")
     inside = {value.op for value in loop.args[1].values}
     assert inside <= {"taken", "part", "fmul", "fadd"}

@@ -19,7 +19,7 @@ def _compiled(function):
         return (function(*carried), carried[1]), jnp.asarray(True)
 
     program = Program(lambda given: given, attempt, lambda _, carried: carried[0])
-    return CompiledProgram(program, (NUMBER, NUMBER))
+    return CompiledProgram.of(program, (NUMBER, NUMBER))
 
 
 def _where(block, op):

@@ -142,7 +142,7 @@ def test_parameters_are_inputs_of_each_lane():
 
 
 def _endless():
-    return CompiledProgram(
+    return CompiledProgram.of(
         Program(
             start=lambda inputs: inputs,
             attempt=lambda inputs, carried: (carried + 1.0, carried < 0.0),
@@ -208,7 +208,7 @@ def test_an_interrupt_is_heard_at_the_first_look(monkeypatch):
 @pytest.mark.parametrize("attempts", [1, 2, 1000])
 def test_a_run_that_is_stopped_attempts_nothing_more(attempts, monkeypatch):
     """Each simulation would be done after so many; threads that come after a stop do none."""
-    program = CompiledProgram(
+    program = CompiledProgram.of(
         Program(
             start=lambda inputs: jnp.zeros_like(inputs),
             attempt=lambda inputs, carried: (carried + 1.0, carried + 1.0 >= inputs),
@@ -265,7 +265,7 @@ def test_records_at_the_times_of_a_schedule():
     def halves(inputs, carried):
         return carried + 0.5, carried + 0.5 >= inputs
 
-    program = CompiledProgram(
+    program = CompiledProgram.of(
         Program(
             start=lambda inputs: jnp.zeros_like(inputs),
             attempt=halves,

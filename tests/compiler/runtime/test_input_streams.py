@@ -25,7 +25,7 @@ def _summing(backwards=False):
 
     number = jax.ShapeDtypeStruct((), jnp.float64)
     program = Program(start, attempt, lambda _, c: c, stream=2, backwards=backwards)
-    return CompiledProgram(program, (number, number))
+    return CompiledProgram.of(program, (number, number))
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 19])
