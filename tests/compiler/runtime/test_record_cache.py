@@ -187,13 +187,13 @@ def test_what_came_first_goes_first():
     # An input and two records of one number each: 24 bytes a simulation.
     held = RecordCache(lambda: 50)
     for number in (1.0, 2.0, 3.0):
-        np.testing.assert_array_equal(held.ran("program", np.array([[number]]), run), [[number]])
-    held.rows("program", np.array([[3.0, 2.0]]), run)
+        np.testing.assert_array_equal(held.run("program", np.array([[number]]), run)[0], [[number]])
+    held.records("program", np.array([[3.0, 2.0]]), run)
     assert ran == [1.0, 2.0, 3.0]
-    rows = held.rows("program", np.array([[1.0, 3.0]]), run)
+    rows = held.records("program", np.array([[1.0, 3.0]]), run)
     assert [each.shape for each in rows] == [(2, 1), (2, 1)]
     assert ran == [1.0, 2.0, 3.0, 1.0]
-    held.rows("another", np.array([[3.0]]), run)
+    held.records("another", np.array([[3.0]]), run)
     assert ran == [1.0, 2.0, 3.0, 1.0, 3.0]
 
 
@@ -204,7 +204,7 @@ def test_simulations_without_records_take_room_as_well():
         n = table.shape[1]
         return table, np.zeros((n, 3, 1)), np.zeros(n, dtype=int)
 
-    held.ran("program", np.arange(1000.0)[None], run)
+    held.run("program", np.arange(1000.0)[None], run)
     assert held.kept == 800
     held.clear()
     assert held.kept == 0
