@@ -7,14 +7,18 @@ import pytest
 
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._primitive import Recording, call, call_recording
-from jaxbiped.compiler.runtime._program import Program
 from jaxbiped.compiler.runtime._record_cache import RecordCache
+from tests.compiler.one_shot import NUMBER, stepped, two_zeros
 
 ROOM = 8
-NUMBER = jax.ShapeDtypeStruct((), jnp.float64)
 
 
-def _powers():
+def _record(given, carried, time):
+    return carried[1] > 0.0, [carried[1], carried[0]]
+
+
+@pytest.fixture(scope="module")
+def powers():
     """Records factor, factor², … up to as high a power as the inputs say; gives the last."""
 
     def attempt(given, carried):
@@ -22,12 +26,9 @@ def _powers():
         power, count = carried
         return (power * factor, count + 1.0), count + 1.0 >= steps
 
-    def record(given, carried, time):
-        return carried[1] > 0.0, [carried[1], carried[0]]
-
     start = lambda given: (jnp.ones(()), jnp.zeros(()))
-    program = Program(start, attempt, lambda _, carried: carried[0], record=record)
-    return CompiledProgram.of(program, (NUMBER, NUMBER))
+    finish = lambda given, carried: carried[0]
+    return stepped(attempt, (NUMBER, NUMBER), start=start, finish=finish, record=_record)
 
 
 def _doubled():
@@ -37,30 +38,18 @@ def _doubled():
         count = carried[1] + 1.0
         return (2.0 * row[1], count), count >= steps
 
-    def record(steps, carried, time):
-        return carried[1] > 0.0, [carried[1], carried[0]]
-
-    start = lambda steps: (jnp.zeros(()), jnp.zeros(()))
-    return CompiledProgram.of(
-        Program(start, attempt, lambda _, c: c[1], record=record, stream=2), NUMBER
-    )
+    finish = lambda steps, carried: carried[1]
+    return stepped(attempt, start=two_zeros, finish=finish, record=_record, stream=2)
 
 
-def _last_sum(*, backwards=False):
+def _last_sum():
     """Σ of the second numbers in as many rows as the input says."""
 
     def attempt(steps, carried, row):
         total, count = carried
         return (total + row[1], count + 1.0), count + 1.0 >= steps
 
-    start = lambda steps: (jnp.zeros(()), jnp.zeros(()))
-    program = Program(start, attempt, lambda _, c: c[0], stream=2, backwards=backwards)
-    return CompiledProgram.of(program, NUMBER)
-
-
-@pytest.fixture(scope="module")
-def powers():
-    return _powers()
+    return stepped(attempt, start=two_zeros, finish=lambda steps, c: c[0], stream=2)
 
 
 @pytest.fixture
@@ -125,18 +114,6 @@ def test_what_is_read_but_once_is_then_no_longer_held(powers, runs):
     sums = [float(call(reader, jnp.asarray(2.0), stream=recording)[0]) for _ in range(3)]
     assert sums == [0.3125] * 3
     assert runs == [1, 1, 1]
-
-
-def test_a_recording_can_be_read_backwards(powers):
-    reader = _last_sum(backwards=True)
-
-    def last_two(factor, steps):
-        _, recording = _recording(powers, factor, steps)
-        return call(reader, jnp.asarray(2.0), stream=recording)[0]
-
-    factors, steps = jnp.array([2.0, 3.0, 0.5]), jnp.array([3.0, 4.0, 5.0])
-    sums = jax.jit(jax.vmap(last_two))(factors, steps)
-    np.testing.assert_allclose(sums, [12.0, 108.0, 0.09375])
 
 
 @pytest.mark.parametrize("most", [0, 1 << 20])
