@@ -106,6 +106,11 @@ class Operation(NamedTuple):
         return [(shape, dtype, shape) for shape, dtype in found]
 
 
+def listed(count: int, first: int = 0) -> str:
+    """Inputs in a form, one after the other."""
+    return ", ".join(f"{{{i}}}" for i in range(first, first + count))
+
+
 class HostWriter:
     """A text under way."""
 
@@ -158,6 +163,10 @@ class HostWriter:
     ) -> Value:
         """What an expression gives, in whose `form` the inputs belong at {0}, {1}, …"""
         return self.emit_all(form, inputs, [(shape, dtype, shape if held is None else held)])[0]
+
+    def emit_whole(self, form: str, op: Operation) -> list[Value]:
+        """What an expression of an operation's inputs gives, all held in their whole shapes."""
+        return [self.emit(form, [self.full(each) for each in op.inputs], *op.result())]
 
     def later(self, form: str, base: Value, shape: Sequence[int]) -> Value:
         """`emit` of one input, where it turns out to be needed."""

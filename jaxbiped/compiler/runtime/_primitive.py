@@ -19,7 +19,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._host_call import host_call, lower_host_call
 from jaxbiped._types import Numbers, as_array
 from jaxbiped.compiler.host_code._host_jit import register_rule
-from jaxbiped.compiler.host_code._host_writer import HostWriter, Operation, Value
+from jaxbiped.compiler.host_code._host_writer import HostWriter, Operation, Value, listed
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._lane_call import LaneCall, LaneRun, Part, Schedule
 from jaxbiped.compiler.runtime._program import Recorded, outputs_of
@@ -209,9 +209,9 @@ def _write_on_host(writer: HostWriter, op: Operation) -> Sequence[Value]:
     """The call in a host program."""
     given = [writer.full(each) for each in op.inputs]
     name = writer.thing(_begun_call(given[0].shape[0], op.params["how"]), object())
-    names = ", ".join(f"{{{i}}}" for i in range(len(given)))
     only = "[0]" if len(op.results()) == 1 else ""
-    return writer.emit_all(f"{name}({names}){only}", given, op.results(), computed=False)
+    form = f"{name}({listed(len(given))}){only}"
+    return writer.emit_all(form, given, op.results(), computed=False)
 
 
 def _refuse_derivative(primals: object, tangents: object, **params: object) -> NoReturn:
