@@ -14,11 +14,11 @@ import jaxbiped as jb
 from jaxbiped.caching import _caches
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import Once, bounded_cache
-from jaxbiped.compiler.runtime import _compiled_program, _record_cache
+from jaxbiped.compiler.runtime import _compiled_program, _lane_call
 from jaxbiped.compiler.runtime._engine_interface import Request
 from jaxbiped.compiler.runtime._lane_engine import LaneEngine
 from jaxbiped.compiler.runtime._machine_code import _LOADED
-from jaxbiped.compiler.runtime._primitive import call_recording
+from jaxbiped.compiler.runtime._primitive import call
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.solve._failure_events import WATCHES, ending_events
 from jaxbiped.solve._rigid_program import rigid_program
@@ -186,10 +186,10 @@ def test_the_environment_bounds_records_and_buffers(monkeypatch, limit):
     program = stepped(attempt, start=jnp.zeros_like, record=record)
     jb.clear_caches()
     monkeypatch.setenv("JAXBIPED_CACHE_BYTES", limit)
-    _, recording = call_recording(program, jnp.asarray(1.0), room=6, quick=True)
+    _, recording = call(program, jnp.asarray(1.0), room=6, quick=True, keeps_records=True)
     half = {"0": 0, "100": 50}.get(limit, 1 << 29)
     # One input and five records of one number each are 48 bytes.
-    assert _record_cache._RECORDS.kept == (48 if half else 0)
+    assert _lane_call._RECORDS.kept == (48 if half else 0)
     (values,) = recording.columns(np.zeros(1))
     np.testing.assert_array_equal(values[:6], range(6))
     gc.collect()

@@ -1,7 +1,7 @@
 """Record cache: what simulations recorded waits on the host until somebody asks for it.
 
-A recorder is a program whose records are kept so; another program may read them. They lie in memory
-that is used again: the first touch of a page takes longer than what is written there.
+Another program may read them. They lie in memory that is used again: the first touch of a page
+takes longer than what is written there.
 """
 
 import collections
@@ -9,13 +9,9 @@ import math
 import threading
 import weakref
 from collections.abc import Callable, Hashable
-from typing import NamedTuple, Optional, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-
-from jaxbiped.caching._caches import half_of_cache_bytes, register_bytes
-from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._host_cpu import default_threads
 
 BLOCK = 512
 """Simulations that record, or read records, at once: all together would take much memory."""
@@ -146,71 +142,3 @@ class RecordCache:
 
 def _bytes_of(key: _Key, records: np.ndarray) -> int:
     return len(key[1]) + records.nbytes
-
-
-_RECORDS = RecordCache(most=half_of_cache_bytes)
-_BUFFERS = BufferPool(most=half_of_cache_bytes)
-register_bytes("records of simulations", _RECORDS)
-register_bytes("buffers for records", _BUFFERS)
-
-
-class Recorder(NamedTuple):
-    """How simulations were run whose records are kept on the host. Hashable.
-
-    Their numbers are their own inputs and behind them the numbers of what they read.
-
-    Attributes:
-        compiled: the program; `room` for how many records, at most one for each row that it reads.
-        quick: see `call`.
-        once: whether its records are read only once.
-        reads: what recorded its stream, if it reads one.
-    """
-
-    compiled: CompiledProgram
-    room: int
-    quick: bool
-    once: bool = False
-    reads: Optional["Recorder"] = None
-
-    def outputs(self, numbers: np.ndarray) -> np.ndarray:
-        """Outputs of simulations with these numbers (n, k); their records are then known."""
-        return _RECORDS.run(self, numbers.T, self._run_for(len(numbers)))[0]
-
-    def rows(self, numbers: np.ndarray) -> list[np.ndarray]:
-        """Records of each simulation (records, numbers), or zeros where it made none."""
-        known = _RECORDS.records(self, numbers.T, self._run_for(len(numbers)))
-        if self.once:
-            _RECORDS.forget(self, numbers.T)
-        return [each if len(each) else np.zeros((1, each.shape[1])) for each in known]
-
-    def columns(self, numbers: np.ndarray, first: np.ndarray) -> list[np.ndarray]:
-        """The first k numbers in a record, each as an array (n, 1 + room), NaN beyond the last.
-
-        Before those recorded comes that of `first`, shape (n, k).
-        """
-        known = _RECORDS.records(self, numbers.T, self._run_for(len(numbers)))
-        found = [np.full((len(known), 1 + self.room), np.nan) for _ in first.T]
-        for i, records in enumerate(known):
-            for column, start, values in zip(found, first[i], records.T, strict=False):
-                column[i, 0], column[i, 1 : 1 + len(values)] = start, values
-        return found
-
-    def _run_for(self, count: int) -> Callable[[np.ndarray], Tables]:
-        """Runs those of `count` simulations that nobody ran yet."""
-        # Also where these are few: another width would have to be compiled.
-        width = self.compiled.width(count, default_threads())
-
-        def run(table: np.ndarray) -> Tables:
-            own, others = np.split(table, [self.compiled.size])
-            rows, room = None, self.room
-            if self.reads is not None:
-                rows = self.reads.rows(others.T)
-                room = min(room, max(len(each) for each in rows))
-            alone = self.quick and table.shape[1] == 1
-            found, recorded = self.compiled.run_table(
-                own, stream=rows, room=room, memory=_BUFFERS.array, quick=alone, width=width
-            )
-            assert recorded is not None
-            return found, *recorded
-
-        return run

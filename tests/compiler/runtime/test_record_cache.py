@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
-from jaxbiped.compiler.runtime._primitive import Recording, call, call_recording
+from jaxbiped.compiler.runtime._primitive import Recording, call
 from jaxbiped.compiler.runtime._record_cache import RecordCache
 from tests.compiler.one_shot import NUMBER, stepped, two_zeros
 
@@ -68,7 +68,7 @@ def runs(powers, monkeypatch):
 
 def _recording(powers, factor, steps):
     given = (jnp.asarray(factor), jnp.asarray(steps))
-    return call_recording(powers, given, room=ROOM, quick=True)
+    return call(powers, given, room=ROOM, quick=True, keeps_records=True)
 
 
 def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
@@ -84,7 +84,7 @@ def test_what_was_recorded_is_told_later_without_a_run(powers, runs):
 
 
 def test_what_is_no_longer_held_is_run_again(powers, runs, monkeypatch):
-    monkeypatch.setattr("jaxbiped.compiler.runtime._record_cache._RECORDS", RecordCache(lambda: 0))
+    monkeypatch.setattr("jaxbiped.compiler.runtime._lane_call._RECORDS", RecordCache(lambda: 0))
     _, recording = _recording(powers, 1.5, 2.0)
     _, values = recording.columns(np.array([0.0, 1.0]))
     np.testing.assert_array_equal(values[:3], [1.0, 1.5, 2.25])
@@ -109,7 +109,7 @@ def test_a_recording_is_another_programs_stream(powers, runs):
 
 def test_what_is_read_but_once_is_then_no_longer_held(powers, runs):
     given = (jnp.asarray(0.25), jnp.asarray(2.0))
-    _, recording = call_recording(powers, given, room=ROOM, quick=True, once=True)
+    _, recording = call(powers, given, room=ROOM, quick=True, keeps_records=True, reads_once=True)
     reader = _last_sum()
     sums = [float(call(reader, jnp.asarray(2.0), stream=recording)[0]) for _ in range(3)]
     assert sums == [0.3125] * 3
@@ -118,14 +118,14 @@ def test_what_is_read_but_once_is_then_no_longer_held(powers, runs):
 
 @pytest.mark.parametrize("most", [0, 1 << 20])
 def test_what_reads_a_recording_may_record_as_well(powers, monkeypatch, most):
-    monkeypatch.setattr(
-        "jaxbiped.compiler.runtime._record_cache._RECORDS", RecordCache(lambda: most)
-    )
+    monkeypatch.setattr("jaxbiped.compiler.runtime._lane_call._RECORDS", RecordCache(lambda: most))
     doubled, reader = _doubled(), _last_sum()
 
     def total(factor, steps):
         _, recording = _recording(powers, factor, steps)
-        count, twice = call_recording(doubled, steps, room=ROOM, quick=True, stream=recording)
+        count, twice = call(
+            doubled, steps, room=ROOM, quick=True, stream=recording, keeps_records=True
+        )
         return count, call(reader, steps, stream=twice)[0], twice.columns(jnp.zeros(1))[0]
 
     factors, steps = jnp.array([2.0, 3.0]), jnp.array([3.0, 2.0])
