@@ -88,6 +88,7 @@ def gait_sweep(
     path = None if store is None else user_path(store, "store")
     if path is not None:
         check_store(path)
+        path = path.absolute()
     options: dict[str, Any] = dict(
         parameters=parameters,
         footsteps=footsteps,

@@ -5,9 +5,8 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped._identity import provenance
-from jaxbiped.sweep._store import AbstractStore, MemoryStore
+from jaxbiped.sweep._store import Store
 from jaxbiped.sweep._stored_fields import FIELDS, Layout
-from jaxbiped.sweep._zarr_store import ZarrStore
 from tests.rigid_walkers import simplest_walker
 from tests.sweep.walkers import simplest_grid
 
@@ -15,17 +14,17 @@ SCENE = simplest_walker(0.009)
 LAYOUT = Layout.of(simplest_grid(SCENE), 16)
 
 
-@pytest.fixture(params=[MemoryStore, ZarrStore])
-def store(request, tmp_path) -> AbstractStore:
+@pytest.fixture(params=["in memory", "on a disk"])
+def store(request, tmp_path):
     writer = provenance(SCENE)
-    if request.param is MemoryStore:
-        return MemoryStore(LAYOUT, {}, writer)
-    return ZarrStore.open(tmp_path / "store", LAYOUT, {}, writer)
+    if request.param == "in memory":
+        return Store.in_memory(LAYOUT, {}, writer)
+    return Store.open(tmp_path / "store", LAYOUT, {}, writer)
 
 
 def test_what_is_written_is_read_and_in_the_dataset(store):
     label = np.arange(16, dtype=np.int8) % 7
-    assert list(store.missing()) == list(range(LAYOUT.chunks))
+    assert list(store.behind()) == list(range(LAYOUT.chunks))
     store.write(1, {"label": label})
     read = store.read(1, ("label", "cycle_footsteps"))
     np.testing.assert_array_equal(read["label"], label)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.sweep._zarr_store import ZarrStore
+from jaxbiped.sweep._store import Store
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same_results, simplest_grid
 
@@ -67,21 +67,21 @@ def test_killed_while_gaits_found_late_are_labelled(tmp_path, monkeypatch, write
     expected = jb.sweep(LABELLING, STARTS, chunk=8)
     assert jb.basins.Label.WALKING in expected.label
     assert len(json.loads(expected.attrs["gaits"])[0]["gaits"]) == 1
-    write, count = ZarrStore.write, []
+    write, count = Store.write, []
 
     def killing(self, chunk, fields, **settled):
         count.append(chunk)
         if len(count) > self.layout.chunks + writes:
             # As if amid its arrays: some are new, others old, and the chunk is not complete.
             self._mark(chunk, 0)
-            self._group["label"][self.layout.region(chunk)] = 77
+            self._data["label"][self.layout.region(chunk)] = 77
             raise _Killed
         write(self, chunk, fields, **settled)
 
-    monkeypatch.setattr(ZarrStore, "write", killing)
+    monkeypatch.setattr(Store, "write", killing)
     with pytest.raises(_Killed):
         jb.sweep(LABELLING, STARTS, store=path, chunk=8)
-    monkeypatch.setattr(ZarrStore, "write", write)
+    monkeypatch.setattr(Store, "write", write)
     same_results(jb.sweep(LABELLING, STARTS, store=path, chunk=8), expected)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.basins._labels import Label
-from jaxbiped.sweep import _nearest_failure, _zarr_store
+from jaxbiped.sweep import _nearest_failure, _store
 from jaxbiped.sweep._attractor import attractor_without_radius, component_scales
 from jaxbiped.sweep._follow_starts import Labelled
 from jaxbiped.sweep._labelling_settings import effort_of
@@ -79,7 +79,7 @@ def test_a_lost_or_damaged_chunk_is_labelled_anew(tmp_path, by_formula, field, d
 
 def test_two_clients_begin_one_store(tmp_path, by_formula, monkeypatch):
     """The other one makes the same store while this one writes its own."""
-    plain, inner = _zarr_store._write_empty, []
+    plain, inner = _store._write_empty, []
 
     def write(*args):
         if not inner:
@@ -87,7 +87,7 @@ def test_two_clients_begin_one_store(tmp_path, by_formula, monkeypatch):
             swept(tmp_path / "a", grid())
         plain(*args)
 
-    monkeypatch.setattr(_zarr_store, "_write_empty", write)
+    monkeypatch.setattr(_store, "_write_empty", write)
     found = swept(tmp_path / "a", grid())
     assert (found.label.values >= 0).all()
     assert [each.name for each in tmp_path.iterdir()] == ["a"]

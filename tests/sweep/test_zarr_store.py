@@ -17,7 +17,7 @@ import xarray as xr
 import zarr
 
 import jaxbiped as jb
-from jaxbiped.sweep._zarr_store import ZarrStore
+from jaxbiped.sweep._store import Store
 from tests.rigid_walkers import STABLE, simplest_state, simplest_walker
 from tests.sweep.walkers import gaitless, same_results, simplest_grid
 
@@ -55,7 +55,7 @@ def test_a_store_opens_plainly_and_says_what_made_it(tmp_path):
 
 _RUN = """
 import sys
-from tests.sweep.test_zarr_store import LABELLING, SCENE
+from tests.sweep.test_store import LABELLING, SCENE
 from tests.sweep.walkers import simplest_grid
 import jaxbiped as jb
 jb.sweep(LABELLING, simplest_grid(SCENE, 120), store=sys.argv[1], chunk=120, look_for_gaits=False)
@@ -180,14 +180,14 @@ def _full(*_, **__):
 
 
 def test_a_full_disk_is_told_and_what_is_complete_stays(tmp_path, monkeypatch):
-    path, mark, marked = tmp_path / "store", ZarrStore._mark, []
+    path, mark, marked = tmp_path / "store", Store._mark, []
 
     def filling(self, chunk, complete):
         marked.append(chunk)
         (_full if len(marked) > 2 else mark)(self, chunk, complete)
 
     with monkeypatch.context() as patched:
-        patched.setattr(ZarrStore, "_mark", filling)
+        patched.setattr(Store, "_mark", filling)
         with pytest.raises(jb.ResourceError) as raised:
             _swept(path)
     sentence = str(raised.value)
