@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
-from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
@@ -52,22 +51,13 @@ class GaitGrid:
         self._dataset, self._state, self._path = dataset, state, path
         self._written, self._pause = time.monotonic(), _PAUSE
 
-    def is_done(self, place: tuple[int, ...], *, found: bool) -> bool:
-        """Whether a point is known; where `found`, whether a gait was found there."""
-        done = bool(self._dataset[_DONE].data[place])
-        return done and (not found or self._dataset["ending"].data[place] == int(Search.FOUND))
+    def is_done(self, place: tuple[int, ...]) -> bool:
+        """Whether a point is known, with a gait or without."""
+        return bool(self._dataset[_DONE].data[place])
 
     def is_stable(self, place: tuple[int, ...]) -> bool:
         """Whether a stable gait was found at a point."""
-        found = self.is_done(place, found=True)
-        return found and bool(self._dataset["spectral_radius"].data[place] < 1.0)
-
-    def state(self, place: tuple[int, ...]) -> PyTree:
-        """The gait's state on the section, None where there is none."""
-        if self._dataset["ending"].data[place] != int(Search.FOUND):
-            return None
-        names = self._state._fields[1:]  # type: ignore[attr-defined]
-        return self._state(0.0, *(float(self._dataset[f"state_{n}"].data[place]) for n in names))
+        return bool(self._dataset["spectral_radius"].data[place] < 1.0)
 
     def states(self) -> np.ndarray:
         """States without hip_x at all points, shape (*grid, m); NaN where there is no gait."""

@@ -8,8 +8,8 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_type
 from jaxbiped.basins._label_oracle import LabelOf
 from jaxbiped.basins._labels import Doubt, Label
-from jaxbiped.sweep._follow_starts import Labelled
 from jaxbiped.sweep._labelling import Labelling
+from jaxbiped.sweep._labelling_loop import Labelled
 from jaxbiped.sweep.starts._coordinates import check_coordinates
 from jaxbiped.sweep.starts._starts import Completion, batch_at
 

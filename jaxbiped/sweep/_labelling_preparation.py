@@ -11,7 +11,7 @@ from jaxbiped.basins._labels import Label
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.sweep._gait_family import find_family, with_gaits
+from jaxbiped.sweep._gait_family import Guesses, find_family, with_gaits
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_settings import effort_of
 from jaxbiped.sweep.starts._coordinates import parameter_axes
@@ -74,9 +74,8 @@ def labelling(
     family = find_family(scene, effort, parameters=values, guess=start)
     missing = sum(not row for row in family.rows)
     if missing:
-        of = (
-            f" for {missing} of {len(family.rows)} combinations of the parameters" if values else ""
-        )
+        all_ = f"{missing} of {len(family.rows)} combinations of the parameters"
+        of = f" for {all_}" if values else ""
         warnings.warn(
             f"no stable gait was found{of}: what walks there is labelled unresolved until one is "
             "met (see `with_gaits_met`).",
@@ -108,10 +107,6 @@ def with_gaits_met(labelling: Labelling, starts: AbstractStarts, *, count: int =
     return with_guesses(labelling, guesses_among(labelling, starts, chosen))
 
 
-Guesses = dict[int, list[tuple[int, list[float]]]]
-"""By row of a family: footsteps in a cycle and states, without hip_x, from which to search."""
-
-
 def guesses_among(labelling: Labelling, starts: AbstractStarts, numbers: np.ndarray) -> Guesses:
     """Where to seek the gaits that the starts with these numbers seem to converge to."""
     batch = starts.at(labelling, numbers)
@@ -123,7 +118,7 @@ def guesses_among(labelling: Labelling, starts: AbstractStarts, numbers: np.ndar
     rows = np.zeros(len(found.label), dtype=int)
     if family.names:
         rows = family.row_of(batch.parameters)
-    guesses: Guesses = {}
+    guesses: dict[int, list[tuple[int, list[float]]]] = {}
     for row, length in sorted({(int(rows[i]), int(found.cycle_footsteps[i])) for i in open_}):
         among = open_[(rows[open_] == row) & (found.cycle_footsteps[open_] == length)]
         for i in among[_distinct_points(found.final[among] / family.scales[row])]:
@@ -135,12 +130,7 @@ def with_guesses(labelling: Labelling, guesses: Guesses) -> Labelling:
     """The labelling that also knows the gaits to which these guesses lead."""
     if not guesses:
         return labelling
-    family = labelling.family
-    states = {
-        row: [(length, type(family.states[row])(0.0, *point)) for length, point in each]
-        for row, each in guesses.items()
-    }
-    more = with_gaits(labelling.scene, family, labelling.effort, states)
+    more = with_gaits(labelling.scene, labelling.family, labelling.effort, guesses)
     return Labelling(labelling.scene, more, labelling.effort)
 
 

@@ -35,7 +35,7 @@ class Effort(NamedTuple):
         rtol: relative tolerance; the absolute one is a hundredth of it in the scene's units.
         footsteps: after which a start that is not certain is given up.
         max_attempts: cap on the solver's attempted steps.
-        gap: see `after_arrival`; `gap_share`: in units of the tolerance.
+        gap_share: the gap in units of the tolerance; 0 where recurrences are not looked for.
         solver: of the compliant walker.
         engine: "lanes", "cuda" or "xla".
         may_move: whether large batches go from lanes to a CUDA device where there is one.
@@ -46,13 +46,17 @@ class Effort(NamedTuple):
     rtol: float
     footsteps: int
     max_attempts: int
-    gap: float
     gap_share: float
     solver: AbstractRosenbrock
     engine: str
     wanted: float | None = None
     embedded: bool = False
     may_move: bool = False
+
+    @property
+    def gap(self) -> float:
+        """Between states that repeat each other; see `after_arrival`."""
+        return max(_GAP, self.gap_share * self.rtol) if self.gap_share else 0.0
 
     @property
     def may_use_device(self) -> bool:
@@ -63,10 +67,6 @@ class Effort(NamedTuple):
     def engine_of(self, count: int) -> str:
         """The engine that follows `count` starts: large batches go where a device is kept busy."""
         return "cuda" if self.may_use_device and DEVICES.fills(count) else self.engine
-
-    def at_tolerance(self, rtol: float) -> "Effort":
-        """The same at another tolerance."""
-        return self._replace(rtol=float(rtol), gap=_gap(float(rtol), self.gap_share))
 
 
 def effort_of(
@@ -108,7 +108,6 @@ def effort_of(
         rtol=float(tolerance),
         footsteps=int(footsteps),
         max_attempts=int(max_solver_steps),
-        gap=_gap(float(tolerance), _GAP_SHARE[scene.compliant]),
         gap_share=_GAP_SHARE[scene.compliant],
         solver=method,
         engine=engine_for(engine, obstacle=None, by_device=True),
@@ -129,7 +128,3 @@ def _share_wanted(accuracy: str | float, rtol: float | None) -> float | None:
             "wrong, and must be below 1."
         )
     return float(accuracy)
-
-
-def _gap(rtol: float, share: float) -> float:
-    return max(_GAP, share * rtol)

@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxbiped._types import JsonObject
 from jaxbiped.basins._labels import Doubt, Label, Witness
-from jaxbiped.sweep._follow_starts import Labelled
+from jaxbiped.sweep._labelling_loop import Labelled
 from jaxbiped.sweep.starts._starts import AbstractStarts, Batch
 
 if TYPE_CHECKING:

@@ -224,7 +224,8 @@ def tightened(
     while True:
         more = len(tolerances) - 1
         if more:
-            finer = _at_tolerance(labelling, tolerances[-1])
+            effort = labelling.effort._replace(rtol=tolerances[-1])
+            finer = dataclasses.replace(labelling, effort=effort)
             left = results.behind(ALL_GAITS + more)
             for chunk, fields in compute_chunks(finer, layout, left, executor, workers):
                 results.write(chunk, fields, mark=ALL_GAITS + more)
@@ -261,7 +262,3 @@ def tally_disagreements(doubt: np.ndarray, disagreed: np.ndarray, changed: np.nd
         looser & other,
     )
     return Seen(doubt.size, *[int(part.sum()) for part in parts])
-
-
-def _at_tolerance(labelling: Labelling, rtol: float) -> Labelling:
-    return dataclasses.replace(labelling, effort=labelling.effort.at_tolerance(rtol))

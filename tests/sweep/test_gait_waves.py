@@ -7,8 +7,8 @@ import pytest
 import xarray
 
 import jaxbiped as jb
-from jaxbiped.sweep import _gait_waves
-from jaxbiped.sweep._gait_waves import find_each
+from jaxbiped.sweep import _gait_sweep, _gait_waves
+from jaxbiped.sweep._gait_sweep import find_each
 from jaxbiped.sweep._store_files import consolidate
 
 pytestmark = pytest.mark.slow
@@ -55,7 +55,7 @@ def test_a_batch_rounds_as_a_single_search_whatever_is_beside():
 
 
 def test_a_killed_sweep_continues_to_the_same_bits(swept, tmp_path, monkeypatch):
-    path, find, calls = tmp_path / "gaits", _gait_waves.find_each, []
+    path, find, calls = tmp_path / "gaits", _gait_sweep.find_each, []
 
     def interrupted(*args):
         if len(calls) == 5:
@@ -63,7 +63,7 @@ def test_a_killed_sweep_continues_to_the_same_bits(swept, tmp_path, monkeypatch)
         calls.append(args)
         return find(*args)
 
-    monkeypatch.setattr(_gait_waves, "find_each", interrupted)
+    monkeypatch.setattr(_gait_sweep, "find_each", interrupted)
     with pytest.raises(KeyboardInterrupt):
         jb.gait_sweep(jb.seed_scene(), OVER, store=path, **PLAIN)
     known = int(np.isfinite(xarray.open_zarr(path).period).sum())
@@ -74,7 +74,7 @@ def test_a_killed_sweep_continues_to_the_same_bits(swept, tmp_path, monkeypatch)
         searched.append(len(args[2]))
         return find(*args)
 
-    monkeypatch.setattr(_gait_waves, "find_each", counted)
+    monkeypatch.setattr(_gait_sweep, "find_each", counted)
     again = jb.gait_sweep(jb.seed_scene(), OVER, store=path, **PLAIN).load()
     assert sum(searched) == 64 - known
     xarray.testing.assert_equal(again.drop_attrs(), swept.drop_attrs())

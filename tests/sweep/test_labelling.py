@@ -144,7 +144,7 @@ def test_starts_just_within_the_radius_converge(simplest, seed):
         states = type(gait.state)(np.zeros(16), *points.T)
         # Without a gait to compare with, all of 30 footsteps are walked.
         walked = gaitless(labelling.scene, gait.state, footsteps=30)
-        walked = jb.Labelling(walked.scene, walked.family, walked.effort._replace(gap=0.0))
+        walked = jb.Labelling(walked.scene, walked.family, walked.effort._replace(gap_share=0.0))
         final = walked(states)
         assert np.all(final.footsteps == 30)
         assert np.all(gait.distance(final.final) < 1e-2 * gait.radius)
