@@ -40,13 +40,7 @@ def relabel_doubtful(
     In doubt is what a ten times looser tolerance or another method of steps labels otherwise, and
     what grazes the ground: whether there was a contact may decide. It is solved by both methods at
     ten times finer tolerances, until all four labels of two tolerances in a row agree; where they
-    never do the doubt remains.
-
-    Args:
-        follow: labels starts with an effort.
-        count: how many starts.
-        effort: of the first solve.
-        scene: the walker.
+    never do the doubt remains. The effort is that of the first solve.
     """
     every = np.arange(count)
     first, other = follow(every, effort), follow(every, _by_other_method(effort))

@@ -52,11 +52,11 @@ class GaitGrid:
         self._written, self._pause = time.monotonic(), _PAUSE
 
     def is_done(self, place: tuple[int, ...]) -> bool:
-        """Whether a point is known, with a gait or without."""
+        """Whether it is known what a point has, a gait or none."""
         return bool(self._dataset[_DONE].data[place])
 
     def is_stable(self, place: tuple[int, ...]) -> bool:
-        """Whether a stable gait was found at a point."""
+        """Whether a point has a stable gait."""
         return bool(self._dataset["spectral_radius"].data[place] < 1.0)
 
     def states(self) -> np.ndarray:
@@ -133,16 +133,13 @@ def open_gait_grid(
     *,
     any_version: bool,
 ) -> GaitGrid:
-    """A grid without results, or what a store holds of it.
+    """A grid without results, or what a store holds of it; see `continue_store`.
 
     Args:
         first: any gait of the sweep, for the shapes.
-        values: of the swept parameters.
-        units: SI units of these.
-        settings: all that the results depend on; those of a store that is there must be equal.
-        writer: what writes.
+        values, units: of the swept parameters.
+        settings, writer, any_version: as there.
         path: of the store; None for one in memory.
-        any_version: whether a store may have been written by another version.
     """
     state = type(first.measures.state)
     dataset = _empty(first, values, units).assign_attrs({**writer, SETTINGS: strict_json(settings)})

@@ -150,17 +150,13 @@ def find_each(
     state: type,
     options: Mapping[str, Any],
 ) -> Iterator[tuple[slice, Gait]]:
-    """The gaits that Newton's method comes to, part by part, by lanes.
+    """The gaits that lanes come to, batch by batch: which of the n, and these with a first axis.
 
     Args:
         scene: the walker.
         values: of the parameters that differ, shape (n,) each.
-        starts: states without hip_x, shape (n, m).
-        state: their type.
-        options: those of `find_gait`.
-
-    Yields:
-        Which of the n, and their gaits, every array of NumPy with a first axis; no orbits.
+        starts: states without hip_x, shape (n, m), of the type `state`.
+        options: those of `find_gait`. Gaits have no orbits.
     """
     count, first = len(starts), 0
     scene = jtu.tree_map(as_float, scene)

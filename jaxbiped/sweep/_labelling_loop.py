@@ -200,14 +200,10 @@ class CompliantLabelling:
             pairs = zip(_with_leg_names(True, state), _with_leg_names(False, state), strict=True)
             return type(state)(*[jnp.where(first, a, b) for a, b in pairs])
 
-        def on_section() -> ArrivalHistory:
-            def value(time: Scalar) -> Scalar:
-                return section.value(scene, at(time))
+        def on_section() -> State:
+            return at(arrival_time(lambda time: section.value(scene, at(time)), last.t, after.t))
 
-            time = arrival_time(value, last.t, after.t)
-            return _after_arrival(start, now, at(time), self.cycles)
-
-        return _trace_or(arrives, on_section, now.trace)
+        return _after_arrival(start, now, arrives, on_section, self.cycles)
 
 
 class RigidLabelling:
@@ -232,11 +228,7 @@ class RigidLabelling:
         after, over = attempt_step(
             start.solve, now.solve, embedded=self.embedded, lands_on_falls=False
         )
-
-        def on_section() -> ArrivalHistory:
-            return _after_arrival(start, now, after.state, self.cycles)
-
-        trace = _trace_or(after.struck, on_section, now.trace)
+        trace = _after_arrival(start, now, after.struck, lambda: after.state, self.cycles)
         strike = jnp.where(after.struck, after.t, now.strike)
         late = after.t - strike > start.patience
         verdict = jnp.where(late, int(Label.TIMED_OUT), trace.verdict)
@@ -275,24 +267,23 @@ def _outcome(trace: ArrivalHistory, *, code: Scalar, **walked: Any) -> Labelled:
     return Labelled(**certain, **walked)
 
 
-def _trace_or(
-    condition: Scalar, make: Callable[[], ArrivalHistory], old: ArrivalHistory
+def _after_arrival(
+    start: Start,
+    now: Progress,
+    arrives: Scalar,
+    state: Callable[[], PyTree],
+    cycles: tuple[int, ...],
 ) -> ArrivalHistory:
-    """A new trace where the condition holds; made only if it does in any start of the batch."""
+    """The trace after an arrival, if there is one; made only if any start of the batch has one."""
+    old = now.trace
 
     def made() -> ArrivalHistory:
-        return select(condition, make(), old)
+        recurring = tuple(state()[1:])
+        new = after_arrival(old, recurring, start.goals, cycles, start.gap, start.solve.rtol)
+        return select(arrives, new, old)
 
-    trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(condition), made, lambda: old)
+    trace: ArrivalHistory = jax.lax.cond(eqxi.unvmap_any(arrives), made, lambda: old)
     return trace
-
-
-def _after_arrival(
-    start: Start, now: Progress, state: PyTree, cycles: tuple[int, ...]
-) -> ArrivalHistory:
-    """After an arrival in this state, its place along the slope left out."""
-    recurring = tuple(state[1:])
-    return after_arrival(now.trace, recurring, start.goals, cycles, start.gap, start.solve.rtol)
 
 
 def _with_leg_names(exchanged: bool, state: PyTree) -> PyTree:

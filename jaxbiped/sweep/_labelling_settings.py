@@ -79,11 +79,7 @@ def effort_of(
     max_solver_steps: int = 65536,
     engine: str = "auto",
 ) -> Effort:
-    """How to follow starts, from what a user says.
-
-    Raises:
-        ArgumentError: an argument that is not allowed.
-    """
+    """How to follow starts, from the arguments of `labelling`; raises `ArgumentError`."""
     scene = check_scene(scene, Scene, RigidScene)
     check_whole("footsteps", footsteps, 1)
     check_whole("max_solver_steps", max_solver_steps, 1)

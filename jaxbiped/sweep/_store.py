@@ -110,11 +110,7 @@ class Store:
         return np.flatnonzero(self._done < mark)
 
     def write(self, chunk: int, fields: Mapping[str, np.ndarray], *, mark: int = COMPLETE) -> None:
-        """Writes a chunk, then marks how far it is.
-
-        Raises:
-            ResourceError: it cannot be written; what was written before stays.
-        """
+        """Writes a chunk, then marks how far it is; raises as `writing`."""
         region, shape = self.layout.region(chunk), self.layout.shape_of(chunk)
         with contextlib.nullcontext() if self.path is None else writing(self.path):
             if self._done[chunk]:
@@ -136,11 +132,7 @@ class Store:
         return {name: np.array(self._data[name][region]).ravel() for name in names}
 
     def note(self, attributes: Mapping[str, str | float]) -> None:
-        """Sets attributes.
-
-        Raises:
-            ResourceError: they cannot be written.
-        """
+        """Sets attributes; raises as `writing`."""
         if self.path is None:
             self._data.attrs.update(attributes)
         else:

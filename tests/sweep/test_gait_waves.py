@@ -95,14 +95,6 @@ def test_what_a_wave_misses_its_neighbours_find(swept, monkeypatch):
     np.testing.assert_allclose(again.period, swept.period, rtol=1e-6)
 
 
-def test_where_there_is_no_gait_the_branch_end_is_told():
-    over = {"slope": np.array([0.006, *np.linspace(0.015, 0.03, 64)])}
-    found = jb.gait_sweep(jb.seed_scene(), over, **PLAIN)
-    assert int(found.branch_end[0]) == int(jb.gait.BranchEnd.FOLD)
-    assert np.isnan(float(found.period[0]))
-    assert np.all(found.spectral_radius[1:] < 1.0)
-
-
 def test_gaits_of_a_batch_that_graze_are_told(tmp_path):
     """At that damping the foot that strikes rebounds until it all but leaves the ground."""
     grazing, path = 152234.28, tmp_path / "gaits"
@@ -116,9 +108,11 @@ def test_gaits_of_a_batch_that_graze_are_told(tmp_path):
         jb.gait_sweep(jb.seed_scene(), over, store=path, **PLAIN)  # all of it known
 
 
-def test_a_store_that_kept_less_is_refused(tmp_path):
+def test_a_store_of_another_sweep_or_that_kept_less_is_refused(tmp_path):
     path, over = tmp_path / "gaits", {"slope": [0.02]}
     jb.gait_sweep(jb.seed_scene(), over, store=path, **PLAIN)
+    with pytest.raises(jb.ArgumentError, match="other settings"):
+        jb.gait_sweep(jb.seed_scene(), {"slope": [0.021]}, store=path, **PLAIN)
     shutil.rmtree(path / "grazes")
     consolidate(path)
     with pytest.raises(jb.ArgumentError, match="kept no grazes"):

@@ -71,6 +71,18 @@ def test_a_sample_is_the_same_whichever_chunk_it_is_made_in(method, seed, cuts):
     assert not np.array_equal(other.columns["hip_vx"], whole.columns["hip_vx"])
 
 
+@pytest.mark.parametrize("method", jb.starts.SAMPLINGS)
+def test_samples_fill_their_bounds(method):
+    batch = jb.starts.sample(SCENE, BOUNDS, 256, method=method).batch(LABELLING, 0, 256)
+    for name, (low, high) in BOUNDS.items():
+        column = batch.columns[name]
+        assert column.min() < low + 0.02 * (high - low)
+        assert high - 0.02 * (high - low) < column.max()
+    leaves = batch.states.theta_2, batch.states.omega_2, batch.states.hip_vx
+    for leaf, name in zip(leaves, BOUNDS, strict=True):
+        np.testing.assert_array_equal(leaf, batch.columns[name])
+
+
 def test_low_discrepancy_samples_fill_every_slice():
     numbers = np.arange(64)
     for method in ("sobol", "latin-hypercube"):
