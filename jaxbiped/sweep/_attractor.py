@@ -23,8 +23,7 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._units import sizes_of
 from jaxbiped.sweep._convergence_test import Goals
-from jaxbiped.sweep._follow_starts import broadcast_leaves, follow_starts
-from jaxbiped.sweep._labelling_settings import Effort
+from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts
 from jaxbiped.variational._hybrid_system import section_of
 
 _SHELLS = 1e-5 * 1.5 ** np.arange(30)

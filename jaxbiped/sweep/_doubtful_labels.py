@@ -16,8 +16,8 @@ from jaxbiped.solve._accuracy import resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
+from jaxbiped.sweep._follow_starts import Effort
 from jaxbiped.sweep._labelling_loop import Labelled
-from jaxbiped.sweep._labelling_settings import Effort
 
 _FINER = 10.0
 """From one tolerance to the next."""

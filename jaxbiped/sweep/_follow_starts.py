@@ -1,6 +1,6 @@
 """Following of starts until the label of each is certain, by any engine."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax.tree_util as jtu
 import numpy as np
@@ -9,7 +9,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import as_float
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
-from jaxbiped.compiler import Program, Request
+from jaxbiped.compiler import DEVICES, Program, Request
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._adaptive_program import Solve
 from jaxbiped.solve._engine_names import engine_named
@@ -19,8 +19,9 @@ from jaxbiped.solve.controllers._first_and_last_step import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.sweep._convergence_test import Goals
 from jaxbiped.sweep._labelling_loop import CompliantLabelling, Labelled, RigidLabelling, Start
-from jaxbiped.sweep._labelling_settings import Effort
 
+_GAP = 1e-4
+"""Gap between states that repeat each other, at least."""
 _LONGEST = 1e6
 """Simulated time [s] that no start takes: its footsteps or its patience end it before."""
 _PATIENCE = 50.0
@@ -34,6 +35,47 @@ _WHOLE: dict[str, type] = dict(
     grazes=np.int32,
 )
 """Types of the fields of `Labelled` that hold whole numbers."""
+
+
+class Effort(NamedTuple):
+    """How starts are followed. All hashable.
+
+    Attributes:
+        rtol: relative tolerance; the absolute one is a hundredth of it in the scene's units.
+        footsteps: after which a start that is not certain is given up.
+        max_attempts: cap on the solver's attempted steps.
+        gap_share: the gap in units of the tolerance; 0 where recurrences are not looked for.
+        solver: of the compliant walker.
+        engine: "lanes", "cuda" or "xla".
+        may_move: whether large batches go from lanes to a CUDA device where there is one.
+        wanted: share of the labels that may be wrong; None where the tolerance decides.
+        embedded: whether the rigid walker steps by the embedded method; see `rolling_step`.
+    """
+
+    rtol: float
+    footsteps: int
+    max_attempts: int
+    gap_share: float
+    solver: AbstractRosenbrock
+    engine: str
+    wanted: float | None = None
+    embedded: bool = False
+    may_move: bool = False
+
+    @property
+    def gap(self) -> float:
+        """Between states that repeat each other; see `after_arrival`."""
+        return max(_GAP, self.gap_share * self.rtol) if self.gap_share else 0.0
+
+    @property
+    def may_use_device(self) -> bool:
+        """Whether a CUDA device may follow them."""
+        moves = self.may_move and self.engine == "lanes" and DEVICES.hindrance() is None
+        return moves or self.engine == "cuda"
+
+    def engine_of(self, count: int) -> str:
+        """The engine that follows `count` starts: large batches go where a device is kept busy."""
+        return "cuda" if self.may_use_device and DEVICES.fills(count) else self.engine
 
 
 def follow_starts(

@@ -21,8 +21,7 @@ from jaxbiped.sweep._attractor import (
     with_radius,
 )
 from jaxbiped.sweep._convergence_test import NO_GAIT, Goals
-from jaxbiped.sweep._follow_starts import broadcast_leaves
-from jaxbiped.sweep._labelling_settings import Effort
+from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves
 
 _SAME = 1e-5
 """Distance in the components' sizes up to which two states on the section are of one gait, where
@@ -161,23 +160,24 @@ def find_family(
     grids = np.meshgrid(*[np.asarray(parameters[name], float) for name in names], indexing="ij")
     table = np.stack([grid.ravel() for grid in grids], axis=1) if names else np.zeros((1, 0))
     spans = np.where(np.ptp(table, axis=0) > 0.0, np.ptp(table, axis=0), 1.0)
+    scenes = [scene_with(scene, names, values) for values in table]
     rows: list[tuple[Attractor, ...]] = [()] * len(table)
-
-    def near(k: int) -> list[PyTree]:
-        """The state of the nearest gait that is known."""
-        known = [j for j, row in enumerate(rows) if row]
-        off = [float(np.linalg.norm((table[j] - table[k]) / spans)) for j in known]
-        return [rows[known[int(np.argmin(off))]][0].state] if known else []
-
     # Forward, then back: a gait may be found from one side only.
     for k in [*range(len(table)), *reversed(range(len(table)))]:
         if not rows[k]:
-            own = scene_with(scene, names, table[k])
-            guesses = [*(near(k) or [guess]), None]
-            rows[k] = tuple(
-                with_radius(own, gait, effort) for gait in _stable_gaits(own, guesses, 1)
-            )
-    return _family(scene, names, table, tuple(rows), guess)
+            known = [j for j, row in enumerate(rows) if row]
+            off = [np.linalg.norm((table[j] - table[k]) / spans) for j in known]
+            near = rows[known[int(np.argmin(off))]][0].state if known else guess
+            found = _stable_gaits(scenes[k], [near, None], 1)
+            rows[k] = tuple(with_radius(scenes[k], gait, effort) for gait in found)
+    known = [k for k, row in enumerate(rows) if row]
+    states = []
+    for k in range(len(table)):
+        next_ = min(known, key=lambda j, k=k: (abs(j - k), j)) if known else None
+        state = guess if next_ is None else rows[next_][0].state
+        states.append(jtu.tree_map(np.asarray, state))
+    scales = [component_scales(own, state) for own, state in zip(scenes, states, strict=True)]
+    return Family(names, table, tuple(rows), tuple(states), np.stack(scales))
 
 
 def with_gaits(
@@ -230,23 +230,6 @@ def _stable_gaits(
         if bool(gait.stable):
             return (attractor_without_radius(scene, gait),)
     return ()
-
-
-def _family(
-    scene: Scene | RigidScene,
-    names: tuple[str, ...],
-    table: np.ndarray,
-    rows: tuple[tuple[Attractor, ...], ...],
-    guess: PyTree,
-) -> Family:
-    known = [k for k, row in enumerate(rows) if row]
-    states, scales = [], []
-    for k, values in enumerate(table):
-        near = min(known, key=lambda j: (abs(j - k), j)) if known else None
-        state = guess if near is None else rows[near][0].state
-        states.append(jtu.tree_map(np.asarray, state))
-        scales.append(component_scales(scene_with(scene, names, values), state))
-    return Family(names, table, rows, tuple(states), np.stack(scales))
 
 
 def _is_same_orbit(a: Attractor, b: Attractor, scales: np.ndarray) -> bool:

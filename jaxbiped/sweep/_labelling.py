@@ -19,10 +19,9 @@ from jaxbiped.scene._parameter_access import scene_identity, with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._doubtful_labels import relabel_doubtful
-from jaxbiped.sweep._follow_starts import broadcast_leaves, follow_starts
+from jaxbiped.sweep._follow_starts import Effort, broadcast_leaves, follow_starts
 from jaxbiped.sweep._gait_family import Family
 from jaxbiped.sweep._labelling_loop import Labelled
-from jaxbiped.sweep._labelling_settings import Effort
 
 
 class Labelling(eqx.Module):

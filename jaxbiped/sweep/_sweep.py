@@ -18,12 +18,12 @@ from jaxbiped.basins._label_errors import ERRORS, LabelErrors, Seen, estimate_la
 from jaxbiped.basins._labels import Doubt, Label, Witness
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import (
+    FINEST_FIRST,
     Guesses,
     guesses_among,
     with_gaits_met,
     with_guesses,
 )
-from jaxbiped.sweep._labelling_settings import FINEST_FIRST
 from jaxbiped.sweep._store import ALL_GAITS, Store
 from jaxbiped.sweep._store_files import GAITS, check_continued, check_store, is_new, writing
 from jaxbiped.sweep._stored_fields import DOUBT_FIELDS, Layout, fields_of

@@ -7,7 +7,7 @@ import numpy as np
 
 import jaxbiped as jb
 from jaxbiped.sweep._attractor import component_scales
-from jaxbiped.sweep._labelling_settings import effort_of
+from jaxbiped.sweep._labelling_preparation import effort_of
 from jaxbiped.sweep._store import Store
 
 
