@@ -117,8 +117,8 @@ def minimal_fatal_shock(
     rays = first_exits(around, ways, marks)
     rays = rays.take(np.isfinite(rays.outside))
     if not rays.inside.size:
-        nothing = np.full((1, around.origin.size), np.nan), *[np.array([np.inf])] * 2
-        rays = Brackets(*nothing, np.array([around.label]))
+        nowhere, far = np.full((1, around.origin.size), np.nan), np.array([np.inf])
+        rays = Brackets(nowhere, far, far, np.array([around.label]))
         return _result(around, rays, np.array([np.nan]), np.inf, tolerance)
     rays = _nearest(around, rays, max(improved, 1), tolerance)
     bisected = float(rays.outside.min())

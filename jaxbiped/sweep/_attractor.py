@@ -196,9 +196,8 @@ def _draws_in(
     # Followed wherever they go: the linear model decides nothing.
     nothing = np.full_like(attractor.model, np.inf)
     aim = attractor._replace(model=nothing, contraction=1.0, radius=-1.0)
-    goals = Goals(
-        *[np.stack([each]) for each in aim.goal], component_scales(scene, attractor.state)
-    )
+    scales = component_scales(scene, attractor.state)
+    goals = Goals(*[*(np.stack([each]) for each in aim.goal), scales])
     strikes = cycles * attractor.cycle_footsteps + (1 if scene.compliant else 0)
     found = follow_starts(
         broadcast_leaves(scene, count),

@@ -92,7 +92,8 @@ def follow_starts(
     if not count:
         none = np.zeros(0)
         final: Any = (none,) * (len(states) - 1)
-        return _as_arrays(Labelled(*[none] * 9, final, grazes=none if counted else None))
+        plain = Labelled(*[*[none] * 9, final])
+        return _as_arrays(plain._replace(grazes=none if counted else None))
 
     def same(value: npt.ArrayLike) -> np.ndarray:
         return np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
@@ -142,13 +143,12 @@ def _program(
 
 def _as_arrays(found: Labelled) -> Labelled:
     """Of an engine's outputs, columns of the right types."""
-    columns = found._replace(final=np.stack(found.final, axis=1))._asdict()
-    return Labelled(
-        **{
-            name: None if column is None else column.astype(_WHOLE.get(name, float), copy=False)
-            for name, column in columns.items()
-        }
-    )
+    columns = found._replace(final=np.stack(list(found.final), axis=1))._asdict()
+    arrays: dict[str, Any] = {
+        name: None if column is None else column.astype(_WHOLE.get(name, float), copy=False)
+        for name, column in columns.items()
+    }
+    return Labelled(**arrays)
 
 
 def broadcast_leaves(tree: PyTree, count: int) -> PyTree:

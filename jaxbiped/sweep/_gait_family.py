@@ -131,12 +131,12 @@ class Family(NamedTuple):
     def _goals_of(self, k: int, cycles: tuple[int, ...]) -> Goals:
         m = self.scales.shape[1]
         shapes = (m,), (m - 1, m), (m - 1, m - 1), (2, m), ()
-        none = (*map(np.zeros, shapes), NO_GAIT)
-        entries: list[tuple[npt.ArrayLike, ...]] = [none] * len(cycles)
+        none: tuple[npt.ArrayLike, ...] = (*map(np.zeros, shapes), NO_GAIT)
+        entries = [none] * len(cycles)
         own = tuple(gait.cycle_footsteps for gait in self.rows[k])
         for place, gait in zip(_places(own, cycles), self.rows[k], strict=True):
             entries[place] = gait.goal
-        return Goals(*map(np.stack, zip(*entries, strict=True)), self.scales[k])
+        return Goals(*[*map(np.stack, zip(*entries, strict=True)), self.scales[k]])
 
 
 def _places(own: tuple[int, ...], room: tuple[int, ...]) -> list[int]:
@@ -173,8 +173,8 @@ def find_family(
     known = [k for k, row in enumerate(rows) if row]
     states = []
     for k in range(len(table)):
-        next_ = min(known, key=lambda j, k=k: (abs(j - k), j)) if known else None
-        state = guess if next_ is None else rows[next_][0].state
+        off_rows = [(abs(j - k), j) for j in known]
+        state = rows[min(off_rows)[1]][0].state if known else guess
         states.append(jtu.tree_map(np.asarray, state))
     scales = [component_scales(own, state) for own, state in zip(scenes, states, strict=True)]
     return Family(names, table, tuple(rows), tuple(states), np.stack(scales))

@@ -88,8 +88,8 @@ class GaitWaves:
             return
         for part, gaits in self._find_from(places, guesses):
             stable, here = np.asarray(gaits.stable), places[part]
-            self._keep([here[k] for k in np.flatnonzero(stable)], _rows(gaits, stable))
-            for k in np.flatnonzero(~stable):
+            self._keep([here[k] for k in map(int, np.flatnonzero(stable))], _rows(gaits, stable))
+            for k in map(int, np.flatnonzero(~stable)):
                 self._doubt(here[k], _rows(gaits, k))
 
     def _keep(self, places: Sequence[Place], gaits: Gait) -> None:

@@ -16,10 +16,10 @@ from jaxbiped._identity import provenance
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label_errors import ERRORS, LabelErrors, Seen, estimate_label_errors
 from jaxbiped.basins._labels import Doubt, Label, Witness
+from jaxbiped.sweep._gait_family import Guesses
 from jaxbiped.sweep._labelling import Labelling
 from jaxbiped.sweep._labelling_preparation import (
     FINEST_FIRST,
-    Guesses,
     guesses_among,
     with_gaits_met,
     with_guesses,

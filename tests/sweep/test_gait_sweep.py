@@ -39,18 +39,3 @@ def test_elasticities_promise_the_neighbour(swept):
     slopes = at.elasticity_period.sel(parameter="K").data
     promised = 0.5 * (slopes[0] + slopes[1]) * np.log(1.1)
     assert np.log(at.period.data[1] / at.period.data[0]) == pytest.approx(promised, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("over", "named"),
-    [
-        ({}, "over"),
-        ({"stiffness": [1.0]}, "stiffness"),
-        ({"K": []}, "K"),
-        ({"K": [-1.0]}, "K"),
-        ({"K": [[1.0]]}, "K"),
-    ],
-)
-def test_bad_arguments(over, named):
-    with pytest.raises(jb.ArgumentError, match=named):
-        jb.gait_sweep(jb.seed_scene(), over)

@@ -260,46 +260,6 @@ def test_gaits_are_those_of_each_parameter(simplest):
     assert np.all(sampled.cycle_footsteps == 1)
 
 
-def _states(*shapes):
-    return jb.State(*[np.zeros(shape) for shape in shapes])
-
-
-@pytest.mark.parametrize(
-    ("call", "reason"),
-    [
-        (lambda it: jb.labelling(it.scene, footsteps=0), "footsteps = 0 .* whole number"),
-        (lambda it: jb.labelling(it.scene, footsteps=2.5), "footsteps = 2.5 .* whole number"),
-        (lambda it: jb.labelling(it.scene, accuracy="best"), "accuracy = 'best' .* draft"),
-        (lambda it: jb.labelling(it.scene, rtol=-1.0), "rtol = -1 .* above 0"),
-        (lambda it: jb.labelling(it.scene, engine="gpu"), "engine = 'gpu'"),
-        (lambda it: jb.labelling(it.scene, solver="kvaerno3"), "rodas3p to rodas5p"),
-        (lambda it: jb.labelling("walker"), "scene = 'walker' .* Scene"),
-        (lambda it: jb.labelling(it.scene, parameters={"hip_vx": [1.0]}), "'hip_vx' is not known"),
-        (lambda it: jb.labelling(it.scene, parameters={"K": [1e6, -1.0]}), "K = -1 .* above 0"),
-        (lambda it: jb.labelling(it.scene, parameters={"K": []}), r"K has values of shape \(0,\)"),
-        (lambda it: jb.labelling(it.scene, parameters={"K": [np.nan]}), "K = nan"),
-        (lambda it: it(simplest_state(*STABLE)), "states = .* must be a State"),
-        (lambda it: it(_states(*[2] * 7, 3)), r"states has leaves of shapes \[\(2,\), \(3,\)\]"),
-        (lambda it: it(jb.seed_state()), r"all of them must be \(n,\)"),
-        (lambda it: it(_states(*[2] * 8), parameters={"K": [1e6]}), r"parameters\['K'\] has shape"),
-        (lambda it: it(_states(*[1] * 8), parameters={"K": [-1.0]}), "K = -1"),
-        (lambda it: it(_states(*[1] * 8), parameters={"k": [1.0]}), "parameter = 'k' is not"),
-        (
-            lambda it: jb.sweep(it, jb.starts.grid(it.scene, {"hip_vx": [0.5]}), chunk=0),
-            "chunk = 0",
-        ),
-        (lambda it: jb.sweep(it, [1.0]), "starts = .* AbstractStarts"),
-        (lambda it: jb.sweep(it, jb.starts.GivenStarts(_states(*[0] * 8))), "starts is empty"),
-        (lambda it: jb.with_gaits_met(it, None, count=0), "count = 0"),
-    ],
-)  # fmt: skip
-def test_bad_input_is_refused_in_one_sentence(call, reason):
-    labelling = gaitless(jb.seed_scene(), jb.seed_state())
-    with pytest.raises(jb.ArgumentError, match=reason) as raised:
-        call(labelling)
-    assert str(raised.value).endswith(".")
-
-
 def test_bristles_start_straight():
     seed = jb.seed_scene()
     scene = jb.Scene(

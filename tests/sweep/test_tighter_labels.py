@@ -61,17 +61,3 @@ def test_all_starts_are_labelled_again_where_too_many_may_be_wrong(tmp_path, mon
     same_results(jb.sweep(LABELLING, STARTS, store=path, chunk=8), whole)
     with pytest.raises(jb.ArgumentError, match="made with other settings"):
         jb.sweep(gaitless(SCENE, simplest_state(*STABLE), accuracy="draft"), STARTS, store=path)
-
-
-@pytest.mark.parametrize(
-    ("how", "words"),
-    [
-        (dict(accuracy=0.0), "accuracy = 0 is not allowed"),
-        (dict(accuracy=2.0), "accuracy = 2 is not allowed: it is the share of the labels"),
-        (dict(accuracy=1e-3, rtol=1e-6), "rtol = 1e-06 is not allowed beside accuracy = 0.001"),
-        (dict(accuracy="fine"), "accuracy = 'fine' is not known: choose one of draft"),
-    ],
-)
-def test_bad_accuracies_cost_one_sentence(how, words):
-    with pytest.raises(jb.ArgumentError, match=words):
-        jb.labelling(SCENE, **how)
