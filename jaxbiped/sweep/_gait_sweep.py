@@ -14,7 +14,6 @@ from jaxtyping import PyTree
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._files import user_path
 from jaxbiped._identity import provenance
 from jaxbiped._types import as_float
 from jaxbiped.caching._cached_jit import cached_jit
@@ -31,7 +30,7 @@ from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.sweep._gait_grid import open_gait_grid
 from jaxbiped.sweep._gait_waves import GaitWaves
 from jaxbiped.sweep._grid_waves import LARGE, Place
-from jaxbiped.sweep._store_files import check_store
+from jaxbiped.sweep._store_files import store_path
 from jaxbiped.sweep.starts._coordinates import parameter_axes
 
 if TYPE_CHECKING:
@@ -89,10 +88,7 @@ def gait_sweep(
     """
     scene = check_scene(scene, Scene, RigidScene, RedundantScene)
     values = _check_values(scene, over)
-    path = None if store is None else user_path(store, "store")
-    if path is not None:
-        check_store(path)
-        path = path.absolute()
+    path = store_path(store)
     options: dict[str, Any] = dict(
         parameters=parameters,
         footsteps=footsteps,

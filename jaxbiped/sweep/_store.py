@@ -84,9 +84,8 @@ class Store:
         names = [name for name in map(str, self._data.array_keys()) if name not in known]
         lost = 0
         for chunk in map(int, np.flatnonzero(self._done)):
-            cuts = zip(self.layout.region(chunk), self.layout.chunk_shape, strict=True)
-            places = [part.start // size for part, size in cuts]
-            files = [self.path.joinpath(name, "c", *map(str, places)) for name in names]
+            place = [str(k) for k in self.layout.place(chunk)]
+            files = [self.path.joinpath(name, "c", *place) for name in names]
             whole = all(file.exists() for file in files)
             try:
                 self.read(chunk, tuple(names) if whole else ())

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped._files import failure_kind, strict_json
+from jaxbiped._files import failure_kind, strict_json, user_path
 from jaxbiped._identity import DECISIVE, difference_of
 from jaxbiped._types import JsonObject
 from jaxbiped.caching._disk_cache import ABANDONED
@@ -113,6 +113,15 @@ def _is_close(old: Any, new: Any, name: str) -> bool:
     numbers = isinstance(old, float) and isinstance(new, float)
     own = name.startswith("gaits")
     return numbers and own and abs(old - new) <= _CLOSE * max(1e-3, abs(old))
+
+
+def store_path(store: str | Path | None) -> Path | None:
+    """The path that a user gives for a store, None for one in memory; raises as `check_store`."""
+    if store is None:
+        return None
+    path = user_path(store, "store")
+    check_store(path)
+    return path.absolute()
 
 
 def check_store(path: Path) -> None:

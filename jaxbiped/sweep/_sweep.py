@@ -11,7 +11,6 @@ import numpy as np
 from tqdm import tqdm
 
 from jaxbiped._checks import ArgumentError, check_type
-from jaxbiped._files import user_path
 from jaxbiped._identity import provenance
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._label_errors import ERRORS, LabelErrors, Seen, estimate_label_errors
@@ -25,7 +24,7 @@ from jaxbiped.sweep._labelling_preparation import (
     with_guesses,
 )
 from jaxbiped.sweep._store import ALL_GAITS, Store
-from jaxbiped.sweep._store_files import GAITS, check_continued, check_store, is_new, writing
+from jaxbiped.sweep._store_files import GAITS, check_continued, is_new, store_path, writing
 from jaxbiped.sweep._stored_fields import DOUBT_FIELDS, Layout, fields_of
 from jaxbiped.sweep._workers import compute_chunks
 from jaxbiped.sweep.starts._coordinates import coordinate_quantities
@@ -96,10 +95,7 @@ def sweep(
     check_whole("workers", workers, 1)
     if not starts.size:
         raise ArgumentError("starts is empty: give at least one.")
-    path = None if store is None else user_path(store, "store")
-    if path is not None:
-        check_store(path)
-        path = path.absolute()
+    path = store_path(store)
     began = time.perf_counter()
     quantities = coordinate_quantities(labelling.scene)
     units = {name: quantity.unit for name, quantity in quantities.items()}
