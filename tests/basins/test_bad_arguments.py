@@ -1,4 +1,4 @@
-"""Arguments that the analyses of basins refuse: one sentence names each."""
+"""Refused arguments of the analyses of basins, against the words that name each."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Arguments that sweeps, labellings and starts refuse: one sentence names each."""
+"""Refused arguments of sweeps, labellings and starts, against the sentence that names each."""
 
 import numpy as np
 import pytest
