@@ -21,7 +21,7 @@ from jaxbiped.sweep._convergence_test import Goals
 from jaxbiped.sweep._labelling_loop import CompliantLabelling, Labelled, RigidLabelling, Start
 
 _GAP = 1e-4
-"""Gap between states that repeat each other, at least."""
+"""Gap between states that repeat each other, at least; see `after_arrival`."""
 _LONGEST = 1e6
 """Simulated time [s] that no start takes: its footsteps or its patience end it before."""
 _PATIENCE = 50.0

@@ -63,8 +63,8 @@ def gait_sweep(
     searched without a guess, and stable gaits that this finds lead on to their neighbours'.
 
     By lanes a grid of 64 points or more is searched in waves, all points of a wave at once: a
-    coarse lattice from its middle outwards, then each finer one from interpolated states. Points
-    of these are searched without a guess only where there is no gait.
+    coarse lattice from its middle outwards, then each finer one from interpolated states. Points of
+    the finer lattices are searched without a guess only where there is no gait.
 
     Args:
         scene: the walker; parameters that are not swept keep its values.

@@ -28,10 +28,9 @@ _ALIKE = 0.05
 """Distance of two starts' last states, in the components' scales, that count as one guess."""
 _MOST_GUESSES = 8
 """Of one cycle length for one combination of parameters."""
-
 _GAP_SHARE = {True: 30.0, False: 3.0}
-"""The same in units of the tolerance, compliant or not: rolling errs by less, and slow transients
-past an unstable gait move by as little as a wider gap."""
+"""Gap between states that repeat each other in units of the tolerance, compliant or not: rolling
+errs by less, and slow transients past an unstable gait move by as little as a wider gap."""
 _FIRST = 3e-3
 """First tolerance as a share of the accuracy wanted, at most that of "draft": of 100,000 labels of
 the seed's slice 37 were wrong and not in doubt at 1e-5 by Rodas4, and 11 at 1e-6."""
@@ -90,11 +89,10 @@ def labelling(
     family = find_family(scene, effort, parameters=values, guess=start)
     missing = sum(not row for row in family.rows)
     if missing:
-        all_ = f"{missing} of {len(family.rows)} combinations of the parameters"
-        of = f" for {all_}" if values else ""
+        of = f" for {missing} of {len(family.rows)} combinations of the parameters"
         warnings.warn(
-            f"no stable gait was found{of}: what walks there is labelled unresolved until one is "
-            "met (see `with_gaits_met`).",
+            f"no stable gait was found{of if values else ''}: what walks there is labelled "
+            "unresolved until one is met (see `with_gaits_met`).",
             RuntimeWarning,
             stacklevel=2,
         )
