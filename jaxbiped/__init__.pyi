@@ -86,7 +86,7 @@ from jaxbiped.sweep._workers import local_executor as local_executor
 from jaxbiped.sweep._gait_family import Family as Family
 from jaxbiped.sweep._gait_sweep import gait_sweep as gait_sweep
 from jaxbiped.sweep._label_function import label_at as label_at
-from jaxbiped.sweep._follow_starts import Labelled as Labelled
+from jaxbiped.sweep._labelling_loop import Labelled as Labelled
 from jaxbiped.sweep._labelling import Labelling as Labelling
 from jaxbiped.sweep._nearest_failure import nearest_failure as nearest_failure
 from jaxbiped.sweep._labelling_preparation import labelling as labelling

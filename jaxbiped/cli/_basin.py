@@ -81,7 +81,7 @@ class Basin(Command):
     def run(self) -> int:
         """Runs the command; returns the exit code."""
         from jaxbiped.solve._accuracy import accuracy_told
-        from jaxbiped.sweep._labelling_settings import effort_of
+        from jaxbiped.sweep._labelling_preparation import effort_of
         from jaxbiped.sweep._store_files import check_store
 
         scene: Any = self.scene.scene()

@@ -6,7 +6,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.compiler import CUDA, LANES, XLA
 from jaxbiped.solve._engine_names import engine_for, engine_named
-from jaxbiped.sweep._labelling_settings import effort_of
+from jaxbiped.sweep._labelling_preparation import effort_of
 from tests.compiler.fake_driver import install
 
 SCENE, STATE = jb.seed_scene(), jb.seed_state()

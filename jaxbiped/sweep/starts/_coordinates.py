@@ -88,11 +88,7 @@ def axis_values(name: str, values: npt.ArrayLike) -> np.ndarray:
 def parameter_axes(
     scene: AbstractScene, given: Mapping[str, npt.ArrayLike], argument: str
 ) -> dict[str, np.ndarray]:
-    """`axis_values` of parameters by name, of an `argument` of that name.
-
-    Raises:
-        ArgumentError: what is no parameter of the scene, or values that it must not have.
-    """
+    """`axis_values` of parameters that the scene has and allows, of an `argument` of that name."""
     axes = {}
     for name, values in given.items():
         check_choice(argument, name, parameter_names(scene))
