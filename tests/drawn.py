@@ -48,6 +48,11 @@ def labels_of(figure):
     return found - {""}
 
 
+def legend_of(ax):
+    """The entries of an axes' legend, in words."""
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
 def points_of(ax, label=None):
     """Points (n, 2) of all lines of an axes in their order, or of those with a label."""
     lines = [line for line in ax.lines if label is None or line.get_label() == label]

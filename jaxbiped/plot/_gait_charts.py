@@ -11,15 +11,8 @@ from jaxbiped._quantity import Quantity
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._stability import Bifurcation
+from jaxbiped.plot import style
 from jaxbiped.plot._symbols import row_label
-from jaxbiped.plot.style import (
-    GROUND_COLOUR,
-    LEG_COLOURS,
-    SHADE_COLOUR,
-    axes_or_new,
-    figure_of,
-    new_figure,
-)
 
 _NEAR_ZERO = 0.03
 """Multipliers closer to zero than this are named together."""
@@ -53,14 +46,16 @@ def multipliers(gait: Gait, *, ax: Axes | None = None) -> Figure:
     """
     check_drawable(gait)
     values, errors = np.asarray(gait.multipliers), np.asarray(gait.multiplier_errors)
-    ax = axes_or_new(ax, 5.6, 5.6)
-    inside = Circle((0.0, 0.0), 1.0, facecolor="#F6F6F6", edgecolor=GROUND_COLOUR, zorder=0)
+    ax = style.axes_or_new(ax, 5.6, 5.6)
+    inside = Circle((0.0, 0.0), 1.0, facecolor="#F6F6F6", edgecolor=style.GROUND_COLOUR, zorder=0)
     ax.add_patch(inside)
     for value, error in zip(values, errors, strict=True):
         if error > _VISIBLE:
             place = (value.real, value.imag)
-            ax.add_patch(Circle(place, error, facecolor=LEG_COLOURS[1], alpha=0.25))
-    ax.plot(values.real, values.imag, "o", color=LEG_COLOURS[0], markersize=5, label="multipliers")
+            ax.add_patch(Circle(place, error, facecolor=style.LEG_COLOURS[1], alpha=0.25))
+    ax.plot(
+        values.real, values.imag, "o", color=style.LEG_COLOURS[0], markersize=5, label="multipliers"
+    )
     _name(ax, values)
     _frame(ax, max(1.0, float(np.max(np.abs(values) + errors))))
     largest = float(np.max(errors))
@@ -70,10 +65,10 @@ def multipliers(gait: Gait, *, ax: Axes | None = None) -> Figure:
         f"largest error {largest:.1e}" + ("" if largest > _VISIBLE else ": within the dots"),
         transform=ax.transAxes,
         fontsize="small",
-        color=GROUND_COLOUR,
+        color=style.GROUND_COLOUR,
     )
     ax.set_title(_title(gait), loc="left", fontsize="medium")
-    return figure_of(ax)
+    return style.figure_of(ax)
 
 
 def _title(gait: Gait) -> str:
@@ -86,8 +81,8 @@ def _title(gait: Gait) -> str:
 
 def _frame(ax: Axes, reach: float) -> None:
     """Equal scales, both axes through zero, room for the names."""
-    ax.axhline(0.0, color=SHADE_COLOUR, linewidth=0.8, zorder=0.5)
-    ax.axvline(0.0, color=SHADE_COLOUR, linewidth=0.8, zorder=0.5)
+    ax.axhline(0.0, color=style.SHADE_COLOUR, linewidth=0.8, zorder=0.5)
+    ax.axvline(0.0, color=style.SHADE_COLOUR, linewidth=0.8, zorder=0.5)
     ax.set_aspect("equal")
     ax.set_xlim(-1.15 * reach, 1.15 * reach)
     ax.set_ylim(-1.15 * reach, 1.15 * reach)
@@ -180,7 +175,7 @@ def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -
     columns = min(len(names), 3)
     rows = -(-len(names) // columns)
     height = 1.3 + 0.2 * len(gait.parameters)
-    figure = new_figure(max(3.9 * columns, 4.6), height * rows)
+    figure = style.new_figure(max(3.9 * columns, 4.6), height * rows)
     panels = list(figure.subplots(rows, columns, squeeze=False).flat)
     values = {name: np.asarray(getattr(gait.elasticities, name)) for name in names}
     largest = max(float(np.max(np.abs(_finite(each)))) for each in values.values())
@@ -191,7 +186,7 @@ def elasticities(gait: Gait, measure: str | tuple[str, ...] = tuple(MEASURES)) -
     for ax in spare:
         ax.set_axis_off()
     if spare:
-        spare[0].text(0.0, 0.95, _READING, va="top", fontsize="small", color=GROUND_COLOUR)
+        spare[0].text(0.0, 0.95, _READING, va="top", fontsize="small", color=style.GROUND_COLOUR)
     return figure
 
 
@@ -207,9 +202,9 @@ def _panel(
     values = values[order]
     drawn = _finite(values)
     places = np.arange(len(values))
-    colours = [LEG_COLOURS[0] if value >= 0.0 else LEG_COLOURS[1] for value in drawn]
+    colours = [style.LEG_COLOURS[0] if value >= 0.0 else style.LEG_COLOURS[1] for value in drawn]
     ax.barh(places, drawn, color=colours, height=0.7)
-    ax.axvline(0.0, color=GROUND_COLOUR, linewidth=0.8)
+    ax.axvline(0.0, color=style.GROUND_COLOUR, linewidth=0.8)
     ax.set_yticks(places, [row_label(parameters[i]) for i in order], fontsize="small")
     ax.set_ylim(len(values) - 0.4, -0.6)
     _numbers(ax, places, values)
@@ -245,7 +240,7 @@ def _numbers(ax: Axes, places: np.ndarray, values: np.ndarray) -> None:
             transform=ax.get_yaxis_transform(),
             va="center",
             fontsize="x-small",
-            color=GROUND_COLOUR,
+            color=style.GROUND_COLOUR,
         )
 
 
