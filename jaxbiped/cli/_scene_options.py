@@ -19,7 +19,6 @@ from jaxbiped.cli._options import Check, Field, Options, among, one_of
 if TYPE_CHECKING:
     AnyScene = jb.Scene | jb.RigidScene | jb.RedundantScene
 
-_BODY = ("m", "J", "l", "d", "r", "hip_mass")
 MATCHED = {"normal": ("K", "c", "n"), "friction": ("mu_static", "mu_kinetic", "v0", "xi")}
 """Parameters that laws of each kind are matched to."""
 
@@ -186,9 +185,8 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
         return jb.RedundantScene(scene, method, self.orientation)
 
     def _rigid(self) -> "jb.RigidScene":
-        walker = jb.Walker(**{name: self.values[name] for name in _BODY})
-        ground = jb.Ground(slope=self.values["slope"], g=self.values["g"])
-        return jb.RigidScene(walker=walker, ground=ground)
+        own = jb.seed_scene(**self.values)
+        return jb.RigidScene(walker=own.walker, ground=own.ground)
 
     def _compliant(self) -> "jb.Scene":
         import jax.tree_util as jtu
@@ -266,6 +264,10 @@ class StartOptions(Options):
         """Raises `ArgumentError` for a number that is not finite."""
         for name, value in self.given.items():
             check_finite(f"state.{name}", value)
+
+    def guess(self, scene: "AnyScene") -> Any:
+        """The start if any of it was said; else None, which leaves it to a search."""
+        return self.state(scene) if self.given else None
 
     def state(self, scene: "AnyScene") -> Any:
         """The start, of the kind that the scene needs; raises `ArgumentError`.

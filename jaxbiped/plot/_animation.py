@@ -44,15 +44,11 @@ def upright(scene: Scene, x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 def poses(scene: Scene, state: State) -> Pose:
     """The walker at states with leaves of shape (n,)."""
-    foot_1, foot_2 = feet(scene, state)
     hip = minimal_state(scene, state)
-    return Pose(
-        hip=upright(scene, np.asarray(hip.hip_x), np.asarray(hip.hip_z)),
-        feet=(
-            upright(scene, np.asarray(foot_1.x), np.asarray(foot_1.z)),
-            upright(scene, np.asarray(foot_2.x), np.asarray(foot_2.z)),
-        ),
+    first, second = (
+        upright(scene, np.asarray(foot.x), np.asarray(foot.z)) for foot in feet(scene, state)
     )
+    return Pose(upright(scene, np.asarray(hip.hip_x), np.asarray(hip.hip_z)), (first, second))
 
 
 _TICK = 0.1

@@ -87,11 +87,7 @@ def basin(
 
 
 def _axes_of(labels: Any, x: Any, y: Any, names: Any) -> tuple[str, str]:
-    """The dimensions of labelled labels along x and y.
-
-    Raises:
-        ArgumentError: more or fewer than two.
-    """
+    """The dimensions of labelled labels along x and y; `ArgumentError` unless they are two."""
     if len(labels.dims) != 2:
         raise ArgumentError(
             f"labels has the axes {', '.join(map(str, labels.dims))}: choose two of them, and one "
@@ -108,12 +104,7 @@ def names_of(
     cycle_footsteps: npt.ArrayLike | None = None,
     gait: npt.ArrayLike | None = None,
 ) -> np.ndarray:
-    """Names on a grid of two dimensions, from names or codes, footsteps in a cycle and gaits.
-
-    Raises:
-        ArgumentError: not a grid of two dimensions, a code that is not known, or shapes that do
-            not fit.
-    """
+    """Names on a grid of two dimensions, from names or codes, footsteps in a cycle and gaits."""
     grid = np.asarray(labels)
     if grid.ndim != 2 or grid.size == 0:
         raise ArgumentError(

@@ -1,5 +1,7 @@
 """Charts of a gait: Floquet multipliers in the complex plane, and elasticities as tornados."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -102,26 +104,13 @@ def _name(ax: Axes, values: np.ndarray) -> None:
             # Neighbours on the real axis are written at different depths.
             text, shift, anchor = f"{value.real:.3f}", -6 - 12 * (reals % 2), "top"
             reals += 1
-        right = value.real > 0.6
-        _write(ax, value, text, (-6 if right else 6, shift), "right" if right else "left", anchor)
+        across, side = (-6, "right") if value.real > 0.6 else (6, "left")
+        place = (value.real, value.imag)
+        style.label_point(ax, text, place, (across, shift), ha=side, va=anchor)
     if small.any():
         largest = float(np.max(np.abs(values[small])))
         text = f"{int(small.sum())} near 0\n" + rf"($|\lambda| \leq$ {largest:.1e})"
-        _write(ax, 0j, text, (-8, -8), "right", "top")
-
-
-def _write(
-    ax: Axes, value: complex, text: str, shift: tuple[int, int], across: str, along: str
-) -> None:
-    ax.annotate(
-        text,
-        (value.real, value.imag),
-        xytext=shift,
-        textcoords="offset points",
-        ha=across,
-        va=along,
-        fontsize="small",
-    )
+        style.label_point(ax, text, (0.0, 0.0), (-8, -8), ha="right", va="top")
 
 
 MEASURES = {
@@ -197,7 +186,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 def _panel(
     ax: Axes, title: str, parameters: tuple[str | Quantity, ...], values: np.ndarray
 ) -> None:
-    """One measure: bars from the largest down, unknown ones last."""
+    """One measure: bars from the largest down, unknown ones last, and their numbers beside."""
     order = np.argsort(-np.where(np.isfinite(values), np.abs(values), -1.0), kind="stable")
     values = values[order]
     drawn = _finite(values)
@@ -207,7 +196,10 @@ def _panel(
     ax.axvline(0.0, color=style.GROUND_COLOUR, linewidth=0.8)
     ax.set_yticks(places, [row_label(parameters[i]) for i in order], fontsize="small")
     ax.set_ylim(len(values) - 0.4, -0.6)
-    _numbers(ax, places, values)
+    look: dict[str, Any] = {"fontsize": "x-small", "color": style.GROUND_COLOUR}
+    for place, value in zip(places, values, strict=True):
+        beside = ax.get_yaxis_transform()
+        ax.text(1.02, place, _format(value), transform=beside, va="center", **look)
     ax.set_title(title, loc="left", fontsize="medium")
     ax.set_xlabel("d log measure / d log parameter", fontsize="small")
     ax.grid(axis="x", color="#E6E6E6", linewidth=0.6)
@@ -228,20 +220,6 @@ def _scale(ax: Axes, largest: float) -> None:
         fontsize="small",
     )
     ax.xaxis.set_minor_locator(NullLocator())
-
-
-def _numbers(ax: Axes, places: np.ndarray, values: np.ndarray) -> None:
-    """The elasticities as numbers, in a column right of the bars."""
-    for place, value in zip(places, values, strict=True):
-        ax.text(
-            1.02,
-            place,
-            _format(value),
-            transform=ax.get_yaxis_transform(),
-            va="center",
-            fontsize="x-small",
-            color=style.GROUND_COLOUR,
-        )
 
 
 def _format(value: float) -> str:

@@ -234,11 +234,6 @@ def _draw_strike(
 
 def _mark_peak(ax: Axes, t: np.ndarray, force: np.ndarray) -> None:
     peak = int(np.argmax(np.abs(force)))
-    ax.annotate(
-        f"{force[peak]:.4g} N".replace("-", "−"),
-        (float(t[peak]), float(force[peak])),
-        xytext=(7, 3 if force[peak] > 0.0 else -3),
-        textcoords="offset points",
-        fontsize="small",
-        va="bottom" if force[peak] > 0.0 else "top",
-    )
+    text = f"{force[peak]:.4g} N".replace("-", "−")
+    shift, anchor = (3, "bottom") if force[peak] > 0.0 else (-3, "top")
+    style.label_point(ax, text, (float(t[peak]), float(force[peak])), (7, shift), va=anchor)

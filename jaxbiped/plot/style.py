@@ -82,6 +82,13 @@ def dress(ax: Axes, title: str, x_label: str, y_label: str) -> None:
     ax.spines[["top", "right"]].set_visible(False)
 
 
+def label_point(
+    ax: Axes, text: str, place: tuple[float, float], shift: tuple[float, float], **anchor: Any
+) -> None:
+    """Writes a few words beside a point, so many points of print away from it."""
+    ax.annotate(text, place, xytext=shift, textcoords="offset points", fontsize="small", **anchor)
+
+
 def legend(ax: Axes, **options: Any) -> None:
     """A legend in small letters without a frame, within the axes unless told otherwise."""
     ax.legend(**{"frameon": False, "fontsize": "small"} | options)
