@@ -1,6 +1,7 @@
 """What a figure shows: its labels, its lines, and whether anybody could see them."""
 
 import contextlib
+import json
 import re
 from pathlib import Path
 
@@ -38,6 +39,11 @@ def leg_pixels(path):
         image.seek(getattr(image, "n_frames", 1) - 1)
         pixels = np.asarray(image.convert("RGB")).astype(int)
     return [int((abs(pixels - colour).max(axis=-1) < 8).sum()) for colour in LEGS]
+
+
+def sent_in(page):
+    """What a page that plays walks was given."""
+    return json.loads(re.search(r'id="walks">(.*?)</script>', page)[1])
 
 
 def labels_of(figure):

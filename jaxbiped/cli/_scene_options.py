@@ -176,7 +176,9 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
     def scene(self) -> "AnyScene":
         """The scene that these options describe; raises `ArgumentError`."""
         self.check()
-        scene: Any = self._rigid() if self.model == "rigid" else self._compliant()
+        own = jb.seed_scene(**self.values)
+        rolls = self.model == "rigid"
+        scene: Any = jb.RigidScene(own.walker, own.ground) if rolls else self._with_laws(own)
         scene = dataclasses.replace(scene, actuation=self.driven.actuation())
         scene = jb.with_parameters(scene, self.named_values())
         if self.formulation == "minimal":
@@ -184,15 +186,10 @@ class SceneOptions(Options, made=dict(_parameter_fields())):
         method = jb.constraints.CONSTRAINT_METHODS[self.method or "index1"]()
         return jb.RedundantScene(scene, method, self.orientation)
 
-    def _rigid(self) -> "jb.RigidScene":
-        own = jb.seed_scene(**self.values)
-        return jb.RigidScene(walker=own.walker, ground=own.ground)
-
-    def _compliant(self) -> "jb.Scene":
+    def _with_laws(self, own: "jb.Scene") -> "jb.Scene":
         import jax.tree_util as jtu
         import numpy as np
 
-        own = jb.seed_scene(**self.values)
         # By NumPy: JAX would compile a program for each operation.
         mass = jtu.tree_map(np.asarray, own.walker).total_mass
         normal = self._law("normal", {"mass": mass, "g": self.values["g"]})

@@ -78,7 +78,10 @@ def gait_strobe(
 
     corners = _corners(scene, everything)
     ax = style.axes_or_new(ax, _WIDTH, _height(corners))
-    _draw_slope(ax, scene, shown)
+    x, steepness = float(shown.hip[0, 0]), -math.tan(float(scene.ground.slope))
+    # A straight line that runs on past both edges, whatever the limits become.
+    look: dict[str, Any] = {"color": style.GROUND_COLOUR, "linewidth": 1.4, "zorder": 1}
+    ax.axline((x, steepness * x), slope=steepness, **look)
     ax.plot(*everything.hip[count:].T, color="#8C8C8C", linewidth=0.8, zorder=1)
     _draw_legs(ax, scene, shown)
     ax.set_aspect("equal", adjustable="box")
@@ -148,12 +151,3 @@ def _height(corners: np.ndarray) -> float:
     width, height = corners[1] - corners[0]
     needed = (_WIDTH - _LABELS[0]) * height / width + _LABELS[1]
     return float(np.clip(needed, _LEAST, _MOST))
-
-
-def _draw_slope(ax: Axes, scene: Scene, shown: Pose) -> None:
-    """A straight line that runs on past both edges, whatever the limits become."""
-    steepness = -math.tan(float(scene.ground.slope))
-    x = float(shown.hip[0, 0])
-    ax.axline(
-        (x, steepness * x), slope=steepness, color=style.GROUND_COLOUR, linewidth=1.4, zorder=1
-    )

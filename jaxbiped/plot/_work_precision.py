@@ -55,7 +55,8 @@ def work_precision(
     ax.set_xscale("log")
     ax.set_yscale("log")
     for k, way in enumerate(ways):
-        mine = [row for row in rows if row["way"] == way and _is_shown(row, axis, cost)]
+        own = (row for row in rows if row["way"] == way and row["outcome"] == "ok")
+        mine = [row for row in own if _error(row, axis) and row[cost]]
         ax.plot(
             np.array([_error(row, axis) for row in mine], dtype=float),
             np.array([row[cost] for row in mine], dtype=float),
@@ -106,10 +107,6 @@ def _draw_failures(
     ax.text(
         1.0 - 0.5 * _BAND, 1.01, "failed", transform=ax.transAxes, ha="center", fontsize="small"
     )
-
-
-def _is_shown(row: Mapping[str, Any], axis: str, cost: str) -> bool:
-    return row["outcome"] == "ok" and bool(_error(row, axis)) and bool(row[cost])
 
 
 def _error(row: Mapping[str, Any], axis: str) -> float | None:

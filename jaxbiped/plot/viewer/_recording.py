@@ -10,7 +10,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._contact_forces import Contacts, contacts
 from jaxbiped.dynamics._energy import energies
-from jaxbiped.dynamics._redundant_state import CompliantState, minimal_state
+from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._state import State
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._samples import at_steps, evaluate_along
@@ -152,7 +152,8 @@ def record_walk(
 
     def evaluate(t: np.ndarray) -> Channels:
         states = state_at(trajectory, t)
-        motion = _motion(scene, states)
+        hip = minimal_state(scene, states)
+        motion = {field: np.asarray(getattr(hip, field)) for field in State._fields}
         if motion_only:
             return motion
         now = evaluate_along(scene, states, energies)
@@ -181,11 +182,6 @@ def _first_times(scene: Scene, trajectory: Trajectory) -> np.ndarray:
     times = times[(times >= 0.0) & (times <= last)]
     apart = np.diff(times) > 1e-6 * unit
     return times[np.concatenate([[True], apart[:-1] | (times[1:-1] == last), [True]])]
-
-
-def _motion(scene: Scene, states: CompliantState) -> Channels:
-    hip = minimal_state(scene, states)
-    return {field: np.asarray(getattr(hip, field)) for field in State._fields}
 
 
 def _forces(found: Contacts) -> Channels:

@@ -2,7 +2,6 @@
 
 import base64
 import dataclasses
-import json
 import re
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.plot.viewer._basin_view import _even_choice
+from tests.drawn import sent_in
 
 pytestmark = pytest.mark.slow
 
@@ -42,8 +42,7 @@ def test_the_choice_is_even_and_no_more_than_asked():
 def test_cells_are_the_labels(basin):
     found, view = basin
     names = jb.basins.label_names(found.label.values, found.cycle_footsteps.values)
-    page = view.html()
-    sent = json.loads(re.search(r'id="walks">(.*?)</script>', page)[1])
+    sent = sent_in(view.html())
     cells = np.frombuffer(base64.b64decode(sent["basin"]["cells"]), np.uint8)
     assert [sent["basin"]["names"][k] for k in cells] == names.ravel().tolist()
 
