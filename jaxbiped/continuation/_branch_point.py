@@ -9,7 +9,7 @@ from jaxbiped.continuation._cycle import Cycle, CycleProblem
 from jaxbiped.gait._orbit_derivatives import CLOSENESS
 from jaxbiped.gait._pseudo_arclength import Change, Curve, CurvePoint
 from jaxbiped.gait._search_starts import component_sizes
-from jaxbiped.gait._stability import Bifurcation
+from jaxbiped.gait._stability import critical_bifurcation
 from jaxbiped.scene._parameter_access import (
     parameter_names,
     parameter_values,
@@ -189,7 +189,7 @@ def branch_point(curve: Curve, axis: Axis, found: CurvePoint) -> BranchPoint:
         multipliers=values,
         multiplier_errors=np.where(cycle.grazes[0] > 0, np.inf, errors),
         unit_multiplier_error=_unit_error(cycle),
-        bifurcation=int(_bifurcation(values, errors)),
+        bifurcation=int(critical_bifurcation(values, errors, CLOSENESS)),
         residual=float(np.max(np.abs(found.change.value))),
         place=found.place,
         tangent=found.tangent,
@@ -216,15 +216,3 @@ def _unit_error(cycle: Cycle) -> float:
     values, vectors = np.linalg.eig(np.asarray(cycle.monodromy[0]))
     parts = np.linalg.lstsq(vectors, np.asarray(cycle.velocity[0], complex))[0]
     return float(abs(values[np.argmax(np.abs(parts))] - 1.0))
-
-
-def _bifurcation(values: np.ndarray, errors: np.ndarray) -> Bifurcation:
-    """What a multiplier on the unit circle announces."""
-    near = np.abs(np.abs(values) - 1.0) <= np.maximum(errors, CLOSENESS)
-    kinds = [
-        Bifurcation.NEIMARK_SACKER
-        if value.imag != 0.0
-        else (Bifurcation.FOLD if value.real > 0.0 else Bifurcation.PERIOD_DOUBLING)
-        for value in values[near]
-    ]
-    return max(kinds, default=Bifurcation.NONE)

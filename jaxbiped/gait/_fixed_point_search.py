@@ -5,7 +5,6 @@ deep underground and be caught there. Stability does not tell them from gaits, s
 the return map of n footsteps also has the gaits of every divisor of n as fixed points.
 """
 
-import enum
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 
@@ -14,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import PyTree
 
+from jaxbiped._ending import NamedCode
 from jaxbiped._types import RealScalarLike, Scalar, by_numpy
 from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._redundant_state import minimal_state
@@ -41,7 +41,7 @@ _ERRORS, _TOLERANCES = 4.0, 30.0
 """Distance of two crossings that are one: in units of the fixed point's error, and of rtol."""
 
 
-class Search(enum.IntEnum):
+class Search(NamedCode):
     """How a search ended. `str(search)` is its name in words.
 
     - found: the orbit returns to within the residual asked for.
@@ -55,9 +55,6 @@ class Search(enum.IntEnum):
     NO_RETURN = 1
     NOT_CONVERGED = 2
     NO_WALK = 3
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
 
 
 class Found(NamedTuple):

@@ -1,6 +1,5 @@
 """Provenance of a gait: how a search came to it and what else it saw, also in a sentence."""
 
-import enum
 import warnings
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -8,7 +7,7 @@ import jax.tree_util as jtu
 import numpy as np
 from jaxtyping import PyTree
 
-from jaxbiped._ending import Ending
+from jaxbiped._ending import Ending, NamedCode
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.gait._fixed_point_search import Search
@@ -32,7 +31,7 @@ _HOW = {
 }
 
 
-class FoundBy(enum.IntEnum):
+class FoundBy(NamedCode):
     """The stage of the search that came to a gait. `str(found_by)` is its name in words.
 
     - guess: Newton's method from the guess that was given.
@@ -47,9 +46,6 @@ class FoundBy(enum.IntEnum):
     WALKING = 2
     CONTINUATION = 3
     SCATTERED_STARTS = 4
-
-    def __str__(self) -> str:
-        return self.name.lower().replace("_", " ")
 
 
 class OtherGait(NamedTuple):
