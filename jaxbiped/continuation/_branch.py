@@ -15,7 +15,11 @@ from jaxbiped.continuation._bifurcations import EVENTS, BifurcationPoint
 from jaxbiped.continuation._branch_point import Axis, BranchPoint
 from jaxbiped.continuation._trace import BranchStop
 from jaxbiped.dynamics._state import BristleState, RigidState, State, WalkerState
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import (
+    STATE_QUANTITIES,
+    recurring_names,
+    state_of_recurring,
+)
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.scene._parameter_access import parameter_quantities, scene_identity, with_parameters
@@ -95,7 +99,7 @@ class Branch(eqx.Module):
             point = self.points[point]
         if isinstance(point, BifurcationPoint):
             point = point.point
-        state = self.state_type(0.0, *point.recurring.tolist())
+        state = state_of_recurring(self.state_type, point.recurring.tolist())
         return cast("WalkerState", jtu.tree_map(as_float, state))
 
     def scene_at(self, point: int | BranchPoint | BifurcationPoint) -> Scene | RigidScene:
@@ -129,7 +133,7 @@ def branch_dataset(branch: Branch) -> "xarray.Dataset":
     """A branch as a dataset; see `Branch.dataset`."""
     import xarray
 
-    names = branch.state_type._fields[1:]  # type: ignore[attr-defined]
+    names = recurring_names(branch.state_type)
     units = {name: STATE_QUANTITIES[name].unit for name in names}
     variables = _columns(branch, branch.points, "", "point", units)
     kinds = [EVENTS.index(each.kind) for each in branch.bifurcations]
@@ -271,7 +275,7 @@ def _points(
     def column(name: str) -> np.ndarray:
         return _column(dataset, before + name)
 
-    recurring = np.stack([column(f"state_{name}") for name in state_type._fields[1:]], axis=1)
+    recurring = np.stack([column(f"state_{name}") for name in recurring_names(state_type)], axis=1)
     values = column("multipliers_real") + 1j * column("multipliers_imag")
     errors, codes = column("multipliers_error"), column("bifurcation")
     numbers = {name: column(name) for name in NUMBERS}

@@ -12,6 +12,7 @@ from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point,
 from jaxbiped.continuation._cycle import CycleProblem
 from jaxbiped.continuation._trace import Trace, limit_cause
 from jaxbiped.dynamics._state import RigidState, WalkerState, check_state, state_for
+from jaxbiped.dynamics._state_quantities import state_of_recurring
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._pseudo_arclength import Attempt, Curve, CurvePoint, correct
@@ -64,7 +65,7 @@ class ContinuationSetup(NamedTuple):
 
     def state_of(self, recurring: np.ndarray) -> WalkerState:
         """The state of these components."""
-        state = type(self.problem.like)(0.0, *recurring.tolist())
+        state = state_of_recurring(type(self.problem.like), recurring.tolist())
         return cast("WalkerState", jtu.tree_map(as_float, state))
 
     def point(self, found: CurvePoint) -> BranchPoint:

@@ -21,6 +21,7 @@ from jaxbiped.continuation._continuation_setup import (
     continuation_setup,
 )
 from jaxbiped.dynamics._state import WalkerState
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._pseudo_arclength import Change
@@ -124,7 +125,7 @@ def _scattered_starts(
     )
     if gait.outcome is not Search.FOUND:
         rolling = rolling_starts(scene, _TRIALS * count, spread=max(_SPREADS), seed=seed)
-        yield from np.stack([np.asarray(leaf) for leaf in rolling[1:]], axis=1)
+        yield from np.stack(recurring_leaves(rolling), axis=1)
         return
     middle, random = setup.recurring(gait.measures.state), np.random.default_rng(seed)
     yield middle

@@ -15,6 +15,7 @@ from jaxbiped._summary import summary
 from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._state import WalkerState
+from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
 from jaxbiped.gait._fixed_point_search import Found, Search, crossings_of, minimal_cycle
 from jaxbiped.gait._orbit_derivatives import Orbit, Slopes, orbit_of, with_parameter_columns
 from jaxbiped.gait._poincare_map import LinearisedReturn
@@ -211,33 +212,33 @@ def summarise_gait(
     backwards = measures._replace(speed=-jnp.abs(measures.speed))
     slope_errors = _by_parameter(orbit, backwards, orbit.slope_errors, orbit.radius_errors)
     errors = _measure_errors(measures, orbit)
+    rows = jnp.concatenate([last.jacobian, last.period_row[None], last.advance_rows])
+    told = dict(
+        measure_errors=errors,
+        multipliers=stability.multipliers,
+        multiplier_errors=stability.errors,
+        directions=stability.directions,
+        monodromy=last.monodromy[:, :m],
+        return_jacobian=rows[:, :m],
+        unit_multiplier_error=stability.unit_error,
+        sensitivities=jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes),
+        sensitivity_errors=jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), slope_errors),
+        elasticities=_elasticities(scene, active, measures, slopes),
+    )
+    off = jnp.stack(recurring_leaves(errors.state))
+    is_found = found.ending == int(Search.FOUND)
     return Gait(
+        **known(told),
         ending=found.ending,
         walk_ending=found.code,
         measures=measures,
-        measure_errors=known(errors),
         residual=found.residual,
-        multipliers=known(stability.multipliers),
-        multiplier_errors=known(stability.errors),
-        directions=known(stability.directions),
-        monodromy=known(last.monodromy[:, :m]),
-        return_jacobian=known(
-            jnp.concatenate([last.jacobian, last.period_row[None], last.advance_rows])[:, :m]
-        ),
-        unit_multiplier_error=known(stability.unit_error),
-        bifurcation=jnp.where(
-            found.ending == int(Search.FOUND), stability.bifurcation, int(Bifurcation.NONE)
-        ),
-        sensitivities=known(jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes)),
-        sensitivity_errors=known(
-            jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), slope_errors)
-        ),
-        elasticities=known(_elasticities(scene, active, measures, slopes)),
+        bifurcation=jnp.where(is_found, stability.bifurcation, int(Bifurcation.NONE)),
         evaluations=found.evaluations,
         history=found.history,
         solver_steps=last.attempted,
         grazes=last.grazes,
-        cycle_footsteps=minimal_cycle(last, jnp.stack(errors.state[1:]), precision.rtol),
+        cycle_footsteps=minimal_cycle(last, off, precision.rtol),
         sound=found.sound,
         origin=jtu.tree_map(jnp.asarray, origin),
         orbit=_path(last, start),
@@ -266,7 +267,7 @@ def _at_fixed_point(once: LinearisedReturn, orbit: Orbit) -> Measures:
     period = once.period + once.period_row[:m] @ correction
     length = once.advance[0] + once.advance_rows[0, :m] @ correction
     peak = once.peak + once.peak_row[:m] @ correction
-    state = type(orbit.state)(jnp.zeros_like(period), *(begun + correction))
+    state = state_of_recurring(type(orbit.state), begun + correction, jnp.zeros_like(period))
     return Measures(period, length, length / period, peak, orbit.stability.spectral_radius, state)
 
 
@@ -282,7 +283,7 @@ def _by_parameter(orbit: Orbit, measures: Measures, slopes: Slopes, radius: Scal
     """Derivatives of the measures with respect to parameters in their own sizes, shape (p,)."""
     length, period = slopes.advance[0], slopes.period
     speed = (length - measures.speed * period) / measures.period
-    state = type(measures.state)(jnp.zeros_like(period), *slopes.recurring)
+    state = state_of_recurring(type(measures.state), slopes.recurring, jnp.zeros_like(period))
     return Measures(period, length, speed, slopes.peak, radius, state)
 
 

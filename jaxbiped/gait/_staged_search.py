@@ -12,6 +12,7 @@ from jaxbiped._progress import stage
 from jaxbiped._types import Scalar, as_float
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._state import WalkerState
+from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
 from jaxbiped.gait._fixed_point_search import ROUGH, Found, Search, cycle_of
 from jaxbiped.gait._homotopy import BranchEnd, FollowedBranch, Homotopy, follow_branch, homotopy_to
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
@@ -208,12 +209,12 @@ def _same(a: Found, b: Seen) -> bool:
 
 def _state(like: PyTree, point: np.ndarray) -> WalkerState:
     """The state with these components besides hip_x, of numbers that take no time to make."""
-    return jtu.tree_map(as_float, type(like)(0.0, *point.tolist()))
+    return jtu.tree_map(as_float, state_of_recurring(type(like), point.tolist()))
 
 
 def _columns(starts: WalkerState) -> np.ndarray:
     """States without hip_x as rows, shape (n, m)."""
-    return np.stack([np.asarray(leaf) for leaf in starts[1:]], axis=1)
+    return np.stack(recurring_leaves(starts), axis=1)
 
 
 def _starts(scene: Scene | RigidScene, seen: list[Seen], count: int) -> WalkerState:
@@ -227,7 +228,7 @@ def _starts(scene: Scene | RigidScene, seen: list[Seen], count: int) -> WalkerSt
     pushed = [row for each in seen for row in _push_off(each.found, sizes)][: count // 2]
     if pushed:
         rows[1 : 1 + len(pushed)] = pushed
-    return type(halves[0])(jnp.zeros(count), *map(jnp.asarray, rows.T))
+    return state_of_recurring(type(halves[0]), map(jnp.asarray, rows.T), jnp.zeros(count))
 
 
 def _push_off(found: Found, sizes: np.ndarray) -> list[np.ndarray]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._state import state_type
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -259,7 +260,7 @@ class DesignProblem:
         gait = self._find(scene, guess)
         if gait.outcome is not Search.FOUND or not bool(gait.sound):
             return None
-        found = np.asarray([float(leaf) for leaf in gait.measures.state[1:]])
+        found = np.stack(recurring_leaves(gait.measures.state))
         sizes = _FLOOR + np.abs(here.known.state)
         aside, length = (np.max(np.abs(each) / sizes) for each in (found - guess, move))
         if aside > _ASIDE * length + _NEAR:

@@ -9,6 +9,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._state import state_type
+from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -75,12 +76,12 @@ def _gaits_near(
     scenes = jtu.tree_map(lambda leaf: jnp.broadcast_to(jnp.asarray(leaf), (count,)), scenes)
     kind = state_type(problem.scene)
     safe = np.where(np.isfinite(points), points, 0.0)
-    starts = kind(jnp.zeros(count), *map(jnp.asarray, safe.T))
+    starts = state_of_recurring(kind, map(jnp.asarray, safe.T), jnp.zeros(count))
     gaits = _find_each(scenes, starts, problem.settings)
     good = np.asarray((gaits.ending == int(Search.FOUND)) & gaits.sound) & allowed
     good &= np.all(np.isfinite(points), axis=1)
-    found = np.stack([np.asarray(leaf) for leaf in gaits.measures.state[1:]], axis=1)
-    slopes = np.stack([np.asarray(leaf) for leaf in gaits.sensitivities.state[1:]], axis=1)
+    found = np.stack(recurring_leaves(gaits.measures.state), axis=1)
+    slopes = np.stack(recurring_leaves(gaits.sensitivities.state), axis=1)
     assert slopes.shape == (count, points.shape[1], len(names))
     return (
         np.where(good[:, None], found, np.nan),

@@ -17,7 +17,12 @@ from jaxbiped.basins._labels import Label
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._feet import feet
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import (
+    STATE_QUANTITIES,
+    recurring_leaves,
+    recurring_names,
+    state_of_recurring,
+)
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -75,7 +80,7 @@ class Attractor(NamedTuple):
     @property
     def point(self) -> np.ndarray:
         """Its state on the section without hip_x, shape (m,)."""
-        return np.array([float(leaf) for leaf in self.state[1:]])
+        return np.stack(recurring_leaves(self.state))
 
     def distance(self, states: np.ndarray) -> np.ndarray:
         """Of states on the section without hip_x, shape (n, m), in the metric; shape (n,)."""
@@ -121,7 +126,7 @@ def attractor_without_radius(scene: Scene | RigidScene, gait: Gait) -> Attractor
         radius=-1.0,
         model=factor.T @ slopes @ np.linalg.inv(factor.T),
         slowest=np.stack([left.real, left.imag]) @ tangents.T,
-        crossings=np.stack([np.asarray(leaf)[:, 0] for leaf in gait.orbit[1][1:]], axis=1),
+        crossings=np.stack([leaf[:, 0] for leaf in recurring_leaves(gait.orbit[1])], axis=1),
     )
 
 
@@ -130,7 +135,7 @@ def section_tangents(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
     import scipy.linalg
 
     slope = _section_slope(section_of(scene, None), scene, jtu.tree_map(as_float, state))
-    normal = np.array([float(leaf) for leaf in slope[1:]])
+    normal = np.stack(recurring_leaves(slope))
     return scipy.linalg.null_space(normal[None])
 
 
@@ -150,7 +155,7 @@ def component_scales(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
     sizes = {"m/s": speed, "rad/s": rate, "rad": 1.0, "": 1.0}
     if scene.compliant:
         sizes["m"] = abs(float(feet(cast(Scene, scene), state).foot_2.penetration))
-    return np.array([sizes[STATE_QUANTITIES[name].unit] for name in state._fields[1:]])
+    return np.array([sizes[STATE_QUANTITIES[name].unit] for name in recurring_names(state)])
 
 
 def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort) -> Attractor:
@@ -208,9 +213,8 @@ def _draws_in(
 
 
 def _displace(state: PyTree, offsets: np.ndarray) -> PyTree:
-    leaves = [np.full(len(offsets), float(state[0]))]
-    leaves += [float(leaf) + offsets[:, i] for i, leaf in enumerate(state[1:])]
-    return type(state)(*leaves)
+    leaves = [float(leaf) + offsets[:, i] for i, leaf in enumerate(recurring_leaves(state))]
+    return state_of_recurring(type(state), leaves, np.zeros(len(offsets)))
 
 
 def _no_goals(scene: Scene | RigidScene, attractor: Attractor, count: int) -> Goals:

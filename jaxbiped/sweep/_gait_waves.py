@@ -16,6 +16,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import as_float
 from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
@@ -154,7 +155,7 @@ class GaitWaves:
         if not places:
             return
         at = tuple(np.transpose(places))
-        self._states[at] = np.stack([np.asarray(x) for x in gaits.measures.state[1:]], axis=-1)
+        self._states[at] = np.stack(recurring_leaves(gaits.measures.state), axis=-1)
         self._stable[at] = True
         for place in places:
             self._doubtful.pop(place, None)
@@ -167,7 +168,7 @@ class GaitWaves:
         if best is None or (found and int(best.ending) != int(Search.FOUND)):
             self._doubtful[place] = gait
             if found:
-                self._states[place] = [float(x) for x in gait.measures.state[1:]]
+                self._states[place] = np.stack(recurring_leaves(gait.measures.state))
 
     def _spread(self) -> None:
         """Searches doubtful points from their neighbours, as long as there are new ones."""
@@ -209,7 +210,7 @@ class GaitWaves:
         self._doubtful.pop(place)
         self._grid.write(place, best)
         if int(best.ending) == int(Search.FOUND):
-            self._states[place] = [float(x) for x in best.measures.state[1:]]
+            self._states[place] = np.stack(recurring_leaves(best.measures.state))
         self._tell(1)
 
 

@@ -16,6 +16,7 @@ from jaxbiped._types import Parameter, Scalar, select
 from jaxbiped.basins._labels import Label
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
 from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._rigid_steps import (
@@ -289,7 +290,7 @@ def _after_arrival(
     start: Start, now: Progress, state: PyTree, cycles: tuple[int, ...]
 ) -> ArrivalHistory:
     """After an arrival in this state, its place along the slope left out."""
-    recurring = tuple(state[1:])
+    recurring = tuple(recurring_leaves(state))
     return after_arrival(now.trace, recurring, start.goals, cycles, start.gap, start.solve.rtol)
 
 

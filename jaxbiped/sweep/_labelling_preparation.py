@@ -8,6 +8,7 @@ from jaxtyping import PyTree
 
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._labels import Label
+from jaxbiped.dynamics._state_quantities import state_of_recurring
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
@@ -137,7 +138,9 @@ def with_guesses(labelling: Labelling, guesses: Guesses) -> Labelling:
         return labelling
     family = labelling.family
     states = {
-        row: [(length, type(family.states[row])(0.0, *point)) for length, point in each]
+        row: [
+            (length, state_of_recurring(type(family.states[row]), point)) for length, point in each
+        ]
         for row, each in guesses.items()
     }
     more = with_gaits(labelling.scene, family, labelling.effort, states)
