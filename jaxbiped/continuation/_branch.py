@@ -127,6 +127,7 @@ NUMBERS = {
     "unit_multiplier_error": "",
     "residual": "SI",
 }
+_EVENT_NUMBERS = ("multiplier_real", "multiplier_imag", "error", "value_error", "beyond")
 
 
 def branch_dataset(branch: Branch) -> "xarray.Dataset":
@@ -144,15 +145,14 @@ def branch_dataset(branch: Branch) -> "xarray.Dataset":
     )
     special = [each.point for each in branch.bifurcations]
     variables |= _columns(branch, special, "event_", "event", units)
-    multipliers = np.array([each.multiplier for each in branch.bifurcations], complex)
-    variables["event_multiplier_real"] = ("event", multipliers.real, {"units": ""})
-    variables["event_multiplier_imag"] = ("event", multipliers.imag, {"units": ""})
-    errors = np.array([each.error for each in branch.bifurcations], float)
-    variables["event_error"] = ("event", errors, {"units": ""})
-    offs = np.array([each.value_error for each in branch.bifurcations], float)
-    variables["event_value_error"] = ("event", offs, {"units": branch.unit})
-    beyond = np.array([each.beyond for each in branch.bifurcations], float)
-    variables["event_beyond"] = ("event", beyond, {"units": branch.unit})
+    rows = [
+        (e.multiplier.real, e.multiplier.imag, e.error, e.value_error, e.beyond)
+        for e in branch.bifurcations
+    ]
+    numbers = np.array(rows, float).reshape(-1, len(_EVENT_NUMBERS)).T
+    event_units = ("", "", "", branch.unit, branch.unit)
+    for name, values, unit in zip(_EVENT_NUMBERS, numbers, event_units, strict=True):
+        variables[f"event_{name}"] = ("event", values, {"units": unit})
     settings = {
         "along": branch.along,
         "axis": branch.axis._asdict(),
@@ -239,11 +239,7 @@ def open_branch(dataset: "xarray.Dataset", scene: Scene | RigidScene) -> Branch:
         for kind, point, real, imaginary, *errors in zip(
             _column(dataset, "event_kind"),
             special,
-            _column(dataset, "event_multiplier_real"),
-            _column(dataset, "event_multiplier_imag"),
-            _column(dataset, "event_error"),
-            _column(dataset, "event_value_error"),
-            _column(dataset, "event_beyond"),
+            *(_column(dataset, f"event_{name}") for name in _EVENT_NUMBERS),
             strict=True,
         )
     ]

@@ -178,7 +178,7 @@ def _(scene: Scene) -> type[MinimalState]:
     return BristleState if scene.has_bristles else State
 
 
-def state_for(scene: Scene, state: PyTree, name: str = "state") -> MinimalState:
+def state_for(scene: AbstractScene, state: PyTree, name: str = "state") -> PyTree:
     """A checked start of the type that a scene needs: bristles are straight unless given.
 
     Raises:

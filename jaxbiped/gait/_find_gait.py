@@ -20,7 +20,7 @@ from jaxbiped.compiler import deferred_checks, host_jit
 from jaxbiped.dynamics._consistent_state import consistent_state
 from jaxbiped.dynamics._redundant_state import LegsState, minimal_state
 from jaxbiped.dynamics._section import AbstractSection
-from jaxbiped.dynamics._state import RigidState, WalkerState, check_state, state_for
+from jaxbiped.dynamics._state import WalkerState, state_for
 from jaxbiped.gait._accurate_gait import accurate_gait
 from jaxbiped.gait._fixed_point_search import Found, Search, SearchArguments, search, walks_only
 from jaxbiped.gait._gait import Described, Gait, summarise_gait
@@ -211,8 +211,6 @@ def _search_on(
 
 
 def _check_start(scene: AbstractScene, section: AbstractSection, start: PyTree) -> WalkerState:
-    if not scene.compliant:
-        return check_state(start, RigidState, "guess")
     if scene.redundant:
         start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)
     return with_leg_names_of(section, scene.minimal, state_for(scene.minimal, start, "guess"))

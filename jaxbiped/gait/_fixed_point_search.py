@@ -5,6 +5,7 @@ deep underground and be caught there. Stability does not tell them from gaits, s
 the return map of n footsteps also has the gaits of every divisor of n as fixed points.
 """
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 
@@ -192,6 +193,15 @@ def _runner(
 def looser(precision: Precision) -> Precision:
     """The precision of the witness of a return's error."""
     return Precision(LOOSER * precision.rtol, LOOSER * precision.tangent_rtol)
+
+
+def with_looser(precision: Precision) -> Precision:
+    """A precision and that of the witness beside it, tolerances of shape (2,)."""
+
+    def both(numpy: Any, fine: Any, loose: Any) -> Any:
+        return numpy.stack([numpy.asarray(fine), numpy.asarray(loose)])
+
+    return Precision(*map(functools.partial(by_numpy, both), precision, looser(precision)))
 
 
 def _iterate(run: Run, begin: Progress, method: Method) -> Progress:

@@ -187,7 +187,7 @@ def follow_branch(
     """
     curve = Curve(change, np.append(scales, 1.0), _CONVERGED)
     here = np.append(start, 0.0) / curve.sizes
-    first = correct(curve, here, np.eye(len(here))[-1])
+    first = correct(curve, here)
     if first.found is None:
         return FollowedBranch(start[None], np.zeros(1), BranchEnd.NO_BEGINNING, first.code)
     control = _CONTROL._replace(smallest=smallest)
@@ -215,7 +215,7 @@ def _at_end(curve: Curve, here: CurvePoint, there: CurvePoint) -> CurvePoint | N
     """The point at s = 1 between two points on either side of it."""
     share = (1.0 - here.place[-1]) / (there.place[-1] - here.place[-1])
     guess = here.place + share * (there.place - here.place)
-    return correct(curve, guess, np.eye(len(guess))[-1], here.tangent).found
+    return correct(curve, guess, here.tangent, holds_s=True).found
 
 
 def _fold(curve: Curve, here: CurvePoint, there: CurvePoint) -> list[CurvePoint]:

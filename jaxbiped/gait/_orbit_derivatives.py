@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar
-from jaxbiped.gait._fixed_point_search import Found, Search, looser
+from jaxbiped.gait._fixed_point_search import Found, Search, with_looser
 from jaxbiped.gait._poincare_map import (
     LinearisedReturn,
     linearised_return,
@@ -101,10 +101,7 @@ def with_parameter_columns(
     def once(precision: Precision) -> LinearisedReturn:
         return linearised_return(spec, seeds, start, precision, idle)
 
-    pairs = jax.tree.map(
-        lambda *pair: jnp.stack(list(map(jnp.asarray, pair))), precision, looser(precision)
-    )
-    new = _each_of(spec, once)(pairs)
+    new = _each_of(spec, once)(with_looser(precision))
 
     def joined(name: str) -> Scalar:
         parameters = jnp.where(lost, jnp.nan, getattr(new, name)[..., m:])
@@ -167,10 +164,17 @@ def slopes_of(last: LinearisedReturn) -> Slopes:
     m = last.recurring.shape[0]
     by_state, by_parameter = last.jacobian[:, :m], last.jacobian[:, m:]
     recurring = solve(jnp.eye(m) - by_state, by_parameter)
-    recurring = jnp.where(last.grazes > 0, jnp.nan, recurring)
+    return _chain_rule(last, jnp.where(last.grazes > 0, jnp.nan, recurring))
+
+
+def _chain_rule(
+    last: LinearisedReturn, recurring: Scalar, size: Callable[[Scalar], Scalar] = lambda rows: rows
+) -> Slopes:
+    """What derivatives of the recurring components make of the others, of terms by their `size`."""
+    m = last.recurring.shape[0]
 
     def total(rows: Scalar) -> Scalar:
-        return rows[..., m:] + rows[..., :m] @ recurring
+        return size(rows[..., m:]) + size(rows[..., :m]) @ recurring
 
     return Slopes(recurring, total(last.period_row), total(last.advance_rows), total(last.peak_row))
 
@@ -184,14 +188,7 @@ def _slope_errors(last: LinearisedReturn, slopes: Slopes, looser: Slopes) -> Slo
     """
     m = last.recurring.shape[0]
     inverse = jnp.abs(solve(jnp.eye(m) - last.jacobian[:, :m], jnp.eye(m)))
-    recurring = inverse @ jnp.abs(last.jacobian[:, m:])
-
-    def total(rows: Scalar) -> Scalar:
-        return jnp.abs(rows[..., m:]) + jnp.abs(rows[..., :m]) @ recurring
-
-    sizes = Slopes(
-        recurring, total(last.period_row), total(last.advance_rows), total(last.peak_row)
-    )
+    sizes = _chain_rule(last, inverse @ jnp.abs(last.jacobian[:, m:]), jnp.abs)
 
     def error(slope: Scalar, other: Scalar, size: Scalar) -> Scalar:
         change = jnp.abs(slope - other)

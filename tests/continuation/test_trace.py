@@ -5,7 +5,8 @@ import pytest
 
 from jaxbiped._ending import Ending
 from jaxbiped.continuation._bifurcations import BranchEvent
-from jaxbiped.continuation._branch_point import NO_WALK, is_stable
+from jaxbiped.continuation._branch_point import is_stable
+from jaxbiped.continuation._cycle import NO_WALK
 from jaxbiped.continuation._trace import passed_before, trace
 from jaxbiped.gait._homotopy import BranchEnd
 from tests.continuation.maps import (
