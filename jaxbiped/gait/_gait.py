@@ -1,6 +1,6 @@
 """Periodic gait: its state, measures, stability and sensitivities, found or not."""
 
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -16,16 +16,20 @@ from jaxbiped._types import Scalar, by_numpy
 from jaxbiped.compiler import host_jit
 from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
-from jaxbiped.gait._fixed_point_search import Found, Search, crossings_of, minimal_cycle
+from jaxbiped.gait._fixed_point_search import (
+    FixedPointProblem,
+    Found,
+    Search,
+    crossings_of,
+    minimal_cycle,
+    search_by_lanes,
+)
 from jaxbiped.gait._orbit_derivatives import Orbit, Slopes, orbit_of, with_parameter_columns
 from jaxbiped.gait._poincare_map import LinearisedReturn
-from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
 from jaxbiped.gait._search_provenance import FoundBy, Origin, OtherGait
 from jaxbiped.gait._stability import Bifurcation
 from jaxbiped.linalg._small_matrices import solve
 from jaxbiped.scene._parameter_access import parameter_quantities
-from jaxbiped.scene._scene import AbstractScene
-from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._error_estimate import ErrorEstimate
 
 _NOTHING = 1e-9
@@ -171,25 +175,21 @@ class Gait(eqx.Module):
         return found
 
 
-Described: TypeAlias = tuple[tuple[str, ...], tuple[int, ...], bool]
-"""Names and positions of the parameters, and whether the radius is differentiated."""
-
-
-@host_jit(runs_by_lanes)
+@host_jit(search_by_lanes)
 def summarise_gait(
-    spec: ReturnMapSpec,
-    scene: AbstractScene,
-    start: WalkerState,
-    precision: Precision,
-    found: Found,
-    names: tuple[str, ...],
-    active: tuple[int, ...],
-    radius: bool,
-    origin: Origin,
+    problem: FixedPointProblem, found: Found, names: tuple[str, ...], radius: bool, origin: Origin
 ) -> Gait:
-    """The gait that a search from `start` found, with its stability and its derivatives."""
-    found = with_parameter_columns(spec, scene, active, start, precision, found)
-    orbit = orbit_of(spec, scene, active, start, found, radius=radius)
+    """The gait that a search found, with its stability and its derivatives.
+
+    Args:
+        problem: what was searched; its active parameters are those that are asked for.
+        found: what the search came to.
+        names: of the active parameters.
+        radius: whether the spectral radius is differentiated.
+        origin: how the search came to it.
+    """
+    found = with_parameter_columns(problem, found)
+    orbit = orbit_of(problem, found, radius=radius)
     stability = orbit.stability
     last, m = found.last, found.recurring.shape[0]
     lost = found.ending == int(Search.NO_RETURN)
@@ -223,7 +223,7 @@ def summarise_gait(
         unit_multiplier_error=stability.unit_error,
         sensitivities=jtu.tree_map(lambda leaf: leaf / orbit.sizes, slopes),
         sensitivity_errors=jtu.tree_map(lambda leaf: leaf / jnp.abs(orbit.sizes), slope_errors),
-        elasticities=_elasticities(scene, active, measures, slopes),
+        elasticities=_elasticities(problem.args, problem.active, measures, slopes),
     )
     off = jnp.stack(recurring_leaves(errors.state))
     is_found = found.ending == int(Search.FOUND)
@@ -238,13 +238,13 @@ def summarise_gait(
         history=found.history,
         solver_steps=last.attempted,
         grazes=last.grazes,
-        cycle_footsteps=minimal_cycle(last, off, precision.rtol),
+        cycle_footsteps=minimal_cycle(last, off, problem.precision.rtol),
         sound=found.sound,
         origin=jtu.tree_map(jnp.asarray, origin),
-        orbit=_path(last, start),
+        orbit=_path(last, problem.guess),
         parameters=names,
-        engine=spec.engine,
-        quantities=tuple(map(parameter_quantities(scene).__getitem__, names)),
+        engine=problem.spec.engine,
+        quantities=tuple(map(parameter_quantities(problem.args).__getitem__, names)),
     )
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 import jaxbiped as jb
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.gait._fixed_point_search import search
+from jaxbiped.gait._fixed_point_search import FixedPointProblem, search
 from jaxbiped.gait._newton import Method
 from jaxbiped.gait._orbit_derivatives import orbit_of, with_parameter_columns
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
@@ -178,9 +178,9 @@ def test_every_solver_carries_derivatives(solver, engine):
 
 def _orbit(spec, args, guess):
     tight = precision_of("tight")
-    found = search(spec, args, (), guess, tight, Method(None, 40, 1e-10))
-    found = with_parameter_columns(spec, args, (0,), guess, tight, found)
-    return orbit_of(spec, args, (0,), guess, found, radius=True)
+    problem = FixedPointProblem(spec, args, (), guess, tight, Method(None, 40, 1e-10))
+    asked = problem._replace(active=(0,))
+    return orbit_of(asked, with_parameter_columns(asked, search(problem)), radius=True)
 
 
 @pytest.mark.parametrize("engine", ["xla", "lanes"])
