@@ -4,7 +4,7 @@ A formulation registers its kind of scene here, by `state_type` and `field_of`.
 """
 
 import functools
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import NamedTuple, TypeAlias, TypeVar, cast
 
 import jax
 import jax.numpy as jnp
@@ -192,7 +192,7 @@ def state_for(scene: AbstractScene, state: PyTree, name: str = "state") -> PyTre
         return BristleState(**state._asdict(), bristle_1=straight, bristle_2=straight)
     if kind is State and isinstance(state, BristleState):
         raise ArgumentError(
-            f"{name} has bristles, but friction = {type(scene.friction).__name__} has none: give a "
+            f"{name} has bristles, but friction = {type(cast(Scene, scene).friction).__name__} has none: give a "
             "State."
         )
     return check_state(state, kind, name)
