@@ -191,10 +191,8 @@ def state_for(scene: AbstractScene, state: PyTree, name: str = "state") -> PyTre
         straight = jnp.zeros_like(state.hip_x)
         return BristleState(**state._asdict(), bristle_1=straight, bristle_2=straight)
     if kind is State and isinstance(state, BristleState):
-        raise ArgumentError(
-            f"{name} has bristles, but friction = {type(cast(Scene, scene).friction).__name__} has none: give a "
-            "State."
-        )
+        law = type(cast(Scene, scene).friction).__name__
+        raise ArgumentError(f"{name} has bristles, but friction = {law} has none: give a State.")
     return check_state(state, kind, name)
 
 
