@@ -28,6 +28,7 @@ from jaxbiped.dynamics._state import (
     state_type,
     whole_state,
 )
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES, recurring_leaves, recurring_names
 from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
@@ -137,7 +138,7 @@ def settle_walks(scene: Scene | RigidScene, starts: PyTree, *, most: int = 4) ->
     """
     walked: Callable[..., tuple[Scalar, PyTree]] = _arrivals if scene.compliant else _rigid_arrivals
     counts, last = walked(scene, starts)
-    points = np.stack([np.asarray(leaf) for leaf in last[1:]], axis=-1)
+    points = np.stack(recurring_leaves(last), axis=-1)
     walking = np.flatnonzero(np.asarray(counts) >= _FOOTSTEPS)
     sizes = component_sizes(scene, last)
     latest = points[walking, -1] / sizes
@@ -155,15 +156,12 @@ def settle_walks(scene: Scene | RigidScene, starts: PyTree, *, most: int = 4) ->
 def component_sizes(scene: AbstractScene, state: WalkerState) -> np.ndarray:
     """Size of each component of a state without hip_x, shape (m,), SI units.
 
-    Angles 1, lengths l, velocities √(g l), rates √(g/l).
+    Angles 1, lengths l, velocities √(g l), rates √(g/l), and bristles the number of l.
     """
     length, gravity = float(scene.walker.l), float(scene.ground.g)
-    by_prefix = {
-        "theta": 1.0,
-        "omega": np.sqrt(gravity / length),
-        "hip_v": np.sqrt(gravity * length),
-    }
-    return np.array([by_prefix.get(name[:5], length) for name in state._fields[1:]])
+    speed, rate = np.sqrt(gravity * length), np.sqrt(gravity / length)
+    sizes = {"m": length, "": length, "m/s": speed, "rad/s": rate, "rad": 1.0}
+    return np.array([sizes[STATE_QUANTITIES[name].unit] for name in recurring_names(state)])
 
 
 @cached_jit

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_provenance import explain_search
 from jaxbiped.optimise._design_gaits import GaitSettings, are_walks
@@ -189,7 +190,7 @@ class DesignProblem:
         gait = self.settings.find_near(scene, guess)
         if not are_walks(gait):
             return None
-        found = np.asarray([float(leaf) for leaf in gait.measures.state[1:]])
+        found = np.stack(recurring_leaves(gait.measures.state))
         return None if np.any(np.abs(found - guess) > farthest) else self._keep(u, scene, gait)
 
     def gait_of(self, design: Design) -> Gait:

@@ -10,6 +10,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._quantity import Quantity
 from jaxbiped.continuation._bifurcations import BranchEvent
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
 from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
@@ -239,8 +240,8 @@ def evaluate(
         errors={name: row.error for name, row in kept.items()},
         slopes={name: row.slopes for name, row in kept.items()},
         slope_errors={name: row.slope_errors for name, row in kept.items()},
-        state=np.asarray([float(leaf) for leaf in state[1:]]),
-        state_slopes=np.stack([np.asarray(leaf) for leaf in slopes[1:]]),
+        state=np.stack(recurring_leaves(state)),
+        state_slopes=np.stack(recurring_leaves(slopes)),
         beyond_range=tuple(beyond_range),
     )
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from jaxbiped._checks import ArgumentError
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.optimise._design_gaits import are_walks, gaits_near
 from jaxbiped.optimise._design_problem import Design, DesignProblem
 
@@ -58,7 +59,8 @@ def _gaits_of_designs(
     _, gaits, _ = gaits_near(problem.scene, values, starts, problem.settings)
     good = are_walks(gaits) & allowed & np.all(known, axis=1)
     found, slopes = (
-        np.stack(states[1:], axis=1) for states in (gaits.measures.state, gaits.sensitivities.state)
+        np.stack(recurring_leaves(states), axis=1)
+        for states in (gaits.measures.state, gaits.sensitivities.state)
     )
     return (
         np.where(good[:, None], found, np.nan),

@@ -15,7 +15,7 @@ from jaxbiped.continuation._bifurcation_curve import BifurcationCurve
 from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import BranchPoint
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES, recurring_names
 from jaxbiped.plot import style
 from jaxbiped.plot._symbols import NORMAL_FORCE
 from jaxbiped.scene._parameter_access import parameter_quantities
@@ -65,7 +65,7 @@ def branch(
         raise ArgumentError("branches is not allowed: each must have a point.")
     if len({each.along for each in given}) > 1:
         raise ArgumentError("branches is not allowed: they must go along one parameter.")
-    components = given[0].state_type._fields[1:]  # type: ignore[attr-defined]
+    components = recurring_names(given[0].state_type)
     check_choice("measure", measure, (*_MEASURES, *components))
     ax = style.axes_or_new(ax, 6.8, 4.6)
     counts = sorted({each.footsteps for each in given})

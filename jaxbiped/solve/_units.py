@@ -14,7 +14,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._state import state_type
-from jaxbiped.dynamics._state_quantities import dimensions_of
+from jaxbiped.dynamics._state_quantities import dimensions_of, recurring_leaves
 from jaxbiped.scene._scene import AbstractScene, is_compliant
 
 _LENGTH = 0.40
@@ -64,7 +64,7 @@ def recurring_inverse_units(args: PyTree, count: int) -> Scalar:
     if not is_compliant(args):
         return jnp.ones(count)
     kind = state_type(args.minimal)
-    inverse = units_of(args, kind(*[0.0] * len(kind._fields))).inverse[1:]
+    inverse = recurring_leaves(units_of(args, kind(*[0.0] * len(kind._fields))).inverse)
     return jnp.stack(inverse) if len(inverse) == count else jnp.ones(count)
 
 

@@ -18,6 +18,7 @@ from jaxbiped.basins._labels import Label
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.dynamics._feet import feet
 from jaxbiped.dynamics._section import AbstractSection
+from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -75,7 +76,7 @@ class Attractor(NamedTuple):
     @property
     def point(self) -> np.ndarray:
         """Its state on the section without hip_x, shape (m,)."""
-        return np.array([float(leaf) for leaf in self.state[1:]])
+        return np.stack(recurring_leaves(self.state))
 
     @property
     def goal(self) -> tuple[npt.ArrayLike, ...]:
@@ -126,7 +127,7 @@ def attractor_without_radius(scene: Scene | RigidScene, gait: Gait) -> Attractor
         radius=-1.0,
         model=factor.T @ slopes @ np.linalg.inv(factor.T),
         slowest=np.stack([left.real, left.imag]) @ tangents.T,
-        crossings=np.stack([np.asarray(leaf)[:, 0] for leaf in gait.orbit[1][1:]], axis=1),
+        crossings=np.stack([leaf[:, 0] for leaf in recurring_leaves(gait.orbit[1])], axis=1),
     )
 
 
@@ -135,7 +136,7 @@ def section_tangents(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
     import scipy.linalg
 
     slope = _section_slope(section_of(scene, None), scene, jtu.tree_map(as_float, state))
-    normal = np.array([float(leaf) for leaf in slope[1:]])
+    normal = np.stack(recurring_leaves(slope))
     return scipy.linalg.null_space(normal[None])
 
 
@@ -153,7 +154,7 @@ def component_scales(scene: Scene | RigidScene, state: PyTree) -> np.ndarray:
     if scene.compliant:
         depth = feet(cast(Scene, scene), state).foot_2.penetration
         sizes = sizes._replace(hip_z=abs(float(depth)))
-    return np.array(sizes[1:])
+    return np.array(recurring_leaves(sizes))
 
 
 def with_radius(scene: Scene | RigidScene, attractor: Attractor, effort: Effort) -> Attractor:
@@ -216,5 +217,5 @@ def _draws_in(
 
 
 def _displace(state: PyTree, offsets: np.ndarray) -> PyTree:
-    leaves = [float(leaf) + column for leaf, column in zip(state[1:], offsets.T, strict=True)]
-    return type(state)(np.full(len(offsets), float(state[0])), *leaves)
+    leaves = [float(x) + off for x, off in zip(recurring_leaves(state), offsets.T, strict=True)]
+    return state_of_recurring(type(state), leaves, np.zeros(len(offsets)))

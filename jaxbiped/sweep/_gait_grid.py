@@ -15,7 +15,11 @@ import numpy.typing as npt
 from jaxbiped._checks import ArgumentError
 from jaxbiped._files import strict_json
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
+from jaxbiped.dynamics._state_quantities import (
+    STATE_QUANTITIES,
+    recurring_names,
+    state_of_recurring,
+)
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._homotopy import BranchEnd
@@ -61,7 +65,7 @@ class GaitGrid:
 
     def states(self) -> np.ndarray:
         """States without hip_x at all points, shape (*grid, m); NaN where there is no gait."""
-        names = self._state._fields[1:]  # type: ignore[attr-defined]
+        names = recurring_names(self._state)
         return np.stack([self._dataset[f"state_{name}"].data for name in names], axis=-1)
 
     def write(self, place: tuple[int, ...], gait: Gait) -> None:
@@ -234,7 +238,7 @@ def _variables(gait: Gait) -> dict[str, tuple[tuple[str, ...], np.ndarray, JsonO
         error = getattr(gait.sensitivity_errors, name)
         add(f"sensitivity_error_{name}", error, per, "parameter")
         add(f"elasticity_{name}", getattr(gait.elasticities, name), "", "parameter")
-    for name in gait.measures.state._fields[1:]:
+    for name in recurring_names(gait.measures.state):
         add(f"state_{name}", getattr(gait.measures.state, name), STATE_QUANTITIES[name].unit)
     add("multiplier_real", np.real(gait.multipliers), "", "multiplier")
     add("multiplier_imag", np.imag(gait.multipliers), "", "multiplier")

@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import jax.tree_util as jtu
 import numpy as np
 
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
 from jaxbiped.sweep._gait_grid import GaitGrid
@@ -97,7 +98,7 @@ class GaitWaves:
         if not places:
             return
         at = tuple(np.transpose(places))
-        self._states[at] = np.stack([np.asarray(x) for x in gaits.measures.state[1:]], axis=-1)
+        self._states[at] = np.stack(recurring_leaves(gaits.measures.state), axis=-1)
         self._stable[at] = True
         for place in places:
             self._doubtful.pop(place, None)
@@ -108,7 +109,7 @@ class GaitWaves:
         if not _is_found(self._doubtful.get(place)):
             self._doubtful[place] = gait
             if _is_found(gait):
-                self._states[place] = [float(x) for x in gait.measures.state[1:]]
+                self._states[place] = np.stack(recurring_leaves(gait.measures.state))
 
     def _spread(self) -> None:
         """Searches doubtful points from their neighbours, as long as there are new ones."""
@@ -148,7 +149,7 @@ class GaitWaves:
         self._doubtful.pop(place)
         self._grid.write(place, best)
         if _is_found(best):
-            self._states[place] = [float(x) for x in best.measures.state[1:]]
+            self._states[place] = np.stack(recurring_leaves(best.measures.state))
         self._tell(1)
 
 

@@ -16,6 +16,7 @@ from jaxbiped._types import Parameter, Scalar, select
 from jaxbiped.basins._labels import Label, label_names
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import State, exchange_legs
+from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve
 from jaxbiped.solve._failure_events import WATCHES
 from jaxbiped.solve._rigid_steps import (
@@ -278,7 +279,7 @@ def _after_arrival(
     old = now.trace
 
     def made() -> ArrivalHistory:
-        recurring = tuple(state()[1:])
+        recurring = tuple(recurring_leaves(state()))
         new = after_arrival(old, recurring, start.goals, cycles, start.gap, start.solve.rtol)
         return select(arrives, new, old)
 

@@ -21,6 +21,7 @@ from jaxbiped.dynamics._redundant_state import LegsState
 from jaxbiped.dynamics._rolling import rolling, rolling_field
 from jaxbiped.dynamics._section import AbstractSection, HeelStrike, MidStance
 from jaxbiped.dynamics._state import RigidState, State, exchange_legs
+from jaxbiped.dynamics._state_quantities import CYCLIC
 from jaxbiped.dynamics._switches import Switch, switches
 from jaxbiped.scene._scene import (
     AbstractScene,
@@ -76,7 +77,7 @@ def system_of(scene: AbstractScene) -> AbstractSystem:
 class Walking(AbstractSystem):
     """The walker: legs exchanged at each footstep, the place along the slope left out."""
 
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = (State._fields.index("hip_x"),)
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(map(State._fields.index, CYCLIC))
 
     def vector_field(self, t: Time, y: State, args: Scene) -> State:
         return vector_field(t, y, args)
@@ -162,7 +163,7 @@ def with_leg_names_of(section: AbstractSection, scene: AbstractScene, state: PyT
 class Rolling(AbstractSystem):
     """The rigid walker: it rolls on leg 2, and exchanges support at each heel strike."""
 
-    cyclic_coordinates: ClassVar[tuple[int, ...]] = (RigidState._fields.index("hip_x"),)
+    cyclic_coordinates: ClassVar[tuple[int, ...]] = tuple(map(RigidState._fields.index, CYCLIC))
 
     def vector_field(self, t: Time, y: RigidState, args: RigidScene) -> RigidState:
         return rolling_field(t, y, args)
