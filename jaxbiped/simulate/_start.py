@@ -20,7 +20,7 @@ from jaxbiped.dynamics._state import BristleState, State, state_for
 from jaxbiped.scene._ground import AbstractClearance, Ground
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._walker import Walker
-from jaxbiped.scene.actuation._catalogue import ACTUATORS
+from jaxbiped.scene.actuation._abstract_actuator import ACTUATORS
 from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS
 
