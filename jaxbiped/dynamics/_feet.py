@@ -10,7 +10,7 @@ from jaxbiped.dynamics._actuation import preload
 from jaxbiped.dynamics._redundant_state import CompliantState, Leg, legs_of
 from jaxbiped.dynamics._state import SomeState, exchange_legs
 from jaxbiped.scene._ground import drop_under
-from jaxbiped.scene._scene import AbstractScene, CompliantScene
+from jaxbiped.scene._scene import AbstractWalkerScene, CompliantScene
 
 _JUST_TOUCHING = 1e-6
 """Depth or height of a foot that counts as at the surface, in units of the leg's length."""
@@ -150,7 +150,7 @@ def with_leg_2_standing(scene: CompliantScene, state: SomeState) -> SomeState:
 
 
 def standing_height(
-    scene: AbstractScene, stance_angle: Scalar, penetration: Scalar | float = 0.0
+    scene: AbstractWalkerScene, stance_angle: Scalar, penetration: Scalar | float = 0.0
 ) -> Scalar:
     """Height of the hip over a leg that stands on its foot.
 

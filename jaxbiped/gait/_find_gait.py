@@ -31,7 +31,7 @@ from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origi
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.gait._staged_search import is_whole, origin_of, search_in_stages, spectral_radius
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._scene import AbstractScene, RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
 from jaxbiped.solve._error_estimate import check_wanted
@@ -210,7 +210,9 @@ def _search_on(
     return found, origin_of(staged, modelled, start)
 
 
-def _check_start(scene: AbstractScene, section: AbstractSection, start: PyTree) -> WalkerState:
+def _check_start(
+    scene: AbstractWalkerScene, section: AbstractSection, start: PyTree
+) -> WalkerState:
     if not scene.compliant:
         return check_state(start, RigidState, "guess")
     if scene.redundant:

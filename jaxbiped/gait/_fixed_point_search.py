@@ -26,7 +26,7 @@ from jaxbiped.gait._poincare_map import (
     state_with,
 )
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
 
 LOOSER = 10.0
@@ -220,7 +220,7 @@ def is_sound(scene: object, state: PyTree, step_length: Scalar, period: Scalar) 
         step_length: advance along the slope in a cycle [m].
         period: duration of a cycle [s].
     """
-    if not isinstance(scene, AbstractScene):
+    if not isinstance(scene, AbstractWalkerScene):
         return jnp.asarray(True)
     pace = jnp.sqrt(scene.walker.l / scene.ground.g)
     forward = (step_length > 0.0) & (period > _SHORTEST * pace)

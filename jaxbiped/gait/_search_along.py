@@ -19,7 +19,7 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._search_provenance import FoundBy, Origin
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.linalg._small_matrices import eigenpairs
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
 
 _FIRST, _LARGEST, _SMALLEST = 0.05, 0.3, 1e-3
@@ -62,7 +62,7 @@ class _Way(NamedTuple):
 
 def search_along(
     spec: ReturnMapSpec,
-    scene: AbstractScene,
+    scene: AbstractWalkerScene,
     active: tuple[int, ...],
     start: WalkerState,
     precision: Precision,

@@ -20,7 +20,7 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import RigidState, WalkerState
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.scene._ground import SteppedGround
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene
 from jaxbiped.variational._hybrid_system import AbstractSystem, system_of
 
 _KINDS: dict[tuple[type, tuple[str, ...]], Any] = {}
@@ -100,7 +100,7 @@ class DisturbedCycle(AbstractSystem):
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (0, 1)
     walker: AbstractSystem
 
-    def vector_field(self, t: Time, y: PyTree, args: AbstractScene) -> PyTree:
+    def vector_field(self, t: Time, y: PyTree, args: AbstractWalkerScene) -> PyTree:
         leaning = dataclasses.replace(args.ground, slope=args.ground.slope + y.push)
         pushed = eqx.tree_at(lambda scene: scene.ground, args, leaning)
         rates = self.walker.vector_field(t, motion_of(y), pushed)
@@ -144,18 +144,18 @@ class SteppedCycle(AbstractSystem):
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (0, 1, 2)
     walker: AbstractSystem
 
-    def vector_field(self, t: Time, y: PyTree, args: AbstractScene) -> PyTree:
+    def vector_field(self, t: Time, y: PyTree, args: AbstractWalkerScene) -> PyTree:
         rates = self.walker.vector_field(t, motion_of(y), _stepped(args, y))
         zero = jnp.zeros_like(y.drop)
         return joined(y, rates, {"clock": zero + 1.0, "fallen": zero, "drop": zero})
 
-    def switches(self, args: AbstractScene, y: PyTree) -> tuple[Switch, ...]:
+    def switches(self, args: AbstractWalkerScene, y: PyTree) -> tuple[Switch, ...]:
         return self.walker.switches(_stepped(args, y), motion_of(y))
 
-    def ending(self, args: AbstractScene, y: PyTree) -> Scalar:
+    def ending(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
         return self.walker.ending(_stepped(args, y), motion_of(y))
 
-    def reset_map(self, args: AbstractScene, y: PyTree) -> PyTree:
+    def reset_map(self, args: AbstractWalkerScene, y: PyTree) -> PyTree:
         after = self.walker.reset_map(args, motion_of(y))
         if not isinstance(after, RigidState):
             after = after._replace(hip_z=after.hip_z + y.drop * args.walker.l)
@@ -188,12 +188,12 @@ class SteppedSection(AbstractSection):
         return MotionSection(self.section).counts(args, y)
 
 
-def _stepped(scene: AbstractScene, y: PyTree) -> AbstractScene:
+def _stepped(scene: AbstractWalkerScene, y: PyTree) -> AbstractWalkerScene:
     """The scene with the step before the swinging leg; a rigid walker's section has it."""
     if not scene.compliant:
         return scene
     ground = SteppedGround(scene.ground.slope, scene.ground.g, y.drop * scene.walker.l)
-    found: AbstractScene = eqx.tree_at(lambda each: each.ground, scene, ground)
+    found: AbstractWalkerScene = eqx.tree_at(lambda each: each.ground, scene, ground)
     return found
 
 

@@ -24,7 +24,7 @@ from jaxbiped.optimise._augmented_cycles import (
     joined,
     motion_of,
 )
-from jaxbiped.scene._scene import AbstractScene, Scene
+from jaxbiped.scene._scene import AbstractScene, AbstractWalkerScene, Scene
 from jaxbiped.variational._hybrid_system import AbstractSystem
 
 
@@ -46,7 +46,7 @@ class AbstractLowestSwing(AbstractSystem):
     walker: AbstractVar[AbstractSystem]
 
     @abc.abstractmethod
-    def lowered(self, args: AbstractScene, y: PyTree) -> Scalar:
+    def lowered(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
         """How much lower than under the foot that swings the ground is where the other stands."""
 
     def vector_field(self, t: Time, y: PyTree, args: AbstractScene) -> PyTree:
@@ -60,7 +60,7 @@ class AbstractLowestSwing(AbstractSystem):
     def ending(self, args: AbstractScene, y: PyTree) -> Scalar:
         return self.walker.ending(args, motion_of(y))
 
-    def reset_map(self, args: AbstractScene, y: PyTree) -> PyTree:
+    def reset_map(self, args: AbstractWalkerScene, y: PyTree) -> PyTree:
         motion, before = motion_of(y), {"clearance": y.clearance, "passed": y.passed}
         height = _swing_height(args, motion_of(motion)) + self.lowered(args, motion)
         told = {"clearance": y.clearance + height / args.walker.l, "passed": before["passed"] + 1.0}
@@ -84,7 +84,7 @@ class PushedLowestSwing(AbstractLowestSwing):
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (0, 1, 2, 3)
     walker: DisturbedCycle
 
-    def lowered(self, args: AbstractScene, y: PyTree) -> Scalar:
+    def lowered(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
         return jnp.zeros_like(y.push)
 
 
@@ -101,7 +101,7 @@ class SteppedLowestSwing(AbstractLowestSwing):
     cyclic_coordinates: ClassVar[tuple[int, ...]] = (0, 1, 2, 3, 4)
     walker: SteppedCycle
 
-    def lowered(self, args: AbstractScene, y: PyTree) -> Scalar:
+    def lowered(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
         if not args.compliant:
             return jnp.zeros_like(y.drop)
         return y.drop * args.walker.l
@@ -133,14 +133,14 @@ def _swing_foot(args: AbstractScene, state: PyTree) -> Foot:
     return feet(cast("Scene", args), state).foot_2
 
 
-def _swing_height(args: AbstractScene, state: PyTree) -> Scalar:
+def _swing_height(args: AbstractWalkerScene, state: PyTree) -> Scalar:
     """Of the foot that swings above its ground [m]; a rigid walker's is leg 1's."""
     if not args.compliant:
         return args.walker.hip_to_foot * (jnp.cos(state.theta_2) - jnp.cos(state.theta_1))
     return -_swing_foot(args, state).penetration
 
 
-def _swing_height_rate(args: AbstractScene, state: PyTree) -> Scalar:
+def _swing_height_rate(args: AbstractWalkerScene, state: PyTree) -> Scalar:
     if not args.compliant:
         by_1 = jnp.sin(state.theta_1) * state.omega_1
         return args.walker.hip_to_foot * (by_1 - jnp.sin(state.theta_2) * state.omega_2)

@@ -39,8 +39,8 @@ from jaxbiped.scene.laws.friction._bristles import Dahl as Dahl
 from jaxbiped.scene.laws.friction._bristles import LuGre as LuGre
 
 # What is made of them: behind the laws, whose order the catalogue looks up here.
-from jaxbiped.scene.laws._catalogue import FRICTION_LAWS as FRICTION_LAWS
-from jaxbiped.scene.laws._catalogue import NORMAL_LAWS as NORMAL_LAWS
+from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS as FRICTION_LAWS
+from jaxbiped.scene.laws._abstract_laws import NORMAL_LAWS as NORMAL_LAWS
 from jaxbiped.scene.laws._catalogue import friction_law_like as friction_law_like
 from jaxbiped.scene.laws._catalogue import normal_law_like as normal_law_like
 from jaxbiped.scene.laws.normal._hertz import hertz_stiffness as hertz_stiffness

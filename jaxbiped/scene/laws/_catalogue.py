@@ -13,12 +13,12 @@ from jaxbiped.scene.laws._abstract_laws import (
     AbstractNormalLaw,
 )
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
-from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
-from jaxbiped.scene.laws.normal._weight_on_law import Standing
+from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer, Standing
 
+_CATALOGUES: tuple[dict[str, Any], ...] = (NORMAL_LAWS, FRICTION_LAWS)
 for _law in list(vars(laws).values()):
     # In the order of the lines that export them, not of the modules that define them.
-    for _known in (NORMAL_LAWS, FRICTION_LAWS):
+    for _known in _CATALOGUES:
         if _law in _known.values():
             _known[_law.name] = _known.pop(_law.name)
 
