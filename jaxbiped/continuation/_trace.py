@@ -15,7 +15,7 @@ from jaxbiped.continuation._bifurcations import (
     not_located,
 )
 from jaxbiped.continuation._branch_point import NO_WALK, Axis, BranchPoint, branch_point
-from jaxbiped.dynamics._contact_forces import contacts
+from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._state import State, WalkerState
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, correct, follow

@@ -7,8 +7,7 @@ import jax.numpy as jnp
 from jaxbiped._types import Scalar
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
-from jaxbiped.dynamics._contact_forces import foot_force, hip_motion, normal_forces
-from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._contacts import Foot, feet, foot_force, hip_motion, normal_forces, touches
 from jaxbiped.dynamics._redundant_state import legs_of, minimal_state
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import AbstractWalkerScene, Scene

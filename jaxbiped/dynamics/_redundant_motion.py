@@ -10,8 +10,7 @@ from jaxbiped._types import RealScalarLike, Scalar, Time, VectorField
 from jaxbiped.caching._cached_jit import kept_alone
 from jaxbiped.constraints._linkage import constraints_of, headings_of, point_of, torque_on
 from jaxbiped.dynamics._actuation import hip_torques
-from jaxbiped.dynamics._contact_forces import foot_force, hip_motion
-from jaxbiped.dynamics._feet import feet, feet_of
+from jaxbiped.dynamics._contacts import feet, feet_of, foot_force, hip_motion
 from jaxbiped.dynamics._linkage_motion import LinkageMotion, motion_under
 from jaxbiped.dynamics._minimal_motion import Accelerations, accelerations, bristle_rates
 from jaxbiped.dynamics._redundant_state import Leg, LegsState, legs_of

@@ -14,7 +14,7 @@ from jaxbiped._types import Scalar, as_float, select
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.caching._caches import bounded_cache
 from jaxbiped.compiler import host_jit
-from jaxbiped.dynamics._feet import standing_height
+from jaxbiped.dynamics._contacts import standing_height
 from jaxbiped.dynamics._section import MidStance
 from jaxbiped.dynamics._state import (
     BristleState,

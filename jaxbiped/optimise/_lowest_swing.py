@@ -14,7 +14,7 @@ from equinox import AbstractVar
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
-from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.dynamics._contacts import Foot, feet
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.optimise._augmented_cycles import (

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from jaxbiped._checks import ArgumentError
-from jaxbiped.dynamics._contact_forces import Contacts
+from jaxbiped.dynamics._contacts import Contacts
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.plot._samples import sampled_forces
 from jaxbiped.plot._symbols import NORMAL_FORCE, TANGENTIAL_FORCE, TIME

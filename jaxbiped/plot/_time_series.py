@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from jaxbiped._checks import check_positive
 from jaxbiped._types import Scalar, as_array, as_float
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._contact_forces import contacts
+from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._state import RigidState
 from jaxbiped.measure._samples import evaluate_along
 from jaxbiped.plot._samples import sample
