@@ -6,8 +6,10 @@ what is said of them is read in the source of what declares it, as syntax.
 
 import ast
 import contextlib
+import inspect
 import math
 import re
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -147,7 +149,10 @@ def _statement(module: str, own: str) -> ast.stmt:
 
 def _source(module: str) -> str:
     if module not in _SOURCES:
-        path = _ROOT.joinpath(*module.split(".")[1:])
+        package, *parts = module.split(".")
+        if package != _ROOT.name:  # an option of a user's own command
+            return inspect.getsource(sys.modules[module])
+        path = _ROOT.joinpath(*parts)
         if path == _ROOT:
             path = path / "__init__.pyi"
         else:

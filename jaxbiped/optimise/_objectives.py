@@ -1,7 +1,7 @@
 """Objectives: measures of a periodic gait by name, their gradients and their error bars."""
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -55,15 +55,18 @@ def _of_swing(scene: Scene | RigidScene) -> str | None:
 
 
 class Objective(NamedTuple):
-    """What can be optimised or bounded.
+    """What can be optimised or bounded; a user's own is added to `OBJECTIVES`.
 
     Attributes:
         quantity: words, symbol and unit.
         lacks: why a scene has none of it, None where it has.
+        measured: of a user's own, value, error, derivatives with respect to the p parameters (p,)
+            and their errors, of a scene and its gait.
     """
 
     quantity: Quantity
     lacks: Callable[[Scene | RigidScene], str | None] = _of_any
+    measured: Callable[[Scene | RigidScene, Gait], tuple[Any, Any, Any, Any]] | None = None
 
 
 OBJECTIVES = {
@@ -166,8 +169,14 @@ def functionals_for(wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
     of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in needed)
     if "spectral_radius" in wanted:
         of_jacobian = (*CLUSTER, *(name for name in of_jacobian if name not in CLUSTER))
-    others = {*of_jacobian, *_OF_THE_GAIT, *_DISTANCES, "whole_sensitivity"}
+    others = {*of_jacobian, *_OF_THE_GAIT, *_DISTANCES, "whole_sensitivity", *_own(wanted)}
     return of_jacobian, bool(set(wanted) - others)
+
+
+def _own(wanted: tuple[str, ...]) -> dict[str, Callable[[Any, Gait], tuple[Any, Any, Any, Any]]]:
+    """Those of a user's own among these measures, by name."""
+    known = {name: OBJECTIVES[name].measured for name in wanted if name in OBJECTIVES}
+    return {name: measured for name, measured in known.items() if measured is not None}
 
 
 def evaluate(
@@ -186,6 +195,7 @@ def evaluate(
     state, steps, engine = gait.measures.state, gait.orbit[0].shape[0], gait.engine
     first, second = (None, None) if functionals is None else functionals
     rows = {name: _row(gait, name) for name in _OF_THE_GAIT}
+    rows |= {name: _Row(*measured(scene, gait)) for name, measured in _own(wanted).items()}
     if of_jacobian:
         first = first or jacobian_functionals(
             scene, state, of_jacobian, footsteps=steps, accuracy=accuracy, engine=engine

@@ -111,7 +111,7 @@ def effort_of(
         gap=_gap(float(tolerance), _GAP_SHARE[scene.compliant]),
         gap_share=_GAP_SHARE[scene.compliant],
         solver=method,
-        engine=engine_for(engine, obstacle=None, by_device=True),
+        engine=engine_for(engine, obstacle=None, by_device=True, by_any=True),
         may_move=engine == "auto",
         wanted=wanted,
     )
