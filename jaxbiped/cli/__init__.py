@@ -2,7 +2,9 @@
 
 import contextlib
 import dataclasses
+import functools
 import io
+import operator
 import os
 import re
 import sys
@@ -30,20 +32,21 @@ from jaxbiped.cli._report import Report as Report
 from jaxbiped.cli._trade import Trade
 from jaxbiped.cli._walk import Walk
 
-_Command = (
-    Annotated[Walk, subcommand("walk")]
-    | Annotated[FindGait, subcommand("gait")]
-    | Annotated[ContinueGait, subcommand("continue")]
-    | Annotated[Optimise, subcommand("optimise")]
-    | Annotated[Fit, subcommand("fit")]
-    | Annotated[Basin, subcommand("basin")]
-    | Annotated[Models, subcommand("models")]
-    | Annotated[Constraints, subcommand("constraints")]
-    | Annotated[Trade, subcommand("trade")]
-    | Annotated[Cache, subcommand("cache")]
-    | Annotated[Doctor, subcommand("doctor")]
-    | Annotated[None, subcommand("version")]
-)
+COMMANDS: dict[str, type[Command] | None] = {
+    "walk": Walk,
+    "gait": FindGait,
+    "continue": ContinueGait,
+    "optimise": Optimise,
+    "fit": Fit,
+    "basin": Basin,
+    "models": Models,
+    "constraints": Constraints,
+    "trade": Trade,
+    "cache": Cache,
+    "doctor": Doctor,
+    "version": None,
+}
+"""Commands by name; `main` takes one that is added here along."""
 
 _MOVED = {
     "extremes": "extremes is no longer a command: the study of extreme cases is "
@@ -130,7 +133,9 @@ def _parse(arguments: list[str]) -> Command | None:
     refusal = io.StringIO()
     try:
         with contextlib.redirect_stderr(refusal):
-            return tyro.cli(_Command, args=arguments, prog="jaxbiped", description=__doc__)
+            commands = (Annotated[kind, subcommand(name)] for name, kind in COMMANDS.items())
+            chosen: Any = functools.reduce(operator.or_, commands)
+            return tyro.cli(chosen, args=arguments, prog="jaxbiped", description=__doc__)
     except SystemExit as ended:
         if ended.code:
             print(f"jaxbiped: {one_sentence(refusal.getvalue())}", file=sys.stderr)

@@ -17,7 +17,7 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.gait._fixed_point_search import is_sound, with_looser
 from jaxbiped.gait._poincare_map import linearised_return, seed_directions, state_with
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
 
 NO_WALK = -1
@@ -71,7 +71,7 @@ class CycleProblem(NamedTuple):
     """
 
     spec: ReturnMapSpec
-    scene: AbstractScene
+    scene: AbstractWalkerScene
     like: PyTree
     precision: Precision
 

@@ -16,7 +16,7 @@ from jaxbiped.continuation._bifurcations import (
 )
 from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point
 from jaxbiped.continuation._cycle import NO_WALK
-from jaxbiped.dynamics._contact_forces import contacts
+from jaxbiped.dynamics._contacts import contacts
 from jaxbiped.dynamics._state import State, WalkerState
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import Curve, CurvePoint, StepControl, correct, follow

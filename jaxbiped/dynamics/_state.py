@@ -14,7 +14,7 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_finite, check_type
 from jaxbiped._types import Scalar, VectorField, as_float, by_numpy
 from jaxbiped.caching._cached_jit import kept_alone
-from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 
 
 @functools.singledispatch
@@ -178,7 +178,7 @@ def _(scene: Scene) -> type[MinimalState]:
     return BristleState if scene.has_bristles else State
 
 
-def state_for(scene: AbstractScene, state: PyTree, name: str = "state") -> PyTree:
+def state_for(scene: AbstractWalkerScene, state: PyTree, name: str = "state") -> PyTree:
     """A checked start of the type that a scene needs: bristles are straight unless given.
 
     Raises:
@@ -225,7 +225,7 @@ def _(scene: RigidScene) -> type[RigidState]:
 
 
 @kept_alone
-def whole_state(scene: AbstractScene, state: RigidState) -> State:
+def whole_state(scene: AbstractWalkerScene, state: RigidState) -> State:
     """The same motion in the compliant walker's coordinates, its stance foot just touching.
 
     Args:

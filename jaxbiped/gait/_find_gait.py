@@ -38,7 +38,7 @@ from jaxbiped.gait._search_provenance import FoundBy, Origin, single_stage_origi
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.gait._staged_search import is_whole, origin_of, search_in_stages, spectral_radius
 from jaxbiped.scene._parameter_access import select_parameters
-from jaxbiped.scene._scene import AbstractScene, RedundantScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RedundantScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.solve._accuracy import ACCURACIES, Precision, check_accuracy_name, precision_of
 from jaxbiped.solve._error_estimate import check_wanted
@@ -215,7 +215,9 @@ def _search_on(problem: FixedPointProblem, first: Found, engine: str) -> tuple[F
     return found, origin_of(staged, scene.minimal, start)
 
 
-def _check_start(scene: AbstractScene, section: AbstractSection, start: PyTree) -> WalkerState:
+def _check_start(
+    scene: AbstractWalkerScene, section: AbstractSection, start: PyTree
+) -> WalkerState:
     if scene.redundant:
         start = minimal_state(scene, consistent_state(cast("RedundantScene", scene), start).state)
     return with_leg_names_of(section, scene.minimal, state_for(scene.minimal, start, "guess"))

@@ -16,7 +16,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._ending import NamedCode
 from jaxbiped._types import RealScalarLike, Scalar, by_numpy
-from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._contacts import Foot, feet, touches
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.gait._newton import Method, Progress, Stage, initial_progress, newton_iteration
 from jaxbiped.gait._poincare_map import (
@@ -27,7 +27,7 @@ from jaxbiped.gait._poincare_map import (
     state_with,
 )
 from jaxbiped.gait._return_map_spec import ReturnMapSpec, runs_by_lanes
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._scene import AbstractWalkerScene
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.variational._tangents import Seeded
 
@@ -240,7 +240,7 @@ def is_sound(scene: object, state: PyTree, step_length: Scalar, period: Scalar) 
         step_length: advance along the slope in a cycle [m].
         period: duration of a cycle [s].
     """
-    if not isinstance(scene, AbstractScene):
+    if not isinstance(scene, AbstractWalkerScene):
         return jnp.asarray(True)
     pace = jnp.sqrt(scene.walker.l / scene.ground.g)
     forward = (step_length > 0.0) & (period > _SHORTEST * pace)

@@ -26,14 +26,10 @@ from jaxbiped.gait._pseudo_arclength import (
     locate,
 )
 from jaxbiped.scene._ready_scenes import seed_scene
-from jaxbiped.scene._scene import AbstractScene, RigidScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 from jaxbiped.scene.actuation._abstract_actuator import Actuation
-from jaxbiped.scene.laws._catalogue import (
-    FRICTION_LAWS,
-    NORMAL_LAWS,
-    friction_law_like,
-    normal_law_like,
-)
+from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
+from jaxbiped.scene.laws._catalogue import friction_law_like, normal_law_like
 
 _Law = TypeVar("_Law", bound=eqx.Module)
 _CONTROL = StepControl(first=0.08, largest=0.35, smallest=2e-4)
@@ -51,10 +47,10 @@ class Homotopy(NamedTuple):
         first, last: the scenes at s = 0 and at s = 1.
     """
 
-    first: AbstractScene
-    last: AbstractScene
+    first: AbstractWalkerScene
+    last: AbstractWalkerScene
 
-    def at(self, s: Scalar | float) -> AbstractScene:
+    def at(self, s: Scalar | float) -> AbstractWalkerScene:
         """The scene at s; beyond 1 the line goes on."""
         return jtu.tree_map(lambda a, b: _interpolate(a, b, s)[0], self.first, self.last)
 
@@ -74,7 +70,7 @@ def _interpolate(a: Scalar, b: Scalar, s: Scalar | float) -> tuple[Scalar, Scala
     return value, jnp.where(geometric, power * jnp.log(ratio), b - a)
 
 
-def homotopy_to(scene: AbstractScene) -> Homotopy:
+def homotopy_to(scene: AbstractWalkerScene) -> Homotopy:
     """The line to `scene` from the seed's scene, its laws made to resemble the seed's.
 
     Numbers of laws that are not in the catalogue stay those of `scene`. Its actuators are idle.

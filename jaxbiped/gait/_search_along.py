@@ -16,7 +16,7 @@ from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._search_provenance import FoundBy, Origin
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.linalg._small_matrices import eigenpairs
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._scene import AbstractWalkerScene
 
 _FIRST, _LARGEST, _SMALLEST = 0.05, 0.3, 1e-3
 """Steps along the line: the first, at most, and at which it is given up."""
@@ -149,7 +149,9 @@ def _is_ahead(way: _Way, point: Scalar) -> Scalar:
     return jnp.where(way.at[1] > way.at[0], aside < _ASIDE * length + 0.01, length < _JUMP)
 
 
-def _nearest(kept: AbstractScene, line: Homotopy, s: Scalar, wanted: Scalar) -> AbstractScene:
+def _nearest(
+    kept: AbstractWalkerScene, line: Homotopy, s: Scalar, wanted: Scalar
+) -> AbstractWalkerScene:
     scene = line.at(s)
     return select(wanted, scene.minimal, kept)
 

@@ -21,7 +21,7 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import RigidState, WalkerState
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.scene._ground import Ground, SteppedGround
-from jaxbiped.scene._scene import AbstractScene
+from jaxbiped.scene._scene import AbstractWalkerScene
 from jaxbiped.variational._hybrid_system import AbstractSystem
 
 _KINDS: dict[tuple[type, tuple[str, ...]], Any] = {}
@@ -130,18 +130,18 @@ class DisturbedCycle(AbstractAugmented):
     disturbance: str = eqx.field(static=True)
     recurring: ClassVar[int] = 1
 
-    def vector_field(self, t: Time, y: PyTree, args: AbstractScene) -> PyTree:
+    def vector_field(self, t: Time, y: PyTree, args: AbstractWalkerScene) -> PyTree:
         rates = self.walker.vector_field(t, motion_of(y), self._scene(args, y))
         zero = jnp.zeros_like(y.clock)
         return joined(y, rates, dict.fromkeys(self.coordinates, zero) | {"clock": zero + 1.0})
 
-    def switches(self, args: AbstractScene, y: PyTree) -> tuple[Switch, ...]:
+    def switches(self, args: AbstractWalkerScene, y: PyTree) -> tuple[Switch, ...]:
         return self.walker.switches(self._scene(args, y), motion_of(y))
 
-    def ending(self, args: AbstractScene, y: PyTree) -> Scalar:
+    def ending(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
         return self.walker.ending(self._scene(args, y), motion_of(y))
 
-    def reset_map(self, args: AbstractScene, y: PyTree) -> PyTree:
+    def reset_map(self, args: AbstractWalkerScene, y: PyTree) -> PyTree:
         after = self.walker.reset_map(args, motion_of(y))
         told = {"clock": y.clock, self.disturbance: jnp.zeros_like(y.clock)}
         if self.disturbance == DROP:
@@ -150,10 +150,10 @@ class DisturbedCycle(AbstractAugmented):
                 after = after._replace(hip_z=after.hip_z + y.drop * args.walker.l)
         return joined(y, after, told)
 
-    def load(self, args: AbstractScene, y: PyTree) -> None:
+    def load(self, args: AbstractWalkerScene, y: PyTree) -> None:
         return None
 
-    def _scene(self, scene: AbstractScene, y: PyTree) -> AbstractScene:
+    def _scene(self, scene: AbstractWalkerScene, y: PyTree) -> AbstractWalkerScene:
         """The scene as it is disturbed; the step of a rigid walker is its section's."""
         ground: Ground | SteppedGround
         if self.disturbance == PUSH:
@@ -162,7 +162,7 @@ class DisturbedCycle(AbstractAugmented):
             ground = SteppedGround(scene.ground.slope, scene.ground.g, y.drop * scene.walker.l)
         else:
             return scene
-        found: AbstractScene = eqx.tree_at(lambda each: each.ground, scene, ground)
+        found: AbstractWalkerScene = eqx.tree_at(lambda each: each.ground, scene, ground)
         return found
 
 

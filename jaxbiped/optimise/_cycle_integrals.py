@@ -10,8 +10,8 @@ from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time
 from jaxbiped.dynamics._actuation import actuator_powers
+from jaxbiped.dynamics._contacts import feet, touches
 from jaxbiped.dynamics._energy import powers
-from jaxbiped.dynamics._feet import feet, touches
 from jaxbiped.dynamics._impact import impact, push_off_work
 from jaxbiped.dynamics._rolling import inertia_of, rolling_hip_motion, support_of
 from jaxbiped.dynamics._state import RigidState, whole_state

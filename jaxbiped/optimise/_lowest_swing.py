@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, Time, select
-from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.dynamics._contacts import Foot, feet
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.optimise._augmented_cycles import (
@@ -22,7 +22,7 @@ from jaxbiped.optimise._augmented_cycles import (
     joined,
     motion_of,
 )
-from jaxbiped.scene._scene import AbstractScene, Scene
+from jaxbiped.scene._scene import AbstractWalkerScene, Scene
 
 
 class LowestSwing(AbstractAugmented):
@@ -39,18 +39,18 @@ class LowestSwing(AbstractAugmented):
     walker: DisturbedCycle
     coordinates: tuple[str, ...] = eqx.field(static=True, default=("clearance", "passed"))
 
-    def vector_field(self, t: Time, y: PyTree, args: AbstractScene) -> PyTree:
+    def vector_field(self, t: Time, y: PyTree, args: AbstractWalkerScene) -> PyTree:
         zero = jnp.zeros_like(y.passed)
         rates = self.walker.vector_field(t, motion_of(y), args)
         return joined(y, rates, dict.fromkeys(self.coordinates, zero))
 
-    def switches(self, args: AbstractScene, y: PyTree) -> tuple[Switch, ...]:
+    def switches(self, args: AbstractWalkerScene, y: PyTree) -> tuple[Switch, ...]:
         return self.walker.switches(args, motion_of(y))
 
-    def ending(self, args: AbstractScene, y: PyTree) -> Scalar:
+    def ending(self, args: AbstractWalkerScene, y: PyTree) -> Scalar:
         return self.walker.ending(args, motion_of(y))
 
-    def reset_map(self, args: AbstractScene, y: PyTree) -> PyTree:
+    def reset_map(self, args: AbstractWalkerScene, y: PyTree) -> PyTree:
         motion, zero = motion_of(y), jnp.zeros_like(y.passed)
         lowered = zero
         if self.walker.disturbance == DROP and args.compliant:
@@ -61,7 +61,7 @@ class LowestSwing(AbstractAugmented):
         at_section = joined(y, after, {"clearance": y.clearance, "passed": zero})
         return select(y.passed < 0.5, joined(y, motion, told), at_section)
 
-    def load(self, args: AbstractScene, y: PyTree) -> None:
+    def load(self, args: AbstractWalkerScene, y: PyTree) -> None:
         return None
 
 
@@ -85,27 +85,27 @@ class LowestSwingSection(AbstractSection):
         return jnp.where(y.passed > 0.5, swings, self.section.counts(args, motion))
 
 
-def _swing_foot(args: AbstractScene, state: PyTree) -> Foot:
+def _swing_foot(args: AbstractWalkerScene, state: PyTree) -> Foot:
     """A compliant walker's, leg 2's: its cycle has the footstep before, and the exchange of legs
     behind."""
     return feet(cast("Scene", args), state).foot_2
 
 
-def _swing_height(args: AbstractScene, state: PyTree) -> Scalar:
+def _swing_height(args: AbstractWalkerScene, state: PyTree) -> Scalar:
     """Of the foot that swings above its ground [m]; a rigid walker's is leg 1's."""
     if not args.compliant:
         return args.walker.hip_to_foot * (jnp.cos(state.theta_2) - jnp.cos(state.theta_1))
     return -_swing_foot(args, state).penetration
 
 
-def _swing_height_rate(args: AbstractScene, state: PyTree) -> Scalar:
+def _swing_height_rate(args: AbstractWalkerScene, state: PyTree) -> Scalar:
     if not args.compliant:
         by_1 = jnp.sin(state.theta_1) * state.omega_1
         return args.walker.hip_to_foot * (by_1 - jnp.sin(state.theta_2) * state.omega_2)
     return -_swing_foot(args, state).penetration_rate
 
 
-def _swings(args: AbstractScene, state: PyTree) -> Scalar:
+def _swings(args: AbstractWalkerScene, state: PyTree) -> Scalar:
     """Whether the clearance rule lets that foot pass."""
     if not args.compliant:
         return jnp.asarray(True)

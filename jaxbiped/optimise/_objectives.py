@@ -56,15 +56,18 @@ def _of_swing(scene: Scene | RigidScene) -> str | None:
 
 
 class Objective(NamedTuple):
-    """What can be optimised or bounded.
+    """What can be optimised or bounded; a user's own is added to `OBJECTIVES`.
 
     Attributes:
         quantity: words, symbol and unit.
         lacks: why a scene has none of it, None where it has.
+        measured: of a user's own, value, error, derivatives with respect to the p parameters (p,)
+            and their errors, of a scene and its gait.
     """
 
     quantity: Quantity
     lacks: Callable[[Scene | RigidScene], str | None] = _of_any
+    measured: Callable[[Scene | RigidScene, Gait], tuple[Any, Any, Any, Any]] | None = None
 
 
 OBJECTIVES = {
@@ -185,8 +188,14 @@ def _names_for(wanted: tuple[str, ...]) -> tuple[tuple[str, ...], bool]:
     of_jacobian = tuple(name for name in JACOBIAN_FUNCTIONALS if name in needed)
     if "spectral_radius" in wanted:
         of_jacobian = (*CLUSTER, *(name for name in of_jacobian if name not in CLUSTER))
-    others = {*of_jacobian, *_OF_THE_GAIT, *_DISTANCES, "whole_sensitivity"}
+    others = {*of_jacobian, *_OF_THE_GAIT, *_DISTANCES, "whole_sensitivity", *_own(wanted)}
     return of_jacobian, bool(set(wanted) - others)
+
+
+def _own(wanted: tuple[str, ...]) -> dict[str, Callable[[Any, Gait], tuple[Any, Any, Any, Any]]]:
+    """Those of a user's own among these measures, by name."""
+    known = {name: OBJECTIVES[name].measured for name in wanted if name in OBJECTIVES}
+    return {name: measured for name, measured in known.items() if measured is not None}
 
 
 def evaluate(
@@ -203,6 +212,7 @@ def evaluate(
     wanted = tuple(names)
     both = (gait.measures, gait.measure_errors, gait.sensitivities, gait.sensitivity_errors)
     rows = {name: _row(*(getattr(each, name) for each in both)) for name in _OF_THE_GAIT}
+    rows |= {name: _Row(*measured(scene, gait)) for name, measured in _own(wanted).items()}
     if functionals is None:
         footsteps = gait.orbit[0].shape[0]
         functionals = functionals_of(scene, gait, wanted, footsteps, accuracy)

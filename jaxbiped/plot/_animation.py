@@ -12,7 +12,7 @@ from matplotlib.patches import Circle
 
 from jaxbiped._checks import check_positive
 from jaxbiped._files import check_writable_file
-from jaxbiped.dynamics._feet import feet
+from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._state import State
 from jaxbiped.plot import style

@@ -6,7 +6,7 @@ import jax.tree_util as jtu
 import numpy as np
 import numpy.typing as npt
 
-from jaxbiped.dynamics._contact_forces import Contacts, contacts
+from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._state import State
 from jaxbiped.measure._samples import evaluate_along, evaluate_at
 from jaxbiped.scene._scene import Scene

@@ -8,7 +8,7 @@ from jaxbiped._quantity import Quantity
 from jaxbiped.dynamics._state_quantities import STATE_QUANTITIES
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._walker import Walker
-from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS
+from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS
 from jaxbiped.scene.laws.friction._bengisu_akay import BengisuAkay
 from jaxbiped.scene.laws.normal._ristow_schafer import RistowSchafer
 from jaxbiped.sweep.starts._coordinates import START_QUANTITIES

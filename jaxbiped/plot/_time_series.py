@@ -12,7 +12,7 @@ from matplotlib.figure import Figure, SubFigure
 from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped._types import Scalar, as_array, as_float
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._contact_forces import Contacts, contacts
+from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._state import RigidState
 from jaxbiped.measure._footsteps import heel_strikes
 from jaxbiped.measure._samples import evaluate_along

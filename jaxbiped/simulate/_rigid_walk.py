@@ -239,7 +239,10 @@ def rigid_walk(
     check_count("max_solver_steps", max_solver_steps)
     narrow = state.theta_1.dtype != jnp.float64
     chosen = engine_for(
-        engine, obstacle="it computes in 64 bits" if narrow else None, by_device=True
+        engine,
+        obstacle="it computes in 64 bits" if narrow else None,
+        by_device=True,
+        by_any=True,
     )
     count, longest = 1 if footsteps is None else footsteps, duration
     if duration is None:

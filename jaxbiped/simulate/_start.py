@@ -20,9 +20,8 @@ from jaxbiped.dynamics._state import BristleState, State, state_for
 from jaxbiped.scene._ground import AbstractClearance, Ground
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._walker import Walker
-from jaxbiped.scene.actuation._catalogue import ACTUATORS
-from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
-from jaxbiped.scene.laws._catalogue import FRICTION_LAWS, NORMAL_LAWS
+from jaxbiped.scene.actuation._abstract_actuator import ACTUATORS
+from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS, AbstractNormalLaw
 
 _PRECISIONS = (np.float16, np.float32, np.float64)
 """Of NumPy's, those that JAX has."""

@@ -9,8 +9,8 @@ from jaxtyping import PyTree
 from jaxbiped._ending import Ending
 from jaxbiped._types import Scalar, Time
 from jaxbiped.caching._cached_jit import cached_jit
+from jaxbiped.dynamics._contacts import Foot, feet, touches
 from jaxbiped.dynamics._energy import energies
-from jaxbiped.dynamics._feet import Foot, feet, touches
 from jaxbiped.dynamics._minimal_motion import accelerations
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._state import RigidState, State

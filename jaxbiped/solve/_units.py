@@ -15,7 +15,7 @@ from jaxtyping import PyTree
 from jaxbiped._types import Numbers, Scalar
 from jaxbiped.dynamics._state import state_type
 from jaxbiped.dynamics._state_quantities import dimensions_of, recurring_leaves
-from jaxbiped.scene._scene import AbstractScene, is_compliant
+from jaxbiped.scene._scene import AbstractWalkerScene, is_compliant
 
 _LENGTH = 0.40
 """Leg length of the seed paper's walker [m]."""
@@ -68,7 +68,7 @@ def recurring_inverse_units(args: PyTree, count: int) -> Scalar:
     return jnp.stack(inverse) if len(inverse) == count else jnp.ones(count)
 
 
-def _length_and_time(args: AbstractScene) -> tuple[Scalar, Scalar]:
+def _length_and_time(args: AbstractWalkerScene) -> tuple[Scalar, Scalar]:
     walker, ground = args.walker, args.ground
     known = not any(isinstance(leaf, jax.core.Tracer) for leaf in (walker.l, ground.g))
     xp: Any = np if known else jnp  # where numbers are known nothing is compiled for them

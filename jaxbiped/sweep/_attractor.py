@@ -16,7 +16,7 @@ from jaxbiped._types import as_float
 from jaxbiped.basins._label_oracle import spread_directions
 from jaxbiped.basins._labels import Label
 from jaxbiped.caching._cached_jit import cached_jit
-from jaxbiped.dynamics._feet import feet
+from jaxbiped.dynamics._contacts import feet
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state_quantities import recurring_leaves, state_of_recurring
 from jaxbiped.gait._fixed_point_search import Search

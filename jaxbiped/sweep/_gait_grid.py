@@ -18,7 +18,6 @@ from jaxbiped._types import JsonObject
 from jaxbiped.dynamics._state_quantities import (
     STATE_QUANTITIES,
     recurring_names,
-    state_of_recurring,
 )
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait

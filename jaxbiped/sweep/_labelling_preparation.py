@@ -10,7 +10,6 @@ from jaxtyping import PyTree
 from jaxbiped._checks import ArgumentError, check_positive
 from jaxbiped.basins._arguments import check_whole
 from jaxbiped.basins._labels import Label
-from jaxbiped.dynamics._state_quantities import state_of_recurring
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene

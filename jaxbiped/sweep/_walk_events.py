@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxbiped._types import Numbers, Scalar
-from jaxbiped.dynamics._feet import Foot, feet, touches
+from jaxbiped.dynamics._contacts import Foot, feet, touches
 from jaxbiped.dynamics._state import State
 from jaxbiped.scene._scene import CompliantScene, Scene
 from jaxbiped.solve._fusion_barrier import fusion_barrier

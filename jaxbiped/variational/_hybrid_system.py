@@ -12,8 +12,7 @@ from jaxtyping import PyTree
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import Scalar, Time
-from jaxbiped.dynamics._contact_forces import foot_forces
-from jaxbiped.dynamics._feet import with_leg_2_standing
+from jaxbiped.dynamics._contacts import foot_forces, with_leg_2_standing
 from jaxbiped.dynamics._impact import impact
 from jaxbiped.dynamics._minimal_motion import vector_field
 from jaxbiped.dynamics._redundant_motion import redundant_field

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError
 from jaxbiped._types import JsonObject
-from jaxbiped.dynamics._contact_forces import Contacts, contacts
+from jaxbiped.dynamics._contacts import Contacts, contacts
 from jaxbiped.dynamics._energy import energies
 from jaxbiped.dynamics._redundant_state import minimal_state
 from jaxbiped.dynamics._state import State

@@ -6,7 +6,7 @@ import diffrax
 import jax.numpy as jnp
 
 from jaxbiped._types import RealScalarLike, Scalar
-from jaxbiped.dynamics._feet import feet, landings, standing_foot
+from jaxbiped.dynamics._contacts import feet, landings, standing_foot
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractWrappedControl,
     Adapted,

@@ -19,8 +19,7 @@ import jax.tree_util as jtu
 from jaxtyping import PyTree
 
 from jaxbiped._types import Numbers, RealScalarLike, Scalar
-from jaxbiped.dynamics._contact_forces import foot_force
-from jaxbiped.dynamics._feet import Foot, feet
+from jaxbiped.dynamics._contacts import Foot, feet, foot_force
 from jaxbiped.scene._scene import CompliantScene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
 from jaxbiped.solve._accuracy import rms_norm

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.dynamics._feet import Feet, Foot, landings, standing_foot, touches
+from jaxbiped.dynamics._contacts import Feet, Foot, landings, standing_foot, touches
 
 
 def test_foot_at_the_seed_start():
