@@ -19,7 +19,6 @@ from jaxbiped.solve.controllers._wrapped_control import (
     AbstractWrappedControl,
     Adapted,
     Attempt,
-    StepControl,
     try_again,
 )
 from jaxbiped.variational._grazing import turns_of
@@ -82,7 +81,6 @@ class SwitchLocator(AbstractWrappedControl):
     counts as an arrival, so a solve may start on its section.
     """
 
-    controller: StepControl
     watch: Watch
 
     def init(self, *request: Any) -> tuple[Scalar, SwitchLocatorState]:

@@ -19,10 +19,9 @@ from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.solve._accuracy import rms_norm
 from jaxbiped.solve._projected_solver import Projected
 from jaxbiped.solve.controllers._wrapped_control import (
-    AbstractWrappedControl,
+    AbstractMemorylessControl,
     Adapted,
     Attempt,
-    StepControl,
 )
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._rosenbrock_tangents import rosenbrock_tangents
@@ -151,26 +150,20 @@ def _tangent_step(
     return Tangents(y1, as_columns(columns)), Tangents(error, as_columns(column_errors))
 
 
-class TangentControl(AbstractWrappedControl):
+class TangentControl(AbstractMemorylessControl):
     """Lets the columns' errors into a controller's norm, with a tolerance of their own.
 
     An entry's error is measured against its own size, a share of the largest entry of its column,
     and the column's floor, each in its leaf's unit: a column that is zero, or fades away, must not
-    choose the steps.
+    choose the steps. The wrapped controller's norm is `worst_norm`.
 
     Attributes:
-        controller: decides every step's size; its norm is `worst_norm`.
         tangent_rtol: tolerance of the columns, relative.
         inverse_units: of the state's leaves, shape (c,).
     """
 
-    controller: StepControl
     tangent_rtol: RealScalarLike
     inverse_units: Scalar
-
-    def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
-        return self.controller.init(*request)
 
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does."""

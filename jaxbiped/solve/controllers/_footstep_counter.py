@@ -11,7 +11,6 @@ from jaxbiped.solve.controllers._wrapped_control import (
     AbstractWrappedControl,
     Adapted,
     Attempt,
-    StepControl,
 )
 
 PATIENCE = 100.0
@@ -25,11 +24,9 @@ class FootstepLimit(AbstractWrappedControl):
     how many strikes there were. The solve's `args` must be the scene.
 
     Attributes:
-        controller: decides every step's size.
         limit: number of heel strikes after which the solve ends.
     """
 
-    controller: StepControl
     limit: RealScalarLike
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:

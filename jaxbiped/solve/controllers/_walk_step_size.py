@@ -29,7 +29,7 @@ from jaxbiped.solve.controllers._contact_steps import ShallowContact, TouchdownA
 from jaxbiped.solve.controllers._tangent_step_size import SAFETY, SMALLEST_STEP
 from jaxbiped.solve.controllers._wrapped_control import (
     AbstractControl,
-    AbstractWrappedControl,
+    AbstractMemorylessControl,
     Adapted,
     Attempt,
     StepControl,
@@ -165,22 +165,16 @@ def _root(square: Scalar, order: RealScalarLike | None) -> Scalar:
     return square ** (0.5 / order)
 
 
-class CrossedSwitches(AbstractWrappedControl):
+class CrossedSwitches(AbstractMemorylessControl):
     """Wraps a controller; errors of steps that cross a switch of the contact count `weight` times.
 
     The solve's `args` must be the scene.
 
     Attributes:
-        controller: decides every step's size.
         weight: of those errors [–].
     """
 
-    controller: StepControl
     weight: float
-
-    def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
-        return self.controller.init(*request)
 
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does."""

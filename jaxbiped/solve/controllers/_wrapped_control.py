@@ -114,7 +114,7 @@ class AbstractWrappedControl(AbstractControl):
         controller: decides every step's size.
     """
 
-    controller: eqx.AbstractVar[StepControl]
+    controller: StepControl
 
     @property
     def rtol(self) -> RealScalarLike:
@@ -137,17 +137,23 @@ class AbstractWrappedControl(AbstractControl):
         return self
 
 
+class AbstractMemorylessControl(AbstractWrappedControl):
+    """Wraps a controller, whose state is all that is carried from step to step."""
+
+    def init(self, *request: Any) -> tuple[Scalar, Any]:
+        """The first step's end and the controller's state, as diffrax asks."""
+        return self.controller.init(*request)
+
+
 class Extremes(AbstractWrappedControl):
     """Wraps a controller; keeps the least and largest values at the ends of the accepted steps.
 
     Exact for every solver, and without room for the steps themselves. The start counts as an end.
 
     Attributes:
-        controller: decides every step's size.
         function: of (args, state).
     """
 
-    controller: StepControl
     function: Callable[[PyTree, PyTree], PyTree] = eqx.field(static=True)
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
@@ -185,11 +191,9 @@ class GivenFirstStep(AbstractWrappedControl):
     cannot be kept on disk. Sizes are checked before a solve begins.
 
     Attributes:
-        controller: decides every step's size but the first's.
         size: of the first step, or of all where the controller keeps it [s].
     """
 
-    controller: StepControl
     size: RealScalarLike
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
