@@ -24,7 +24,7 @@ from jaxbiped.solve._error_estimate import LOOSER, Judged, check_untraced, check
 from jaxbiped.solve._solvers import solver_named
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import relative_to_scene, sizes_of
-from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas import Rodas5P
 
 _FIRST = 1e-2
 """First tolerance as a share of the relative error wanted: errors of walks are about 0.5 to 6

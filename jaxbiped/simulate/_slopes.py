@@ -22,7 +22,7 @@ from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._failure_events import FALL_ANGLE, ending_surface
 from jaxbiped.solve._trajectory import Trajectory
 from jaxbiped.solve._units import units_of
-from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
 from jaxbiped.variational._tangents_at_times import (

@@ -23,7 +23,10 @@ from jaxbiped.solve.controllers._wrapped_control import (
     Adapted,
     Attempt,
 )
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
+from jaxbiped.solve.rosenbrock._rosenbrock_solver import (
+    AbstractMemorylessSolver,
+    AbstractRosenbrock,
+)
 from jaxbiped.variational._rosenbrock_tangents import rosenbrock_tangents
 from jaxbiped.variational._saltation import has_saltation, jump_surface_values, saltation_at
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
@@ -42,7 +45,7 @@ class VariationalField(eqx.Module):
         return Tangents(rate, as_columns(columns))
 
 
-class TangentSolver(diffrax.AbstractAdaptiveSolver):  # type: ignore[type-arg]
+class TangentSolver(AbstractMemorylessSolver):
     """Steps a state and its columns: the columns by the exact derivative of the solver's step.
 
     They share the step's Jacobian and factorisation. Their error estimate is the derivative of
@@ -58,26 +61,15 @@ class TangentSolver(diffrax.AbstractAdaptiveSolver):  # type: ignore[type-arg]
     watch: Watch
     solver: diffrax.AbstractAdaptiveSolver[PyTree]
     columns_only_choose_steps: bool = eqx.field(static=True, default=False)
-    term_structure: ClassVar = diffrax.AbstractTerm
     interpolation_cls: ClassVar[type[diffrax.LocalLinearInterpolation]] = (
         diffrax.LocalLinearInterpolation
     )
 
     def order(self, terms: Any) -> int | None:
-        """Order of the solver."""
         return self.solver.order(terms)
 
     def error_order(self, terms: Any) -> RealScalarLike | None:
-        """Order of the solver's error estimate."""
         return self.solver.error_order(terms)
-
-    def init(self, terms: Any, t0: Time, t1: Time, y0: Tangents, args: Seeded) -> None:
-        """Nothing is carried from step to step."""
-        return None
-
-    def func(self, terms: Any, t0: Time, y0: Tangents, args: Seeded) -> Tangents:
-        """The vector field at a point."""
-        return terms.vf(t0, y0, args)
 
     def step(
         self,
