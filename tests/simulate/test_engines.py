@@ -12,6 +12,7 @@ from reference.walks import reference_states
 
 import jaxbiped as jb
 from jaxbiped.compiler.ir._lower_jaxpr import UnknownPrimitiveError
+from jaxbiped.simulate import _lane_backend
 from jaxbiped.simulate._lane_backend import recorded_steps
 from tests.unknown_to_lanes import ErrorFunction
 
@@ -253,7 +254,7 @@ def test_memory_is_asked_for_by_the_steps_taken(monkeypatch):
     scene, start = jb.seed_scene(), jb.seed_state()
     few = jb.simulate(scene, start, duration=0.1)
     capped = jb.simulate(scene, start, duration=0.1, max_solver_steps=1 << 50)
-    monkeypatch.setattr("jaxbiped.solve._lane_solve._ROOM", 16)
+    monkeypatch.setattr(_lane_backend, "_ROOM", 16)
     again = jb.simulate(scene, start, duration=0.1)
     assert int(few.accepted) > 16
     for walk in (capped, again):
