@@ -14,11 +14,20 @@ from jaxbiped.compiler import AbstractEngine
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
-from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
+from jaxbiped.variational._tangents import (
+    SectionSolve,
+    Seeded,
+    Tangents,
+    Watch,
+    along_columns,
+    as_columns,
+)
 from jaxbiped.variational._variational_solve import solve_variational
 
 _FLOOR = 1e-4
 """Size below which a derivative's error is absolute, along a direction of its own size."""
+_LOOSER = 10.0
+"""Tolerance of derivatives, in units of the state's."""
 _MOST_ATTEMPTS = 1_000_000
 _NEAR = 1e-3
 """Time from the event, in units of time, beyond which it is not known where that lies."""
@@ -37,23 +46,16 @@ class TangentsAtTimes(NamedTuple):
 
 
 def tangents_at_times(
-    watch: Watch,
-    solver: AbstractRosenbrock,
-    scene: PyTree,
-    state: PyTree,
-    *,
+    how: SectionSolve,
+    start: Tangents,
+    seeded: Seeded,
     times: Scalar,
-    places: tuple[int, ...],
-    active: tuple[int, ...],
-    precision: Precision,
     engine: AbstractEngine | None = None,
 ) -> TangentsAtTimes:
     """Follows a motion from one time to the next, with its derivatives.
 
-    Directions are those of the leaves of the state at `places`, then those of the `active` leaves
-    of the scene. Times increase; infinite ones are passed over.
+    Times increase; infinite ones are passed over.
     """
-    start, seeded = seeded_directions(scene, state, places, active)
 
     def follow(
         now: tuple[Scalar, Tangents], time: Scalar
@@ -61,21 +63,28 @@ def tangents_at_times(
         since, at = now
         moves = jnp.isfinite(time) & (time > since)
         lasts = jnp.where(moves, time - since, 0.0)
-        found = tangents_after(watch, solver, at, seeded, lasts, precision, engine)
+        found = tangents_after(how, at, seeded, lasts, engine)
         after = select(moves, found, at)
         return (jnp.where(moves, time, since), after), TangentsAtTimes(after.state, after.columns.T)
 
-    first = (jnp.zeros_like(times[0]), Tangents(state, start))
+    first = (jnp.zeros_like(times[0]), start)
     if len(times) == 1:
         _, found = follow(first, times[0])
         return jtu.tree_map(lambda leaf: leaf[None], found)
     return jax.lax.scan(follow, first, times)[1]
 
 
+def motion_solve(watch: Watch, solver: AbstractRosenbrock, rtol: RealScalarLike) -> SectionSolve:
+    """How a motion solved at this relative tolerance is followed again, with derivatives."""
+    return SectionSolve(watch, solver, Precision(rtol, _LOOSER * rtol), jnp.inf, _MOST_ATTEMPTS)
+
+
 def seeded_directions(
     scene: PyTree, state: PyTree, places: tuple[int, ...], active: tuple[int, ...]
-) -> tuple[Scalar, Seeded]:
-    """Columns at the start, shape (c, n), and the scene with what moves it."""
+) -> tuple[Tangents, Seeded]:
+    """A start and a scene with what moves them: leaves of the state at `places`, then `active` ones
+    of the scene.
+    """
     c, m, p = len(jtu.tree_leaves(state)), len(places), len(active)
     start = np.zeros((c, m + p))
     start[list(places), range(m)] = 1.0
@@ -84,32 +93,21 @@ def seeded_directions(
     inverse = jtu.tree_leaves(units_of(scene, state).inverse)
     floors = [*(jnp.asarray(_FLOOR * inverse[i]) for i in places), *(_FLOOR / s for s in sizes)]
     seeds = jnp.concatenate([jnp.zeros((p, m)), jnp.eye(p)], axis=1)
-    return jnp.asarray(start), Seeded(
+    return Tangents(state, jnp.asarray(start)), Seeded(
         scene, seeds, jnp.stack(floors) if floors else jnp.zeros(0), active
     )
 
 
 def tangents_after(
-    watch: Watch,
-    solver: AbstractRosenbrock,
+    how: SectionSolve,
     at: Tangents,
     seeded: Seeded,
     time: Scalar,
-    precision: Precision,
     engine: AbstractEngine | None = None,
 ) -> Tangents:
     """A state and its derivatives a fixed time [s] later; NaN where they are not determined."""
-    found, _ = solve_variational(
-        watch,
-        solver,
-        at,
-        seeded,
-        jnp.ones(len(seeded.active)),
-        precision=precision,
-        max_time=time,
-        max_solver_steps=_MOST_ATTEMPTS,
-        engine=engine,
-    )
+    timed, sizes = how._replace(max_time=time), jnp.ones(len(seeded.active))
+    found, _ = solve_variational(timed, at, seeded, sizes, engine=engine)
     return Tangents(found.state, jnp.where(found.undetermined, jnp.nan, found.columns.T))
 
 

@@ -1,18 +1,20 @@
 """Variational solves by lanes: for a time, or to a section."""
 
+from typing import cast
+
 import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, Time
+from jaxbiped._types import RealScalarLike, Scalar
 from jaxbiped.caching._caches import PROGRAMS, bounded_cache
 from jaxbiped.compiler import LANES, XLA, AbstractEngine, Program, Recorded, Recording, Request
-from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._first_and_last_step import just_before_end
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import Nodes, SectionArrival
 from jaxbiped.variational._tangents import (
+    SectionSolve,
     Seeded,
     Tangents,
     VariationalProblem,
@@ -26,20 +28,16 @@ _QUICK = 50_000
 
 
 def solve_variational(
-    watch: Watch,
-    solver: AbstractRosenbrock,
+    how: SectionSolve,
     y0: Tangents,
     args: Seeded,
     sizes: Scalar,
     *,
-    precision: Precision,
-    max_time: Time,
-    max_solver_steps: int,
     carries_parameters: Scalar | bool = True,
     save_nodes: bool = False,
     engine: AbstractEngine | None = LANES,
 ) -> tuple[VariationalSolution, Recording | Recorded | None]:
-    """Solves from `y0` to the section, a failure or `max_time` [s].
+    """Solves from `y0` by a program, which either engine runs.
 
     Of the columns the last p move one parameter each, by `sizes`, shape (p,), in the order of the
     active leaves; the columns before move none. Unless `carries_parameters`, the last p are not
@@ -56,18 +54,18 @@ def solve_variational(
         carries_parameters=_number(carries_parameters),
         state_floors=args.floors[:m],
         parameter_floors=args.floors[m:],
-        rtol=_number(precision.rtol),
-        tangent_rtol=_number(precision.tangent_rtol),
+        rtol=_number(how.precision.rtol),
+        tangent_rtol=_number(how.precision.tangent_rtol),
         units=jtu.tree_map(_number, units_of(args.args, y0.state)),
-        max_time=_number(max_time),
-        almost=just_before_end(_number(max_time)),
-        max_attempts=_number(max_solver_steps),
+        max_time=_number(how.max_time),
+        almost=just_before_end(_number(how.max_time)),
+        max_attempts=_number(how.max_solver_steps),
     )
     request = Request(
-        _program(watch, solver, args.active, save_nodes),
+        _program(how.watch, cast(AbstractRosenbrock, how.solver), args.active, save_nodes),
         inputs,
-        room=max_solver_steps if save_nodes else 0,
-        quick=max_solver_steps <= _QUICK,
+        room=how.max_solver_steps if save_nodes else 0,
+        quick=how.max_solver_steps <= _QUICK,
         keeps_records=save_nodes,
     )
     if engine is None:
@@ -88,29 +86,11 @@ def _number(value: RealScalarLike) -> Scalar:
 
 
 def solve_to_section_by_lanes(
-    watch: Watch,
-    solver: AbstractRosenbrock,
-    y0: Tangents,
-    args: Seeded,
-    sizes: Scalar,
-    *,
-    precision: Precision,
-    max_time: Time,
-    max_solver_steps: int,
-    carries_parameters: Scalar | bool,
+    how: SectionSolve, y0: Tangents, args: Seeded, sizes: Scalar, carries_parameters: Scalar | bool
 ) -> SectionArrival:
     """`solve_to_section` for columns as `solve_variational` takes them; nodes are a `Recording`."""
     found, recording = solve_variational(
-        watch,
-        solver,
-        y0,
-        args,
-        sizes,
-        precision=precision,
-        max_time=max_time,
-        max_solver_steps=max_solver_steps,
-        carries_parameters=carries_parameters,
-        save_nodes=True,
+        how, y0, args, sizes, carries_parameters=carries_parameters, save_nodes=True
     )
     return SectionArrival(
         y=Tangents(found.state, found.columns.T),
