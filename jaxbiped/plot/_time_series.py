@@ -17,7 +17,7 @@ from jaxbiped.plot._samples import sample
 from jaxbiped.plot._symbols import LEG_ANGLE, PENETRATION, TIME
 from jaxbiped.plot.style import LEG_NAMES, axes_or_new, dress, figure_of, leg_line, legend_above
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.simulate._rigid_walk import rigid_walk
+from jaxbiped.simulate._simulate import rigid_walk
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 

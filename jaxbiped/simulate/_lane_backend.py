@@ -8,14 +8,14 @@ import jax
 import jax.numpy as jnp
 import jax.tree_util as jtu
 import numpy as np
-from jaxtyping import Array, ArrayLike, PyTree
+from jaxtyping import Array, PyTree
 
 from jaxbiped._checks import ArgumentError, check_choice
 from jaxbiped._types import as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.compiler import LaneEngine, Request
-from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import State
+from jaxbiped.simulate._start import Options
 from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, Solved, adaptive_program
 from jaxbiped.solve._engine_names import ENGINES, engine_for, engine_named
 from jaxbiped.solve._saved_outputs import Saved
@@ -34,28 +34,19 @@ _ROOM = 1 << 18
 
 
 def choose_engine(
-    engine: str,
-    *,
-    solver: diffrax.AbstractSolver[PyTree],
-    save_steps: bool,
-    adjoint: diffrax.AbstractAdjoint | None,
-    leaves: PyTree,
-    times: str | ArrayLike | AbstractSection,
-    section: AbstractSection | None,
-    dt: ArrayLike | None = None,
-    redundant: bool = False,
+    asked: Options, solver: diffrax.AbstractSolver[PyTree], leaves: PyTree, *, redundant: bool
 ) -> str:
     """The engine that "auto" stands for, or the one that is asked for.
 
     Raises:
         ArgumentError: an unknown name, or lanes or CUDA for what they cannot do.
     """
-    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jtu.tree_leaves(leaves))
-    obstacle = _hindrance(solver, save_steps, adjoint, leaves, times, traced=traced)
-    if redundant and not (isinstance(times, str) and times == "end"):
+    obstacle = _hindrance(asked, solver, leaves)
+    if redundant and not (isinstance(asked.save, str) and asked.save == "end"):
         obstacle = 'redundant coordinates are diffrax\'s, but for save="end"'
-    if dt is not None:
+    if asked.dt is not None:
         obstacle = "steps of one size (dt) are diffrax's"
+    engine, section = asked.engine, asked.section
     if section is None:
         return engine_for(engine, obstacle=obstacle, prefers_xla=redundant, by_device=True)
     check_choice("engine", engine, ENGINES)
@@ -68,26 +59,21 @@ def choose_engine(
 
 
 def _hindrance(
-    solver: diffrax.AbstractSolver[PyTree],
-    save_steps: bool,
-    adjoint: diffrax.AbstractAdjoint | None,
-    leaves: PyTree,
-    times: str | ArrayLike | AbstractSection,
-    *,
-    traced: bool,
+    asked: Options, solver: diffrax.AbstractSolver[PyTree], leaves: PyTree
 ) -> str | None:
     """Why lanes cannot do what is asked."""
+    each, section = jtu.tree_leaves(leaves), asked.section
     if not isinstance(solver, AbstractRosenbrock):
         return f"{type(solver).__name__} is not one of its solvers (rodas3p to rodas5p)"
-    if save_steps and traced:
+    if asked.save_steps and any(isinstance(leaf, jax.core.Tracer) for leaf in each):
         return 'under jit, vmap or derivatives it does not save every step (save="steps")'
-    if adjoint is not None:
+    if asked.adjoint is not None:
         return "an adjoint is diffrax's"
-    if isinstance(times, jax.core.Tracer):
+    if isinstance(asked.times, jax.core.Tracer):
         return "the times to save at must be known beforehand"
-    if isinstance(times, AbstractSection) and jtu.tree_leaves(times):
-        return f"the section {type(times).__name__} holds numbers of its own"
-    if any(jnp.result_type(leaf) != jnp.float64 for leaf in jtu.tree_leaves(leaves)):
+    if section is not None and jtu.tree_leaves(section):
+        return f"the section {type(section).__name__} holds numbers of its own"
+    if any(jnp.result_type(leaf) != jnp.float64 for leaf in each):
         return "it computes in 64 bits"
     return None
 
