@@ -1,7 +1,8 @@
 """Walk of the rigid walker: a checked request, which either engine runs."""
 
 import dataclasses
-from typing import ClassVar
+import functools
+from typing import ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -18,7 +19,8 @@ from jaxbiped._checks import (
     traced_rules,
 )
 from jaxbiped._types import Scalar, as_float, by_numpy
-from jaxbiped.compiler import Request
+from jaxbiped.caching._caches import PROGRAMS, bounded_cache
+from jaxbiped.compiler import Program, Request
 from jaxbiped.dynamics._section import HeelStrike
 from jaxbiped.dynamics._state import RigidState, check_state
 from jaxbiped.scene._scene import RigidScene
@@ -34,8 +36,14 @@ from jaxbiped.simulate._start import (
 )
 from jaxbiped.solve._accuracy import ACCURACIES
 from jaxbiped.solve._engine_names import engine_for, engine_named
-from jaxbiped.solve._rigid_program import rigid_program
-from jaxbiped.solve._rigid_steps import RigidWalk
+from jaxbiped.solve._rigid_steps import (
+    RigidProgress,
+    RigidWalk,
+    attempt_step,
+    ending_of,
+    initial_progress,
+    state_with_hip,
+)
 from jaxbiped.solve._scene_key import scene_key
 from jaxbiped.solve._trajectory import Trajectory, arrivals_among, single_time
 
@@ -175,6 +183,41 @@ class RigidSimulation(eqx.Module):
             grazes=found.grazes,
             engine=self.engine,
         )
+
+
+class RigidSolved(NamedTuple):
+    """One walk's outputs: see `RigidProgress`."""
+
+    t: Scalar
+    state: RigidState
+    ending: Scalar
+    footsteps: Scalar
+    accepted: Scalar
+    rejected: Scalar
+    grazes: Scalar
+
+
+@bounded_cache(PROGRAMS)  # the same object each time, so that nothing is compiled again
+def rigid_program(records: bool, waits: bool, embedded: bool = False) -> Program:
+    """The program of a `RigidWalk`.
+
+    Args:
+        records: whether time and state after each strike are recorded.
+        waits: whether the duration only bounds the wait for footsteps.
+        embedded: whether steps go on with the embedded solution; see `rolling_step`.
+    """
+
+    def finish(walk: RigidWalk, now: RigidProgress) -> RigidSolved:
+        code = ending_of(walk, now, jnp.asarray(waits))
+        counts = (now.footsteps, now.accepted, now.rejected, now.grazes)
+        return RigidSolved(now.t, state_with_hip(walk, now), code, *counts)
+
+    attempt = functools.partial(attempt_step, embedded=embedded)
+    return Program(initial_progress, attempt, finish, record=_record if records else None)
+
+
+def _record(walk: RigidWalk, now: RigidProgress, time: Scalar) -> tuple[Scalar, list[Scalar]]:
+    return now.struck, [now.t, *state_with_hip(walk, now)]
 
 
 def _moving(run: RigidSimulation) -> tuple[PyTree, PyTree, PyTree]:

@@ -135,7 +135,6 @@ class FirstVariationSolve:
         self.engine, self.flow, self.row = engine, flow, row
 
     def program(self) -> Program:
-        """The program."""
         return Program(self.start, self.attempt, self.finish, record=self.record, stream=self.row)
 
     def start(self, given: FirstVariationInputs) -> _Now:

@@ -84,7 +84,6 @@ class SwitchLocator(AbstractWrappedControl):
     watch: Watch
 
     def init(self, *request: Any) -> tuple[Scalar, SwitchLocatorState]:
-        """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(*request)
         _, _, _, y0, _, args, *_ = request
         zero, no = jnp.asarray(0), jnp.asarray(False)

@@ -158,7 +158,6 @@ class TangentControl(AbstractMemorylessControl):
     inverse_units: Scalar
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does."""
         inverse = self.inverse_units[:, None]
         size = jnp.maximum(jnp.abs(attempt.y0.columns), jnp.abs(attempt.y1.columns)) * inverse
         floor = SHARE * jnp.max(size, axis=0) + attempt.args.floors

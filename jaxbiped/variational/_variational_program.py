@@ -86,7 +86,6 @@ class AdaptiveColumns:
         self.term: diffrax.ODETerm[PyTree] = diffrax.ODETerm(watch.field)
 
     def program(self) -> Program:
-        """The program."""
         record = self.record if self.save_nodes else None
         return Program(self.start, self.attempt, self.finish, record=record)
 

@@ -157,7 +157,6 @@ class MissedContacts(AbstractWrappedControl):
     """
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(*request)
         return first, (inner, jnp.zeros((), dtype=jnp.int32))
 

@@ -30,7 +30,6 @@ class FootstepLimit(AbstractWrappedControl):
     limit: RealScalarLike
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(*request)
         _, _, _, y0, _, args, *_ = request
         last = standing_foot(feet(args, y0))

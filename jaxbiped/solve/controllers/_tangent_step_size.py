@@ -60,7 +60,6 @@ class InUnits(AbstractMemorylessControl):
     inverse: PyTree
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does."""
         before, after, error = (
             jtu.tree_map(lambda leaf, inverse: leaf * inverse, y, self.inverse)
             for y in (attempt.y0, attempt.y1, attempt.error)

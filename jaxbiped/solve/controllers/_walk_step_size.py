@@ -88,7 +88,6 @@ class ErrorControl(AbstractControl):
         return self
 
     def init(self, *request: Any) -> tuple[Scalar, Scalar]:
-        """The first step's end and the controller's state, as diffrax asks."""
         _, t0, _, _, dt0, *_ = request
         return jnp.asarray(t0 + dt0), jnp.asarray(False)
 
@@ -177,7 +176,6 @@ class CrossedSwitches(AbstractMemorylessControl):
     weight: float
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does."""
         weighed = weigh_crossed(attempt.args, self.weight, attempt.y0, attempt.y1, attempt.error)
         return attempt.by(self.controller, error=weighed)
 

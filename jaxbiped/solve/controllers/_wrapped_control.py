@@ -141,7 +141,6 @@ class AbstractMemorylessControl(AbstractWrappedControl):
     """Wraps a controller, whose state is all that is carried from step to step."""
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
         return self.controller.init(*request)
 
 
@@ -157,7 +156,6 @@ class Extremes(AbstractWrappedControl):
     function: Callable[[PyTree, PyTree], PyTree] = eqx.field(static=True)
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
         first, inner = self.controller.init(*request)
         _, _, _, y0, _, args, *_ = request
         value = self.function(args, y0)
@@ -197,11 +195,9 @@ class GivenFirstStep(AbstractWrappedControl):
     size: RealScalarLike
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
-        """The first step's end and the controller's state, as diffrax asks."""
         terms, t0, t1, y0, _, *rest = request
         size = jnp.asarray(self.size, dtype=jnp.result_type(t0))
         return self.controller.init(terms, t0, t1, y0, size, *rest)
 
     def adapt(self, attempt: Attempt) -> Adapted:
-        """Accepts or rejects a step as the wrapped controller does."""
         return attempt.by(self.controller)
