@@ -24,7 +24,7 @@ from jaxbiped.solve._units import units_of
 from jaxbiped.solve.rosenbrock._rodas import Rodas5P
 from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._tangents import Seeded, Tangents, Watch, along_columns, as_columns
-from jaxbiped.variational._tangents_at_times import (
+from jaxbiped.variational._variational_solve import (
     EventMotion,
     TangentsAtTimes,
     follow_event,

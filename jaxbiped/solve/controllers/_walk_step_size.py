@@ -83,10 +83,6 @@ class ErrorControl(AbstractControl):
         """Of errors in units of the tolerance."""
         return rms_norm
 
-    def wrap(self, direction: RealScalarLike) -> "ErrorControl":
-        """As diffrax asks; walks are never solved backwards."""
-        return self
-
     def init(self, *request: Any) -> tuple[Scalar, Scalar]:
         _, t0, _, _, dt0, *_ = request
         return jnp.asarray(t0 + dt0), jnp.asarray(False)

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import jax.tree_util as jtu
 from jaxtyping import PyTree
 
-from jaxbiped._types import RealScalarLike, Scalar, Time
+from jaxbiped._types import RealScalarLike, Scalar, Time, select
 from jaxbiped.solve._accuracy import rms_norm
 
 if TYPE_CHECKING:  # which takes the adaptive one's abstract attributes for arguments
@@ -87,6 +87,10 @@ class AbstractControl(_Control):  # type: ignore[type-arg]
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step."""
 
+    def wrap(self, direction: RealScalarLike) -> Self:
+        """As diffrax asks; direction makes no difference, for walks are never solved backwards."""
+        return self
+
     def adapt_step_size(self, *step: Any) -> Adapted:
         """Accepts or rejects a step, as diffrax asks."""
         return self.adapt(Attempt(*step))
@@ -100,7 +104,7 @@ def try_again(attempt: Attempt, adapted: Adapted, again: Scalar, target: Scalar)
     """
     sooner = jnp.where(adapted.keep, target, jnp.minimum(adapted.t1, target))
     return adapted._replace(
-        memory=jtu.tree_map(lambda a, b: jnp.where(again, a, b), attempt.memory, adapted.memory),
+        memory=select(again, attempt.memory, adapted.memory),
         keep=adapted.keep & ~again,
         t0=jnp.where(again, attempt.t0, adapted.t0),
         t1=jnp.where(again, sooner, adapted.t1),
@@ -131,10 +135,6 @@ class AbstractWrappedControl(AbstractControl):
         """Of errors in units of the tolerance."""
         norm: Callable[[PyTree], RealScalarLike] = getattr(self.controller, "norm", rms_norm)
         return norm
-
-    def wrap(self, direction: RealScalarLike) -> Self:
-        """As diffrax asks; direction makes no difference to what is wrapped here."""
-        return self
 
 
 class AbstractMemorylessControl(AbstractWrappedControl):
