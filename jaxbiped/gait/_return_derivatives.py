@@ -4,7 +4,7 @@ By lanes all directions of a derivative share one solve; by diffrax each has one
 """
 
 from collections.abc import Callable
-from typing import TypeAlias, cast
+from typing import TypeAlias
 
 import equinox as eqx
 import equinox.internal as eqxi
@@ -20,9 +20,8 @@ from jaxbiped.gait._poincare_map import PARAMETER_FLOOR, STATE_FLOOR
 from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.solve._accuracy import Precision
 from jaxbiped.solve._units import units_of
-from jaxbiped.solve.rosenbrock._rosenbrock_solver import AbstractRosenbrock
 from jaxbiped.variational._solve_to_section import SectionArrival, solve_to_section
-from jaxbiped.variational._tangents import Seeded, Tangents, VariationalSolution
+from jaxbiped.variational._tangents import SectionSolve, Seeded, Tangents, VariationalSolution
 from jaxbiped.variational._variational_solve import solve_variational
 
 NO_REVERSE = (
@@ -135,16 +134,12 @@ def _arrival(
 ) -> SectionArrival:
     """The next arrival through diffrax, of a state or of tangents under seeded arguments."""
     plain, state = (args.args, y.state) if isinstance(y, Tangents) else (args, y)
-    return solve_to_section(
-        spec.watch(plain, state, peak=False),
-        spec.solver,
-        y,
-        args,
-        precision=precision,
-        max_time=spec.max_time,
-        max_solver_steps=spec.max_solver_steps,
-        **options,
-    )
+    return solve_to_section(_how(spec, precision, plain, state), y, args, **options)
+
+
+def _how(spec: ReturnMapSpec, precision: Precision, args: PyTree, state: PyTree) -> SectionSolve:
+    watch = spec.watch(args, state, peak=False)
+    return SectionSolve(watch, spec.solver, precision, spec.max_time, spec.max_solver_steps)
 
 
 @jax.custom_jvp
@@ -264,14 +259,10 @@ def _solve(
     inverse = jtu.tree_leaves(units_of(args, state).inverse)
     floors = jnp.asarray([*(STATE_FLOOR * inverse[i] for i in places), *[PARAMETER_FLOOR] * p])
     found, _ = solve_variational(
-        spec.watch(args, state, peak=False),
-        cast(AbstractRosenbrock, spec.solver),
+        _how(spec, precision, args, state),
         Tangents(state, jnp.asarray(columns)),
         Seeded(args, jnp.zeros((p, m + p)), floors, active),
         jnp.stack(_sizes(args, active)) if active else jnp.zeros(0),
-        precision=precision,
-        max_time=spec.max_time,
-        max_solver_steps=spec.max_solver_steps,
     )
     nan = jnp.where(found.undetermined, jnp.nan, 0.0)
     return found._replace(columns=found.columns + nan, time_columns=found.time_columns + nan)

@@ -33,8 +33,7 @@ from jaxbiped.scene._ready_scenes import seed_scene
 from jaxbiped.scene._scene import AbstractWalkerScene, RigidScene, Scene
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._walker import Walker
-from jaxbiped.simulate._rigid_walk import rigid_walk
-from jaxbiped.simulate._simulate import simulate
+from jaxbiped.simulate._simulate import rigid_walk, simulate
 from jaxbiped.solve._trajectory import Trajectory
 
 _FOOTSTEPS = 40

@@ -20,7 +20,7 @@ from jaxbiped.plot import style
 from jaxbiped.plot._samples import sample, sampled_forces
 from jaxbiped.plot._symbols import LEG_ANGLE, NORMAL_FORCE, PENETRATION, TANGENTIAL_FORCE, TIME
 from jaxbiped.scene._scene import RigidScene, Scene
-from jaxbiped.simulate._rigid_walk import rigid_walk
+from jaxbiped.simulate._simulate import rigid_walk
 from jaxbiped.solve._scene_key import check_scene_of
 from jaxbiped.solve._trajectory import Trajectory
 

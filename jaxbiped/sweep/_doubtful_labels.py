@@ -15,7 +15,7 @@ from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.solve._accuracy import resolve_slip_speed
 from jaxbiped.solve._error_estimate import LOOSER
 from jaxbiped.solve._solvers import solver_named
-from jaxbiped.solve.rosenbrock._rodas5p import Rodas5P
+from jaxbiped.solve.rosenbrock._rodas import Rodas5P
 from jaxbiped.sweep._follow_starts import Effort
 from jaxbiped.sweep._labelling_loop import Labelled
 

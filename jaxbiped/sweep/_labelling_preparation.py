@@ -136,7 +136,7 @@ def effort_of(
         max_attempts=int(max_solver_steps),
         gap_share=_GAP_SHARE[scene.compliant],
         solver=method,
-        engine=engine_for(engine, obstacle=None, by_device=True),
+        engine=engine_for(engine, obstacle=None, by_device=True, by_any=True),
         may_move=engine == "auto",
         wanted=wanted,
     )

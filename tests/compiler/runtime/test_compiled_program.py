@@ -18,11 +18,10 @@ from hypothesis import strategies as st
 
 import jaxbiped as jb
 from jaxbiped._checks import ArgumentError
-from jaxbiped.compiler import LANES
+from jaxbiped.compiler import LANES, Request
 from jaxbiped.compiler.runtime import _compiled_program, _host_cpu
 from jaxbiped.compiler.runtime._host_cpu import default_threads, host
-from jaxbiped.solve._adaptive_program import Solve
-from jaxbiped.solve._lane_solve import Setting, request_of
+from jaxbiped.solve._adaptive_program import AdaptiveSolve, Solve, adaptive_program
 from jaxbiped.solve._units import units_of
 from jaxbiped.solve.controllers._first_and_last_step import just_before_end
 from tests.compiler.one_shot import stepped
@@ -33,9 +32,9 @@ WATCH = ("fall", "stop", "stumble")
 
 
 def _program():
-    setting = Setting(jb.solvers.Rodas4(), WATCH, counting=False, quick=True)
+    steps = AdaptiveSolve(jb.solvers.Rodas4(), WATCH, counting=False, located=True)
     one = jtu.tree_map(lambda leaf: leaf[0], _inputs([SEED]))
-    return LANES.compile(request_of(one, setting))
+    return LANES.compile(Request(adaptive_program(steps), one, quick=True))
 
 
 def _inputs(starts, duration=0.3, most=20000.0, scene=SCENE):

@@ -1,4 +1,4 @@
-"""Swing of a linkage in gravity."""
+"""Motion of a linkage in gravity."""
 
 import warnings
 
@@ -18,9 +18,8 @@ from jaxbiped._checks import (
     check_positive,
     check_type,
 )
-from jaxbiped._debug_switches import without_switches
 from jaxbiped._ending import Ending
-from jaxbiped._types import Parameter, Scalar, as_float
+from jaxbiped._types import Scalar, as_float
 from jaxbiped.caching._cached_jit import cached_jit
 from jaxbiped.constraints._constraint_method import AbstractProjectingMethod
 from jaxbiped.constraints._linkage import Constraints, constraints_of
@@ -28,7 +27,7 @@ from jaxbiped.constraints._projection import check_independent, correct_step, ne
 from jaxbiped.dynamics._linkage_motion import LinkageState, linkage_field
 from jaxbiped.scene._scene_checks import check_scene
 from jaxbiped.scene._walker import LinkageScene
-from jaxbiped.simulate._start import check_steps
+from jaxbiped.simulate._start import Options, check_steps
 from jaxbiped.solve._accuracy import rms_norm, tolerances
 from jaxbiped.solve._projected_solver import check_adjoint, wrap_projected
 from jaxbiped.solve._solvers import solver_named, with_root_tolerances
@@ -44,38 +43,20 @@ _LONGER, _LONG = 2.0, 1e-2
 state from which they are too long."""
 
 
-@without_switches
-def swing(
-    scene: LinkageScene,
-    state: LinkageState,
-    *,
-    times: Parameter,
-    solver: str | diffrax.AbstractSolver[PyTree] = "rodas4",
-    accuracy: str = "balanced",
-    rtol: float | None = None,
-    atol: float | None = None,
-    dt: float | None = None,
-    max_solver_steps: int = 65536,
-    adjoint: diffrax.AbstractAdjoint | None = None,
+_ALLOWED = ("solver", "accuracy", "rtol", "atol", "dt", "save", "max_solver_steps", "adjoint")
+"""Options that apply."""
+
+
+def simulate_linkage(
+    scene: LinkageScene, state: LinkageState, asked: Options
 ) -> Trajectory[LinkageState]:
-    """Simulates a linkage from a start, which is first put on its constraints.
-
-    Works under `jit`, `vmap` and differentiation.
-
-    Args:
-        scene: linkage, constraint method and gravity.
-        state: start at time 0, on its constraints or near them.
-        times: when to save, increasing from 0 on [s], shape (n,); the last one ends the solve.
-        solver, accuracy, rtol, atol, dt, max_solver_steps, adjoint: as in `simulate`.
-
-    Returns:
-        States at the `times`, and how far each is off its constraints, leaves of shape (n,). Its
-        `ending` is "finished", "out of steps" or "solver failed".
-
-    Raises:
-        ArgumentError: an argument that is not allowed, or constraints that the method cannot hold,
-            before anything is compiled.
-    """
+    """Checks what is asked, and simulates a linkage from a start put on its constraints."""
+    asked.refuse_others(scene, _ALLOWED)
+    times, dt, adjoint = asked.times, asked.dt, asked.adjoint
+    if times is None:
+        raise ArgumentError(
+            f"save = {asked.save!r} is not allowed for a LinkageScene: give increasing times."
+        )
     scene = check_scene(scene, LinkageScene)
     check_type("state", state, LinkageState)
     count = scene.linkage.coordinates * len(scene.linkage.bodies)
@@ -91,15 +72,15 @@ def swing(
     check_finite("times", times)
     check_increasing("times", times, 1)
     check_not_negative("times", times, "s")
-    check_count("max_solver_steps", max_solver_steps)
+    check_count("max_solver_steps", asked.max_solver_steps)
     times = as_float(times)
     check_positive("times[-1]", times[-1], "s")
-    method = solver_named(solver)
-    check_steps(method, dt, most_steps=max_solver_steps, duration=times[-1])
+    method = solver_named(asked.solver)
+    check_steps(method, dt, most_steps=asked.max_solver_steps, duration=times[-1])
     check_independent(scene.linkage, scene.method, state.q)
     _check_joints(scene, state)
     check_adjoint(scene.method, adjoint)
-    relative, absolute = tolerances(accuracy, rtol, atol)
+    relative, absolute = tolerances(asked.accuracy, asked.rtol, asked.atol)
     control = step_control(relative, absolute, rms_norm) if dt is None else None
     chosen = diffrax.RecursiveCheckpointAdjoint() if adjoint is None else adjoint
     if dt is not None:
@@ -107,7 +88,7 @@ def swing(
     problem = scene, state, times, method, control
     step = None if dt is None else as_float(dt)
     try:
-        swung = _solve(*problem, step, max_solver_steps, chosen)
+        swung = _solve(*problem, step, asked.max_solver_steps, chosen)
     except TypeError as error:
         if adjoint is not None or "forward-mode" not in str(error):
             raise
@@ -116,7 +97,7 @@ def swing(
         ) from error
     leaves = jtu.tree_leaves((scene, state, times, step))
     if step is not None and not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
-        longer = _solve(*problem, _LONGER * step, max_solver_steps, chosen)
+        longer = _solve(*problem, _LONGER * step, asked.max_solver_steps, chosen)
         _warn_of_long_steps(swung, float(step), longer)
     return swung
 
@@ -154,7 +135,7 @@ def _warn_of_long_steps(
             f"dt = {dt:g} is too long: with steps of {_LONGER * dt:g} s the relative change of the "
             f"final state is {change:.2g}; take shorter steps, or tolerances.",
             RuntimeWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
 
 
