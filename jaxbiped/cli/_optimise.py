@@ -108,9 +108,9 @@ def _bounds(scene: "jb.Scene | jb.RigidScene", text: str) -> dict[str, tuple[flo
                 raise ArgumentError(
                     f"vary = {name} needs bounds, as its value is {value:g}: write {name}=low:high."
                 )
-            least, most = value / _USUAL_RANGE, value * _USUAL_RANGE
-            low, high = (farthest_allowed(scene, name, end) for end in (least, most))
-            found[name] = (low, high)
+            ends = (value / _USUAL_RANGE, value * _USUAL_RANGE)
+            least, most = (farthest_allowed(scene, name, end) for end in ends)
+            found[name] = (least, most)
             continue
         try:
             low, high = bounds.split(":", 1)

@@ -159,9 +159,9 @@ def footstep_rows(steps: Any) -> list[dict[str, float]]:
     return _rows({name: np.asarray(getattr(steps, name)) for name in names})
 
 
-def _rows(columns: dict[str, np.ndarray]) -> list[dict[str, float]]:
-    rows = np.transpose([*columns.values()]).tolist()
-    return [dict(zip(columns, row, strict=True)) for row in rows]
+def _rows(found: dict[str, np.ndarray]) -> list[dict[str, float]]:
+    rows = np.transpose([*found.values()]).tolist()
+    return [dict(zip(found, row, strict=True)) for row in rows]
 
 
 def _rigid_footsteps(scene: "jb.RigidScene", strikes: Any) -> list[dict[str, float]]:
@@ -172,8 +172,8 @@ def _rigid_footsteps(scene: "jb.RigidScene", strikes: Any) -> list[dict[str, flo
     reach = float(scene.walker.hip_to_foot)
     places = np.asarray(states.hip_x)[:count] + reach * np.sin(np.asarray(states.theta_2)[:count])
     periods, lengths = np.diff(at), np.diff(places)
-    columns = {"time_s": at[1:], "period_s": periods, "length_m": lengths}
-    return _rows(columns | {"speed_m_s": lengths / periods})
+    found = {"time_s": at[1:], "period_s": periods, "length_m": lengths}
+    return _rows(found | {"speed_m_s": lengths / periods})
 
 
 def write_outputs(scene: Any, walk: "jb.Trajectory[Any]", out: Path) -> list[Path]:

@@ -197,7 +197,7 @@ def _panel(
     ax.set_yticks(places, [row_label(parameters[i]) for i in order], fontsize="small")
     ax.set_ylim(len(values) - 0.4, -0.6)
     look: dict[str, Any] = {"fontsize": "x-small", "color": style.GROUND_COLOUR}
-    for place, value in zip(places, values, strict=True):
+    for place, value in enumerate(values):
         beside = ax.get_yaxis_transform()
         ax.text(1.02, place, _format(value), transform=beside, va="center", **look)
     ax.set_title(title, loc="left", fontsize="medium")

@@ -1,4 +1,4 @@
-"""`jaxbiped constraints` and the flags of formulations, against the methods' own properties."""
+"""`jaxbiped constraints`, against the methods' own properties."""
 
 import json
 
@@ -9,7 +9,6 @@ import jaxbiped as jb
 from jaxbiped.cli import _constraint_comparison
 from jaxbiped.cli import _constraints as command
 from jaxbiped.cli._constraint_comparison import ConstraintRun, time_run
-from jaxbiped.cli._scene_options import SceneOptions
 from tests.cli.commands import outputs_of, run
 from tests.drawn import assert_is_drawn, points_of
 
@@ -88,14 +87,6 @@ def test_the_comparison_is_the_commands_own():
     """A benchmark is no part of the package's interface."""
     for name in ("compare_constraints", "ConstraintRun", "Integrator"):
         assert not hasattr(jb, name)
-
-
-def test_flags_build_the_scene():
-    scene = SceneOptions(formulation="redundant", method="baumgarte", orientation="euler").scene()
-    assert isinstance(scene, jb.RedundantScene)
-    assert isinstance(scene.method, jb.constraints.Baumgarte)
-    assert scene.orientation == "euler"
-    assert isinstance(SceneOptions(formulation="redundant").scene().method, jb.constraints.Index1)
 
 
 @pytest.mark.slow

@@ -8,7 +8,6 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.cli._default_start import default_start
-from jaxbiped.cli._scene_options import StartOptions
 
 
 @pytest.mark.parametrize("slope", [0.02, 0.04])
@@ -50,15 +49,6 @@ def test_a_ground_too_soft_to_stand_on_is_started_near_its_surface():
     scene = jb.seed_scene(K=2.0)
     foot = jb.dynamics.feet(scene, default_start(scene)).foot_2
     assert float(foot.penetration) == pytest.approx(0.04, rel=1e-6)
-
-
-def test_what_is_said_stays_as_it_was_said():
-    options = StartOptions(hip_z=0.4, omega_2=-1.0)
-    assert options.given == {"hip_z": 0.4, "omega_2": -1.0}
-    start = options.state(jb.seed_scene(K=1e8))
-    assert (float(start.hip_z), float(start.omega_2)) == (0.4, -1.0)
-    assert float(start.theta_2) == float(jb.seed_state().theta_2)
-    assert StartOptions().given == {}
 
 
 def test_a_stiff_ground_is_walked_on_from_there():

@@ -1,11 +1,10 @@
-"""`jaxbiped models` and the flags of models, against the registries and their scenes."""
+"""`jaxbiped models` and what is modelled, against the registries."""
 
-import jax
 import pytest
 from reference.rigid import rigid_walker
 
 import jaxbiped as jb
-from jaxbiped.cli._scene_options import SEED, SceneOptions
+from jaxbiped.cli._scene_options import SceneOptions
 from tests.cli.commands import numbers_of, outputs_of, run
 
 
@@ -21,33 +20,12 @@ def test_lists_every_law_with_units_and_cost(capsys):
     for law in listed["normal"] + listed["friction"]:
         assert law["operations"] > 0
         assert all(entry["unit"] for entry in law["parameters"].values())
+    assert [part["name"] for part in listed["actuation"]] == list(jb.actuation.ACTUATORS)
+    assert listed["actuation"][0]["units"]["k"] == "N·m/rad"
     by_name = {rung["name"]: rung for rung in listed["rungs"]}
     assert by_name["rigid"]["states"] == 5
     assert by_name["bristles"]["states"] == 10
     assert by_name["rigid"]["operations"] < 0.5 * by_name["stribeck"]["operations"]
-
-
-def test_help_tells_the_units_of_the_seeds_parameters():
-    """A unit stands at its end."""
-    for name, quantity in jb.parameter_quantities(jb.seed_scene()).items():
-        said = SEED[name].help
-        assert said.endswith(f" [{quantity.unit}]." if quantity.unit else ".")
-        assert ("[" in said) == bool(quantity.unit)
-
-
-def test_flags_build_the_scene():
-    scene = SceneOptions(
-        normal="hunt-crossley", friction="coulomb", set=("hysteresis=2.5",)
-    ).scene()
-    assert isinstance(scene.normal, jb.laws.HuntCrossley)
-    assert isinstance(scene.friction, jb.laws.RegularisedCoulomb)
-    assert float(scene.normal.hysteresis) == 2.5
-    rigid = SceneOptions(model="rigid", slope=0.03, hip_mass=1.0).scene()
-    assert isinstance(rigid, jb.RigidScene)
-    assert float(rigid.ground.slope) == 0.03
-    seed = SceneOptions().scene()
-    assert jax.tree.structure(seed) == jax.tree.structure(jb.seed_scene())
-    assert jax.tree.leaves(seed) == jax.tree.leaves(jb.seed_scene())
 
 
 @pytest.mark.slow

@@ -35,29 +35,23 @@ atexit.register(lambda: print("COMPILED", json.dumps(told), file=sys.stderr))
 from jaxbiped.cli import main
 main(sys.argv[1:])
 """
-STARTS = ("--x", "theta_swing=-0.5:0.3:3", "--y", "omega_swing=-2:4:2")
+STARTS = "--x theta_swing=-0.5:0.3:3 --y omega_swing=-2:4:2"
+CONSTRAINTS = "--duration 0.01 --repeats 1 --integrators rodas4:1e-4 --methods standard"
 COMMANDS = {
-    "walk": ("walk", "--duration", "0.5", "--out", "OUT"),
-    "rigid walk": ("walk", "--duration", "1", "--model", "rigid", "--out", "OUT"),
-    "gait": ("gait", "--out", "OUT"),
-    "continue": ("continue", "--model", "rigid", "--max-points", "2", "--out", "OUT"),
-    "optimise": (
-        "optimise", "--model", "rigid", "--vary", "d", "--maximise", "speed",
-        "--iterations", "1", "--basin", "16", "--footsteps", "4",
-    ),
-    "fit": ("fit", "MEASURED", "--model", "rigid", "--vary", "d"),
-    "basin": ("basin", *STARTS, "--out", "OUT"),
-    "rigid basin": ("basin", "--model", "rigid", *STARTS),
-    "models": ("models",),
-    "constraints": (
-        "constraints", "--duration", "0.01", "--repeats", "1", "--integrators", "rodas4:1e-4",
-        "--methods", "standard", "--out", "OUT",
-    ),
-    "trade": ("trade", "--duration", "0.1", "--repeats", "1", "--out", "OUT"),
-    "doctor": ("doctor",),
-}  # fmt: skip
-
-
+    "walk": "walk --duration 0.5 --out OUT",
+    "rigid walk": "walk --duration 1 --model rigid --out OUT",
+    "gait": "gait --out OUT",
+    "continue": "continue --model rigid --max-points 2 --out OUT",
+    "optimise": "optimise --model rigid --vary d --maximise speed --iterations 1 --basin 16 "
+    "--footsteps 4",
+    "fit": "fit MEASURED --model rigid --vary d",
+    "basin": f"basin {STARTS} --out OUT",
+    "rigid basin": f"basin --model rigid {STARTS}",
+    "models": "models",
+    "constraints": f"constraints {CONSTRAINTS} --out OUT",
+    "trade": "trade --duration 0.1 --repeats 1 --out OUT",
+    "doctor": "doctor",
+}
 NIGHTLY = ("optimise", "basin", "constraints", "trade")
 """Those that take longest."""
 
@@ -78,7 +72,7 @@ def test_the_second_process_compiles_nothing(name, tmp_path):
 
     def compiled(turn):
         places = {"OUT": str(tmp_path / turn), "MEASURED": str(measured)}
-        words = [places.get(word, word) for word in COMMANDS[name]]
+        words = [places.get(word, word) for word in COMMANDS[name].split()]
         ran = subprocess.run(
             [sys.executable, "-c", COUNTED, *words], capture_output=True, text=True, env=environment
         )

@@ -9,8 +9,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.cli import main
 
-WALK = ["walk", "--duration", "0.05"]
-HELD = ["walk", "--formulation", "redundant", "--duration", "0.05"]
+WALK = "walk --duration 0.05"
+COMPARISON = "_constraint_comparison"
 
 
 class _ReachedError(Exception):
@@ -23,17 +23,12 @@ class _ReachedError(Exception):
         (WALK, "_walk", "Simulation.prepare", "start"),
         (WALK, "_walk", "Simulation.compile", "compiling"),
         (WALK, "_walk_report", "footsteps", "footsteps"),
-        ([*WALK, "--out", "{out}"], "_walk_report", "cli._walk_report.write_outputs", "figures"),
-        (HELD, "_walk", "Simulation.prepare", "start"),
-        ([*WALK, "--model", "rigid"], "_walk", "rigid_walk", "compiling"),
-        (["basin"], "_basin", "labelling", "gaits"),
-        (["models"], "_models", "measure.operation_counts", "counting"),
-        (
-            ["constraints"],
-            "_constraint_comparison",
-            "cli._constraint_comparison.final_truth",
-            "minimal formulation",
-        ),
+        (f"{WALK} --out OUT", "_walk_report", "cli._walk_report.write_outputs", "figures"),
+        (f"{WALK} --formulation redundant", "_walk", "Simulation.prepare", "start"),
+        (f"{WALK} --model rigid", "_walk", "rigid_walk", "compiling"),
+        ("basin", "_basin", "labelling", "gaits"),
+        ("models", "_models", "measure.operation_counts", "counting"),
+        ("constraints", COMPARISON, f"cli.{COMPARISON}.final_truth", "minimal formulation"),
     ],
 )
 def test_the_slow_part_is_named(arguments, module, slow, word, monkeypatch, tmp_path):
@@ -53,6 +48,6 @@ def test_the_slow_part_is_named(arguments, module, slow, word, monkeypatch, tmp_
     *parts, name = slow.split(".")
     monkeypatch.setattr(functools.reduce(getattr, parts, jb), name, stop)
     with pytest.raises(_ReachedError):
-        main([text.format(out=tmp_path) for text in arguments])
+        main(arguments.replace("OUT", str(tmp_path)).split())
     (message,) = active
     assert word in message

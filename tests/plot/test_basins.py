@@ -10,26 +10,19 @@ from matplotlib.figure import Figure
 import jaxbiped as jb
 from jaxbiped.plot import basin, basin_fractions, refined_basin
 from jaxbiped.plot.style import label_colour, label_marker
+from tests.drawn import legend_of
 
 AXES = {"names": ("swing angle", "stance rate"), "units": ("rad", "rad/s")}
 CODES = np.array([[0, 0, 1], [3, -1, 0]])
 X, Y = [1.0, 2.0, 3.0], [-1.0, 1.0]
 
 
-def _colours(ax):
+def _colours(figure):
     """Colours of the cells as drawn, row by row along y."""
-    (mesh,) = [one for one in ax.collections if isinstance(one, QuadMesh)]
+    (mesh,) = [one for one in figure.axes[0].collections if isinstance(one, QuadMesh)]
     mesh.update_scalarmappable()
     shape = np.shape(mesh.get_array())
     return np.array([to_hex(c).upper() for c in mesh.get_facecolors()]).reshape(shape)
-
-
-def _colours_of(figure):
-    return _colours(figure.axes[0])
-
-
-def _legend(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
 
 
 def _nothing_is_cut_off(figure):
@@ -47,31 +40,28 @@ def _nothing_is_cut_off(figure):
 def test_cells_have_their_labels_colours_and_places():
     (ax,) = basin(CODES, X, Y, **AXES).axes
     expected = [[label_colour(str(jb.basins.Label(code))) for code in row] for row in CODES]
-    np.testing.assert_array_equal(_colours(ax), expected)
+    np.testing.assert_array_equal(_colours(ax.figure), expected)
     assert ax.get_xlim() == (0.5, 3.5)
     assert ax.get_ylim() == (-2.0, 2.0)
     assert ax.get_xlabel() == "swing angle (rad)"
     assert ax.get_ylabel() == "stance rate (rad/s)"
 
 
-def test_names_of_coordinates_say_words_symbol_and_unit():
-    (ax,) = basin(CODES, X, Y, names=("theta_swing", "omega_swing")).axes
-    assert ax.get_xlabel() == r"swing leg angle, $\theta_1$ (rad)"
-    assert ax.get_ylabel() == r"swing leg rate, $\omega_1$ (rad/s)"
-
-
 def test_edges_and_names_draw_the_same():
     by_code = basin(CODES, X, Y, cycle_footsteps=1, **AXES).axes[0]
     names = jb.basins.label_names(CODES, 1)
-    by_name = basin(names, [0.5, 1.5, 2.5, 3.5], [-2.0, 0.0, 2.0], **AXES).axes[0]
-    np.testing.assert_array_equal(_colours(by_code), _colours(by_name))
-    assert _legend(by_code) == _legend(by_name)
+    axes = {"names": ("theta_swing", "omega_swing")}  # names that say words, symbol and unit
+    by_name = basin(names, [0.5, 1.5, 2.5, 3.5], [-2.0, 0.0, 2.0], **axes).axes[0]
+    np.testing.assert_array_equal(_colours(by_code.figure), _colours(by_name.figure))
+    assert legend_of(by_code) == legend_of(by_name)
     assert by_code.get_xlim() == by_name.get_xlim()
+    assert by_name.get_xlabel() == r"swing leg angle, $\theta_1$ (rad)"
+    assert by_name.get_ylabel() == r"swing leg rate, $\omega_1$ (rad/s)"
 
 
 def test_legend_says_each_labels_fraction():
     (ax,) = basin(CODES, X, Y, cycle_footsteps=2, mark=(2.0, 0.0), **AXES).axes
-    assert _legend(ax) == [
+    assert legend_of(ax) == [
         "walking period-2: 60.0 %",
         "fell forward: 20.0 %",
         "stopped: 20.0 %",
@@ -79,14 +69,14 @@ def test_legend_says_each_labels_fraction():
         "gait",
     ]
     # Where the cycle is not known it is not said.
-    assert _legend(basin(CODES, X, Y, **AXES).axes[0])[0] == "walking: 60.0 %"
+    assert legend_of(basin(CODES, X, Y, **AXES).axes[0])[0] == "walking: 60.0 %"
 
 
 def test_rare_labels_are_not_rounded_away():
     rare = np.zeros((200, 200), dtype=int)
     rare[0, 0] = 1
     (ax,) = basin(rare, np.arange(200.0), np.arange(200.0), **AXES).axes
-    assert _legend(ax) == ["walking: > 99.99 %", "fell forward: < 0.01 %"]
+    assert legend_of(ax) == ["walking: > 99.99 %", "fell forward: < 0.01 %"]
 
 
 def test_pending_cells_are_hatched_and_the_gait_is_marked():
@@ -106,15 +96,15 @@ def test_a_label_has_one_colour_everywhere_and_no_other_has_it():
     assert len({label_colour(name) for name in names}) == len(names)
     assert len({(label_colour(name), label_marker(name)) for name in names}) == len(names)
     alone = basin(np.full((1, 2), "stopped"), [0.0, 1.0], [0.0, 1.0], **AXES).axes[0]
-    assert set(_colours(alone).flat) == {label_colour("stopped")}
+    assert set(_colours(alone.figure).flat) == {label_colour("stopped")}
 
 
 def test_gaits_of_one_period_have_shades_of_their_own():
     gait = np.array([[0, 1, 0], [0, 0, 2]])
     (ax,) = basin(CODES, X, Y, cycle_footsteps=1, gait=gait, **AXES).axes
-    colours = _colours(ax)
+    colours = _colours(ax.figure)
     assert len({colours[0, 0], colours[0, 1], colours[1, 2]}) == 3
-    assert _legend(ax)[:3] == [f"walking period-1, gait {k}: 20.0 %" for k in range(3)]
+    assert legend_of(ax)[:3] == [f"walking period-1, gait {k}: 20.0 %" for k in range(3)]
     assert colours[0, 2] == label_colour("fell forward")
 
 
@@ -125,14 +115,14 @@ def test_all_labels_at_once_and_nothing_is_cut_off():
         labels, np.arange(12.0), np.arange(11.0), cycle_footsteps=cycle, mark=(0, 9), **AXES
     )
     assert isinstance(figure, Figure)
-    assert len(_legend(figure.axes[0])) == 10 + 6 + 1
+    assert len(legend_of(figure.axes[0])) == 10 + 6 + 1
     _nothing_is_cut_off(figure)
     names = [
         jb.basins.label_name(label, k) for label, k in zip(labels.flat, cycle.flat, strict=True)
     ]
     known = labels.ravel() >= 0
     expected = np.where(known, [label_colour(name) for name in names], "")
-    np.testing.assert_array_equal(_colours(figure.axes[0]).ravel()[known], expected[known])
+    np.testing.assert_array_equal(_colours(figure).ravel()[known], expected[known])
 
 
 def _disc(points):
@@ -150,10 +140,10 @@ def test_refined_cells_are_drawn_where_they_are():
     np.testing.assert_allclose(first.p0, refined.lower + refined.cells[1][0] * 0.25)
     np.testing.assert_allclose(first.size, 0.25)
     expected = np.where(refined.on_grid().T == 0, label_colour("walking"), "#D55E00")
-    np.testing.assert_array_equal(_colours(ax), expected)
+    np.testing.assert_array_equal(_colours(ax.figure), expected)
     assert ax.get_title(loc="left") == f"{refined.asked} labels of the full grid's {33 * 49}"
     assert (ax.get_xlim(), ax.get_ylim()) == ((-1.0, 1.0), (-1.0, 2.0))
-    assert _legend(ax)[-2:] == ["halved cells", "gait"]
+    assert legend_of(ax)[-2:] == ["halved cells", "gait"]
     _nothing_is_cut_off(figure)
 
 
@@ -161,8 +151,8 @@ def test_refined_labels_may_have_names_of_their_own():
     refined = jb.basins.refine_boundary(_disc, (-1.0, -1.0), (1.0, 1.0), (4, 4), levels=2)
     names = {0: "walking period-3", 1: "stopped"}
     (ax,) = refined_basin(refined, codes=names, cells=False, **AXES).axes
-    assert set(_colours(ax).flat) == {label_colour(name) for name in names.values()}
-    assert [text.split(":")[0] for text in _legend(ax)] == list(names.values())
+    assert set(_colours(ax.figure).flat) == {label_colour(name) for name in names.values()}
+    assert [text.split(":")[0] for text in legend_of(ax)] == list(names.values())
     with pytest.raises(jb.ArgumentError, match="codes has no name for label 1"):
         refined_basin(refined, codes={0: "walking"}, **AXES)
 
@@ -197,7 +187,7 @@ def test_stacked_fractions_add_up_to_one():
     top = ax.collections[-1].get_paths()[0].vertices
     for x in (1.0, 2.0, 3.0):
         assert top[top[:, 0] == x, 1].max() == pytest.approx(1.0)
-    assert _legend(ax) == ["stopped", "fell forward", "walking period-1"]
+    assert legend_of(ax) == ["stopped", "fell forward", "walking period-1"]
     _nothing_is_cut_off(figure)
     # What walks is the lowest band, what falls lies on it.
     tops_of_bands = [[0.0, 0.75, 30 / 31], [1.0, 1.0, 30 / 31], [1.0, 1.0, 1.0]]
@@ -258,12 +248,12 @@ def test_labelled_labels_are_drawn_along_their_own_axes(shape):
     fields = {name: (tuple(axes), codes) for name in ("label", "gait", "cycle_footsteps")}
     data = xarray.Dataset(fields, axes)
     x, y = axes.values()
-    plain = _colours_of(basin(codes.T, x, y, names=tuple(axes)))
+    plain = _colours(basin(codes.T, x, y, names=tuple(axes)))
     of_array = basin(data.label, data.omega_swing, data.theta_swing, names=tuple(axes))
-    np.testing.assert_array_equal(_colours_of(of_array), plain)
-    np.testing.assert_array_equal(_colours_of(basin(data.label)), plain)
-    turned = _colours_of(basin(data.label, names=("theta_swing", "omega_swing")))
-    np.testing.assert_array_equal(turned, _colours_of(basin(codes, y, x, names=tuple(axes)[::-1])))
+    np.testing.assert_array_equal(_colours(of_array), plain)
+    np.testing.assert_array_equal(_colours(basin(data.label)), plain)
+    turned = _colours(basin(data.label, names=("theta_swing", "omega_swing")))
+    np.testing.assert_array_equal(turned, _colours(basin(codes, y, x, names=tuple(axes)[::-1])))
     whole = basin(data).axes[0]
     assert (whole.get_xlim(), whole.get_ylim()) == ((-0.5, shape[0] - 0.5), (-0.5, shape[1] - 0.5))
     with pytest.raises(jb.ArgumentError, match="x, y and names are needed"):

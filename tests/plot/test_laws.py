@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 import jaxbiped as jb
 from jaxbiped import plot
-from tests.drawn import assert_is_drawn
+from tests.drawn import assert_is_drawn, legend_of
 from tests.scene.laws.drop import restitutions
 
 SEED = dict(K=1e6, c=2e5, n=1.5, mass=2.0)
@@ -25,7 +25,7 @@ def test_forces_at_each_rate():
     assert depth.max() == pytest.approx(0.5)
     np.testing.assert_allclose(slow[-1], 1e6 * 5e-4**1.5 * 0.7)
     np.testing.assert_allclose(fast[-1], 1e6 * 5e-4**1.5 * 1.6)
-    assert [text.get_text() for text in left.get_legend().texts] == ["-0.1 m/s", "0.2 m/s"]
+    assert legend_of(left) == ["-0.1 m/s", "0.2 m/s"]
     for ax in (left, right):
         assert "(mm)" in ax.get_xlabel()
         assert "(N)" in ax.get_ylabel()

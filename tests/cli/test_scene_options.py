@@ -1,4 +1,4 @@
-"""The flags that drive a walker, against the functions of the package on the same scene."""
+"""Options that describe a scene and a start, against the functions of the package."""
 
 import dataclasses
 
@@ -6,8 +6,36 @@ import jax
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.cli._scene_options import ActuationOptions, SceneOptions
+from jaxbiped.cli._scene_options import SEED, ActuationOptions, SceneOptions, StartOptions
 from tests.cli.commands import numbers_of
+
+
+def test_flags_build_the_scene():
+    scene = SceneOptions(
+        normal="hunt-crossley", friction="coulomb", set=("hysteresis=2.5",)
+    ).scene()
+    assert isinstance(scene.normal, jb.laws.HuntCrossley)
+    assert isinstance(scene.friction, jb.laws.RegularisedCoulomb)
+    assert float(scene.normal.hysteresis) == 2.5
+    rigid = SceneOptions(model="rigid", slope=0.03, hip_mass=1.0).scene()
+    assert isinstance(rigid, jb.RigidScene)
+    assert float(rigid.ground.slope) == 0.03
+    held = SceneOptions(formulation="redundant", method="baumgarte", orientation="euler").scene()
+    assert isinstance(held, jb.RedundantScene)
+    assert isinstance(held.method, jb.constraints.Baumgarte)
+    assert held.orientation == "euler"
+    assert isinstance(SceneOptions(formulation="redundant").scene().method, jb.constraints.Index1)
+    seed = SceneOptions().scene()
+    assert jax.tree.structure(seed) == jax.tree.structure(jb.seed_scene())
+    assert jax.tree.leaves(seed) == jax.tree.leaves(jb.seed_scene())
+
+
+def test_help_tells_the_units_of_the_seeds_parameters():
+    """A unit stands at its end."""
+    for name, quantity in jb.parameter_quantities(jb.seed_scene()).items():
+        said = SEED[name].help
+        assert said.endswith(f" [{quantity.unit}]." if quantity.unit else ".")
+        assert ("[" in said) == bool(quantity.unit)
 
 
 def test_every_actuator_has_a_flag():
@@ -31,10 +59,15 @@ def test_flags_make_the_actuators():
     assert float(rigid.actuation[0].impulse) == 0.2
     redundant = SceneOptions(formulation="redundant", driven=asked).scene()
     assert len(redundant.actuation) == 3
-    assert SceneOptions().scene().actuation is None
-    assert jax.tree_util.tree_structure(SceneOptions().scene()) == jax.tree_util.tree_structure(
-        jb.seed_scene()
-    )
+
+
+def test_what_is_said_stays_as_it_was_said():
+    options = StartOptions(hip_z=0.4, omega_2=-1.0)
+    assert options.given == {"hip_z": 0.4, "omega_2": -1.0}
+    start = options.state(jb.seed_scene(K=1e8))
+    assert (float(start.hip_z), float(start.omega_2)) == (0.4, -1.0)
+    assert float(start.theta_2) == float(jb.seed_state().theta_2)
+    assert StartOptions().given == {}
 
 
 @pytest.mark.slow
@@ -56,9 +89,3 @@ def test_a_driven_walk_tells_its_work(capsys):
     assert abs(numbers["energy_residual_J"]) < 1e-5
     assert 0.01 < numbers["cost_of_transport"] < 0.03
     assert not numbers["warnings"]
-
-
-def test_models_lists_the_actuators(capsys):
-    listed = numbers_of(capsys, "models")["actuation"]
-    assert [part["name"] for part in listed] == list(jb.actuation.ACTUATORS)
-    assert listed[0]["units"]["k"] == "N·m/rad"
