@@ -124,9 +124,9 @@ def test_an_actuator():
 
     assert jb.actuation.ACTUATORS["brake"] is Brake
     theirs = jb.actuation.HipSpring(k=0.0, b=0.02)
-    ends = [
-        short(dataclasses.replace(SEED, actuation=part)).final for part in (Brake(0.02), theirs)
-    ]
+    scenes = [dataclasses.replace(SEED, actuation=part) for part in (Brake(0.02), theirs)]
+    assert jb.parameter_names(scenes[0])[-1] == "b"
+    ends = [short(scene).final for scene in scenes]
     np.testing.assert_allclose(*map(np.array, ends), rtol=1e-9, atol=1e-12)
 
 
