@@ -101,7 +101,9 @@ def test_a_friction_law():
     theirs = jb.laws.friction_law_like("viscous")
     same(*(short(dataclasses.replace(SEED, friction=each)) for each in (law, theirs)))
     with pytest.raises(jb.ArgumentError, match="name = 'viscous' is not allowed: Viscous has it"):
-        type("Other", (Grip,), {"name": "viscous"})
+        type("Other", (Named,), {"name": "viscous"})
+    with pytest.raises(jb.ArgumentError, match="Other is not allowed to have a name: no like_seed"):
+        type("Other", (Grip,), {"name": "other"})
     assert jb.laws.FRICTION_LAWS["viscous"] is jb.laws.Viscous
 
 
