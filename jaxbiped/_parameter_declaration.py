@@ -99,19 +99,24 @@ class AbstractNamedPart(AbstractPart):
         name: what the catalogue and the command line call it; None for one that is in none. A
             property of the class.
         catalogue: the classes of its kind by name. A property of the class.
+        needed: what a class with a name has besides. A property of the class.
 
     Raises:
-        ArgumentError: where a class with a name is defined: a name that another class has.
+        ArgumentError: where a class with a name is defined: a name that another class has, or a
+            class that lacks what is needed.
     """
 
     name: ClassVar[str | None] = None
     catalogue: ClassVar[dict[str, Any]] = {}
+    needed: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         name = vars(cls).get("name")
         if name is None:
             return
+        for lacking in (each for each in cls.needed if not hasattr(cls, each)):
+            raise ArgumentError(f"{cls.__qualname__} is not allowed to have a name: no {lacking}.")
         known = cls.catalogue.setdefault(name, cls)
         if (known.__module__, known.__qualname__) != (cls.__module__, cls.__qualname__):
             raise ArgumentError(f"name = {name!r} is not allowed: {known.__qualname__} has it.")

@@ -101,7 +101,9 @@ def test_a_friction_law():
     theirs = jb.laws.friction_law_like("viscous")
     same(*(short(dataclasses.replace(SEED, friction=each)) for each in (law, theirs)))
     with pytest.raises(jb.ArgumentError, match="name = 'viscous' is not allowed: Viscous has it"):
-        type("Other", (Grip,), {"name": "viscous"})
+        type("Other", (Named,), {"name": "viscous"})
+    with pytest.raises(jb.ArgumentError, match="Other is not allowed to have a name: no like_seed"):
+        type("Other", (Grip,), {"name": "other"})
     assert jb.laws.FRICTION_LAWS["viscous"] is jb.laws.Viscous
 
 
@@ -124,9 +126,9 @@ def test_an_actuator():
 
     assert jb.actuation.ACTUATORS["brake"] is Brake
     theirs = jb.actuation.HipSpring(k=0.0, b=0.02)
-    ends = [
-        short(dataclasses.replace(SEED, actuation=part)).final for part in (Brake(0.02), theirs)
-    ]
+    scenes = [dataclasses.replace(SEED, actuation=part) for part in (Brake(0.02), theirs)]
+    assert jb.parameter_names(scenes[0])[-1] == "b"
+    ends = [short(scene).final for scene in scenes]
     np.testing.assert_allclose(*map(np.array, ends), rtol=1e-9, atol=1e-12)
 
 

@@ -1,5 +1,6 @@
 """Actuation in the equations of motion: torques at the hip, set points of feet, their powers."""
 
+from collections.abc import Iterable
 from typing import NamedTuple, TypeAlias, TypeVar
 
 import jax.numpy as jnp
@@ -28,8 +29,16 @@ def actuators_of(scene: WalkerScene, kind: type[_Part]) -> tuple[_Part, ...]:
     return tuple(part for part in scene.actuation or () if isinstance(part, kind))
 
 
-def _at_hip(scene: WalkerScene) -> list[AbstractHipActuator]:
-    return [part for part in scene.actuation or () if isinstance(part, AbstractHipActuator)]
+def _at_hip(scene: WalkerScene) -> tuple[AbstractHipActuator, ...]:
+    return actuators_of(scene, AbstractHipActuator)  # type: ignore[type-abstract]
+
+
+def _sums(pairs: Iterable[tuple[Scalar, Scalar]]) -> tuple[Scalar, Scalar] | None:
+    """Both sums over pairs; None where there are none."""
+    added = None
+    for first, second in pairs:
+        added = (first, second) if added is None else (added[0] + first, added[1] + second)
+    return added
 
 
 def load_shares(
@@ -48,25 +57,12 @@ def load_shares(
 
 def hip_torques(scene: WalkerScene, hip: HipMotion) -> LegTorques | None:
     """Torque of all actuators on each leg [N·m]; None where the scene has none at the hip."""
-    parts = _at_hip(scene)
-    if not parts:
-        return None
-    on_legs = [part.torques(hip) for part in parts]
-    first, second = on_legs[0]
-    for more, other in on_legs[1:]:
-        first, second = first + more, second + other
-    return first, second
+    return _sums(part.torques(hip) for part in _at_hip(scene))
 
 
 def preload(scene: WalkerScene, angle: Scalar, rate: Scalar) -> tuple[Scalar, Scalar] | None:
     """Extension of a leg's foot [m] and its rate [m/s]; None where the scene has no preload."""
-    parts = [part.set_point(angle, rate) for part in actuators_of(scene, FootPreload)]
-    if not parts:
-        return None
-    extension, speed = parts[0]
-    for more, faster in parts[1:]:
-        extension, speed = extension + more, speed + faster
-    return extension, speed
+    return _sums(part.set_point(angle, rate) for part in actuators_of(scene, FootPreload))
 
 
 class ActuatorPowers(NamedTuple):

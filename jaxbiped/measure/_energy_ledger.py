@@ -7,7 +7,7 @@ import numpy as np
 
 from jaxbiped._checks import ArgumentError, check_increasing, check_type
 from jaxbiped._types import Scalar
-from jaxbiped.dynamics._actuation import ActuatorPowers, actuator_powers
+from jaxbiped.dynamics._actuation import actuator_powers
 from jaxbiped.dynamics._energy import energies, kinetic_and_moment, powers
 from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion, rolling_rates
@@ -213,7 +213,7 @@ def _hip_works(
     shares = (edges[:-1, None] + np.diff(edges)[:, None] * 0.5 * (1.0 + NODES)).ravel()
     many = RigidState(*[jnp.repeat(leaf, len(shares)) for leaf in starts])
     states = states_after(scene, many, np.outer(periods, shares).ravel())
-    powers = _powers(scene, states)
+    powers = actuator_powers(scene, rolling_hip_motion(states), (None, None))
 
     def split(power: Scalar) -> np.ndarray:
         rows = np.broadcast_to(np.asarray(power), (many.theta_2.size,))
@@ -226,7 +226,3 @@ def _hip_works(
         works[k] = samples.integral(total[k]).sum()
         driven[k] = sum(samples.positive_integral(power[k]).sum() for power in motors)
     return works, driven
-
-
-def _powers(scene: RigidScene, states: RigidState) -> ActuatorPowers:
-    return actuator_powers(scene, rolling_hip_motion(states), (None, None))

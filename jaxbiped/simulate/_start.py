@@ -25,11 +25,9 @@ from jaxbiped.dynamics._consistent_state import Consistent, consistent_state
 from jaxbiped.dynamics._redundant_motion import coordinates_of
 from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._state import BristleState, State, state_for
-from jaxbiped.scene._ground import AbstractClearance, Ground
+from jaxbiped.scene._ground import AbstractClearance
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
-from jaxbiped.scene._walker import Walker
-from jaxbiped.scene.actuation._abstract_actuator import ACTUATORS
-from jaxbiped.scene.laws._abstract_laws import FRICTION_LAWS, NORMAL_LAWS, AbstractNormalLaw
+from jaxbiped.scene.laws._abstract_laws import AbstractNormalLaw
 from jaxbiped.solve._failure_events import WATCHES
 
 _PRECISIONS = (np.float16, np.float32, np.float64)
@@ -126,13 +124,10 @@ def check_single_scene(scene: Scene | RigidScene | RedundantScene) -> None:
 
     Laws of the user's own may hold arrays.
     """
-    own = (*NORMAL_LAWS.values(), *FRICTION_LAWS.values(), Walker, Ground)
-    for name, part in vars(scene.minimal).items():
-        if type(part) in own:
+    parts = [*vars(scene.minimal).items(), *(("actuation", part) for part in scene.actuation or ())]
+    for name, part in parts:
+        if type(part).__module__.partition(".")[0] == "jaxbiped":
             check_unbatched(f"scene.{name}", part, "one scene")
-    for part in scene.actuation or ():
-        if type(part) in ACTUATORS.values():
-            check_unbatched("scene.actuation", part, "one scene")
 
 
 def check_limits(

@@ -177,26 +177,6 @@ def test_at_strength_zero_the_fields_are_the_passive_ones():
     np.testing.assert_allclose(np.array(found.state), np.array(expected.state), rtol=1e-15)
 
 
-def test_at_strength_zero_rigid_walks_are_the_passive_ones():
-    start = jb.dynamics.rigid_state(jb.seed_state())
-    walks = [
-        jb.rigid_walk(scene, start, footsteps=3, accuracy="tight", engine="lanes")
-        for scene in (_idle(RIGID), jb.RigidScene(SEED.walker, SEED.ground))
-    ]
-    np.testing.assert_allclose(np.array(walks[0].final), np.array(walks[1].final), rtol=1e-12)
-
-
-@pytest.mark.slow
-def test_at_strength_zero_compliant_walks_are_the_passive_ones():
-    """Over a heel strike, to the tolerance of steps that the solver chooses."""
-    passive = dataclasses.replace(DRIVEN, actuation=None)
-    options = dict(duration=0.42, accuracy="tight", engine="lanes", save="end")
-    ends = [
-        jb.simulate(scene, jb.seed_state(), **options).final for scene in (_idle(DRIVEN), passive)
-    ]
-    np.testing.assert_allclose(np.array(ends[0]), np.array(ends[1]), rtol=1e-6, atol=1e-8)
-
-
 @pytest.mark.slow
 def test_both_engines_roll_alike():
     start = jb.dynamics.rigid_state(jb.seed_state())

@@ -6,7 +6,6 @@ import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference.compliant import START, derivative, numbers
@@ -48,15 +47,6 @@ def test_field_works_on_a_time_series():
     states = jax.tree_util.tree_map(lambda leaf: jnp.full(3, leaf), jb.seed_state())
     rates = jb.dynamics.vector_field(0.0, states, jb.seed_scene())
     assert all(leaf.shape == (3,) for leaf in rates)
-
-
-def test_exchanging_legs_exchanges_their_accelerations():
-    scene, state = jb.seed_scene(), jb.seed_state()
-    plain, mirrored = (
-        jb.dynamics.accelerations(scene, s) for s in (state, jb.dynamics.exchange_legs(state))
-    )
-    assert float(plain.alpha_1) == pytest.approx(float(mirrored.alpha_2), rel=1e-12)
-    assert float(plain.hip_ax) == pytest.approx(float(mirrored.hip_ax), rel=1e-12)
 
 
 def test_a_leg_pinned_at_the_hip_is_a_pendulum():

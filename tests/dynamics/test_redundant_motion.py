@@ -126,11 +126,3 @@ def test_bristles_bend_as_in_minimal_coordinates():
     expected = jb.dynamics.vector_field(0.0, state, scene)
     assert float(rates.bristle_2) == pytest.approx(float(expected.bristle_2), rel=1e-12)
     assert float(rates.omega_2) == pytest.approx(float(expected.omega_2), rel=1e-9)
-
-
-def test_parameters_are_those_of_what_is_modelled():
-    scene = jb.RedundantScene(jb.seed_scene(), "baumgarte")
-    assert jb.parameter_names(scene) == jb.parameter_names(scene.scene)
-    changed = jb.with_parameters(scene, {"K": 2e6})
-    assert float(changed.normal.K) == 2e6
-    assert isinstance(changed.method, jb.constraints.Baumgarte)

@@ -31,6 +31,9 @@ def test_rolling_solves_the_equations(scene, state):
     got = [motion.alpha_1, motion.alpha_2, motion.force.tangential, motion.force.normal]
     scale = np.abs(solved).max()
     np.testing.assert_allclose(np.array(got), solved, rtol=1e-10, atol=1e-12 * scale)
+    field = np.array(jb.dynamics.rolling_field(0.0, state, scene))
+    expected = [walker.whole_rates(y[:, None])[0][0], *walker.rates(y)]
+    np.testing.assert_allclose(field, expected, rtol=1e-10, atol=1e-12 * scale)
 
 
 @pytest.mark.parametrize("scene", WALKERS)
@@ -108,14 +111,6 @@ def energy(scene, state):
     return total
 
 
-@pytest.mark.parametrize("scene", WALKERS)
-def test_rolling_keeps_energy(scene):
-    state = jb.dynamics.RigidState(*map(jnp.asarray, (0.1, -0.3, 0.2, 0.4, -0.9)))
-    rates = jb.dynamics.rolling_field(0.0, state, scene)
-    _, power = jax.jvp(lambda y: energy(scene, y), (state,), (rates,))
-    assert abs(float(power)) < 1e-12 * float(jnp.abs(energy(scene, state)) + 1.0)
-
-
 @pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-11])
 def test_a_swing_keeps_energy_to_the_tolerance(rtol):
     scene = WALKERS[0]
@@ -138,10 +133,3 @@ def test_checks_name_what_a_real_foot_would_do():
     assert checks.slips(0.01).tolist() == [True, True]
     assert checks.slips(10.0).tolist() == [True, False]
     assert float(checks.needed_friction[0]) == np.inf
-
-
-def test_massless_legs_without_a_hip_mass_are_refused():
-    with pytest.raises(jb.ArgumentError, match="hip_mass = 0"):
-        jb.Walker(m=1.0, J=0.0, l=1.0, d=0.5, r=0.0)
-    with pytest.raises(jb.ArgumentError, match="d = 0"):
-        jb.Walker(m=1.0, J=0.0, l=1.0, d=0.0, r=0.0, hip_mass=1.0)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.measure._samples import NODES, Samples
 from tests.rigid_walkers import rigid_seed
 
 A = jb.actuation
@@ -118,16 +117,6 @@ def test_costs_count_motors_where_they_drive(driven, rolled):
     scene, walk = rolled
     costs = jb.measure.cost_of_transport(scene, walk)
     assert (costs.motor_work > jb.measure.rigid_ledger(scene, walk).actuation_work).all()
-
-
-def test_the_positive_part_of_an_integral():
-    edges = np.linspace(0.0, 2.0 * np.pi, 14)
-    middles, halves = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-    samples = Samples(edges, np.sin(middles[:, None] + halves[:, None] * NODES + 0.3))
-    found = samples.positive_integral(samples.values).sum()
-    assert found == pytest.approx(2.0, abs=2e-7)
-    below = samples.positive_integral(-samples.values).sum()
-    assert below - found == pytest.approx(-samples.integral(samples.values).sum(), abs=1e-12)
 
 
 def _simplest(impulse):

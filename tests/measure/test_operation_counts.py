@@ -5,13 +5,11 @@ import re
 from collections import Counter
 
 import jax
-import jax.numpy as jnp
 import pytest
 
 import jaxbiped as jb
 
 SEED = jb.seed_scene()
-PEAKED = dict(mu_static=0.5, mu_kinetic=0.4, v0=1e-4, xi=1000.0)
 BRISTLES = jb.laws.LuGre(mu_static=0.5, mu_kinetic=0.4, v_s=1e-3, sigma_0=5e4, sigma_1=100.0)
 
 
@@ -21,46 +19,34 @@ def scene(**parts):
 
 def compiled(scene):
     """Operations of the vector field as XLA compiles it: those within its fusions."""
-    state = jb.seed_state()
-    if isinstance(scene.friction, jb.laws.Dahl | jb.laws.LuGre):
-        state = jb.dynamics.BristleState(
-            **state._asdict(), bristle_1=jnp.zeros(()), bristle_2=jnp.zeros(())
-        )
-    program = (
-        jax.jit(lambda y, args: jb.dynamics.vector_field(0.0, y, args))
-        .lower(state, scene)
-        .compile()
-    )
-    found = Counter(re.findall(r"= \S+ (\w+[-\w]*)\(", program.as_text()))
-    return found, len(state)
+    field = jax.jit(lambda y, args: jb.dynamics.vector_field(0.0, y, args))
+    text = field.lower(jb.seed_state(), scene).compile().as_text()
+    return Counter(re.findall(r"= \S+ (\w+[-\w]*)\(", text))
 
 
 def test_an_exponential_only_with_stribeck_or_a_power():
     linear = jb.laws.KelvinVoigt(K=3e4, D=5e3)
-    peaked, _ = compiled(scene(normal=linear))
-    flat, _ = compiled(scene(normal=linear, friction=jb.laws.Threlfall(mu=0.4, v0=1e-4)))
-    none, _ = compiled(scene(normal=linear, friction=jb.laws.Frictionless()))
-    viscous, _ = compiled(scene(normal=linear, friction=jb.laws.Viscous(k=100.0)))
+    peaked, flat, none, viscous, coulomb = (
+        compiled(scene(normal=linear, friction=law))
+        for law in (
+            SEED.friction,
+            jb.laws.Threlfall(mu=0.4, v0=1e-4),
+            jb.laws.Frictionless(),
+            jb.laws.Viscous(k=100.0),
+            jb.laws.RegularisedCoulomb(mu=0.4, v_d=1e-4),
+        )
+    )
     assert peaked["exponential"] >= 2
     assert flat["exponential"] >= 2
     assert none["exponential"] == viscous["exponential"] == 0
-    coulomb, _ = compiled(
-        scene(normal=linear, friction=jb.laws.RegularisedCoulomb(mu=0.4, v_d=1e-4))
-    )
     assert coulomb["tanh"] >= 2
     assert none["tanh"] == peaked["tanh"] == 0
     assert none["sign"] == 0
 
 
-def test_no_bristle_state_without_bristles():
-    _, plain = compiled(SEED)
-    _, bent = compiled(scene(friction=BRISTLES))
-    assert (plain, bent) == (8, 10)
-
-
 def test_one_foots_contact_where_only_one_can_touch():
-    both, _ = compiled(scene(clearance=jb.laws.AlwaysTouching()))
-    one, _ = compiled(scene(clearance=jb.laws.OneFoot(leg=2)))
+    both = compiled(scene(clearance=jb.laws.AlwaysTouching()))
+    one = compiled(scene(clearance=jb.laws.OneFoot(leg=2)))
     assert 0 < one["exponential"] <= both["exponential"] // 2
     one, both = (
         jb.measure.operation_counts(scene(clearance=rule))["libm log"]

@@ -49,25 +49,6 @@ def _broadcast(tree, n):
     return jax.tree_util.tree_map(lambda leaf: jnp.broadcast_to(leaf, (n,)), tree)
 
 
-def _primitives(scene):
-    program = jax.make_jaxpr(lambda state: jb.dynamics.accelerations(scene, state))(jb.seed_state())
-    return str(program)
-
-
-def test_what_a_scene_leaves_out_is_not_in_the_program():
-    seed = jb.seed_scene()
-    without = jb.Scene(seed.walker, seed.ground, seed.normal, jb.laws.Frictionless())
-    coulomb = jb.Scene(
-        seed.walker, seed.ground, seed.normal, jb.laws.RegularisedCoulomb(mu=0.4, v_d=1e-4)
-    )
-    assert _primitives(seed).count(" exp ") == 4
-    assert _primitives(without).count(" exp ") == 2
-    assert _primitives(coulomb).count(" tanh ") == 2
-    assert " tanh " not in _primitives(without)
-    assert " sign " in _primitives(seed)
-    assert " sign " not in _primitives(without)
-
-
 def test_frictionless_forces_have_no_tangential_part():
     seed = jb.seed_scene()
     scene = jb.Scene(seed.walker, seed.ground, seed.normal, jb.laws.Frictionless())

@@ -27,6 +27,7 @@ class AbstractNormalLaw(AbstractNamedPart):
     """
 
     catalogue: ClassVar[dict[str, Any]] = NORMAL_LAWS
+    needed: ClassVar[tuple[str, ...]] = ("like_seed",)
     jumps_at_touchdown: ClassVar[bool] = False
 
     @abc.abstractmethod
@@ -66,6 +67,7 @@ class AbstractFrictionLaw(AbstractNamedPart):
     """
 
     catalogue: ClassVar[dict[str, Any]] = FRICTION_LAWS
+    needed: ClassVar[tuple[str, ...]] = ("like_seed",)
     builds_up_over: ClassVar[str | None] = None
 
     @abc.abstractmethod
@@ -123,6 +125,7 @@ class AbstractBristleLaw(AbstractNamedPart):
     """
 
     catalogue: ClassVar[dict[str, Any]] = FRICTION_LAWS
+    needed: ClassVar[tuple[str, ...]] = ("like_seed",)
 
     @abc.abstractmethod
     def engagement(self) -> tuple[Scalar, Scalar]:

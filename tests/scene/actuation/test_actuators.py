@@ -169,27 +169,3 @@ def test_refusals_are_one_sentence(make, message):
     with pytest.raises(jb.ArgumentError, match=message) as refused:
         make()
     assert str(refused.value).count("\n") == 0
-
-
-class Brake(A.AbstractHipActuator):
-    """An actuator of one's own: it holds the legs back, more the faster they part."""
-
-    strength: float = jb.laws.parameter("strength", "$s$", "N m s^3/rad^3", minimum=0.0)
-
-    def torques(self, hip):
-        apart = hip.rate[0] - hip.rate[1]
-        return -self.strength * apart**3, self.strength * apart**3
-
-    def motor_torques(self, hip):
-        return None
-
-    def idle(self):
-        return dataclasses.replace(self, strength=0.0 * self.strength)
-
-
-def test_an_actuator_of_ones_own():
-    scene = _scene(Brake(1e-3))
-    assert jb.parameter_names(scene)[-1] == "strength"
-    state = jb.seed_state()
-    change = jb.dynamics.accelerations(scene, state).alpha_1
-    assert float(change) != float(jb.dynamics.accelerations(SEED, state).alpha_1)

@@ -79,20 +79,10 @@ def matched_to_weight(
     damping_ratio: Parameter = 0.0,
     n: Parameter = 1.5,
 ) -> tuple[Scalar, Scalar]:
-    """The stiffness K and the damper d that hold a mass at rest as told.
+    """The stiffness K [N/mⁿ] and the damper d [N·s/m] that hold a mass at rest as told.
 
     K δⁿ carries the weight m g at the penetration δ. There the linear stiffness is
     k = dF/dδ = n m g/δ, and the linear damper is d = dF/dδ̇ = 2 ζ √(k m).
-
-    Args:
-        mass: what stands on the law, m [kg].
-        penetration: how deep it stands, δ [m].
-        g: gravitational acceleration [m/s²].
-        damping_ratio: of small oscillations about that, ζ [–].
-        n: exponent of the stiffness [–].
-
-    Returns:
-        K [N/mⁿ] and d [N·s/m].
 
     Raises:
         ArgumentError: mass, penetration or g not above 0, damping_ratio below 0 or n below 1.
