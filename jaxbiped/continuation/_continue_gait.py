@@ -90,14 +90,12 @@ def continue_gait(
     check_count("max_points", max_points)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     start = start_of(scene, axis)
-    if isinstance(guess, Gait):
-        guess = guess.measures.state
-    if guess is not None:
-        guess = state_for(scene, guess, "guess")
+    near = guess.measures.state if isinstance(guess, Gait) else guess
+    near = None if near is None else state_for(scene, near, "guess")
     setup = continuation_setup(
         scene, axis, footsteps=int(footsteps), accuracy=accuracy, engine=engine
     )
-    begin = first_gait(setup, start, guess, engine)
+    begin = first_gait(setup, start, near, engine)
     if isinstance(begin, str):
         none = BranchStop(BranchEnd.NO_BEGINNING, begin, float("nan"))
         return setup.branch(Trace([], [], none), Trace([], [], none))
