@@ -10,7 +10,7 @@ from jaxbiped._types import as_float
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._branch_point import Axis, BranchPoint, branch_point, change_of
 from jaxbiped.continuation._cycle import Cycle, CycleProblem
-from jaxbiped.continuation._trace import Trace, limit_cause
+from jaxbiped.continuation._trace import Trace, limit_cause, trace
 from jaxbiped.dynamics._state import WalkerState
 from jaxbiped.dynamics._state_quantities import state_of_recurring
 from jaxbiped.gait._homotopy import BranchEnd
@@ -79,6 +79,10 @@ class ContinuationSetup(NamedTuple):
     def point(self, found: CurvePoint) -> BranchPoint:
         """What is told of a point of the curve."""
         return branch_point(self.curve, self.axis, found)
+
+    def trace(self, begin: CurvePoint, **options: Any) -> Trace:
+        """The gaits onwards from a point of the curve; options are those of `trace`."""
+        return trace(self.curve, self.axis, begin, **options)
 
     def with_cause(self, part: Trace) -> Trace:
         """A part of a branch whose end is told by touch and slip, where these tell it."""

@@ -18,7 +18,7 @@ from jaxbiped.continuation._continuation_setup import (
     continuation_setup,
     setup_of,
 )
-from jaxbiped.continuation._trace import LIMITS, BranchStop, Trace, trace
+from jaxbiped.continuation._trace import LIMITS, BranchStop, Trace
 from jaxbiped.dynamics._state import WalkerState, state_for
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
@@ -90,14 +90,12 @@ def continue_gait(
     check_count("max_points", max_points)
     check_choice("accuracy", accuracy, GAIT_ACCURACIES)
     start = start_of(scene, axis)
-    if isinstance(guess, Gait):
-        guess = guess.measures.state
-    if guess is not None:
-        guess = state_for(scene, guess, "guess")
+    near = guess.measures.state if isinstance(guess, Gait) else guess
+    near = None if near is None else state_for(scene, near, "guess")
     setup = continuation_setup(
         scene, axis, footsteps=int(footsteps), accuracy=accuracy, engine=engine
     )
-    begin = first_gait(setup, start, guess, engine)
+    begin = first_gait(setup, start, near, engine)
     if isinstance(begin, str):
         none = BranchStop(BranchEnd.NO_BEGINNING, begin, float("nan"))
         return setup.branch(Trace([], [], none), Trace([], [], none))
@@ -107,23 +105,13 @@ def continue_gait(
             bar.update()
             bar.set_postfix_str(f"{along} = {point.value:.6g}", refresh=False)
 
-        def onwards(begin: CurvePoint, passed: list[BranchPoint]) -> Trace:
-            return trace(
-                setup.curve,
-                axis,
-                begin,
-                largest_step=float(largest_step),
-                max_points=int(max_points),
-                passed=passed,
-                tell=tell,
-            )
-
-        before = onwards(begin._replace(tangent=-begin.tangent), [])
+        steps = dict(largest_step=float(largest_step), max_points=int(max_points), tell=tell)
+        before = setup.trace(begin._replace(tangent=-begin.tangent), **steps)
         known = before.reversed()
         if before.stop.end is BranchEnd.CLOSED:
             after = Trace(known.points[-1:], [], before.stop)
         else:
-            after = onwards(begin, known.points[:-1])
+            after = setup.trace(begin, passed=known.points[:-1], **steps)
     before, after = map(setup.with_cause, (before, after))
     return setup.branch(before.reversed(), after)
 
@@ -213,13 +201,9 @@ def resume_branch(
         raise ArgumentError(f"at = {at} is not allowed: from there the walk does not return.")
     events = _events_at(branch, kept, forward=forward)
     known = Trace(points, events, branch.stops[0 if forward else 1])
-    beyond = trace(
-        setup.curve,
-        axis,
-        begin.found,
-        largest_step=largest_step,
-        max_points=max_points,
-        passed=(known if forward else known.reversed()).points[:-1],
+    passed = (known if forward else known.reversed()).points[:-1]
+    beyond = setup.trace(
+        begin.found, largest_step=largest_step, max_points=max_points, passed=passed
     )
     return setup.branch(known, beyond) if forward else setup.branch(beyond.reversed(), known)
 

@@ -12,7 +12,7 @@ from jaxbiped._checks import ArgumentError, check_count, check_positive, check_t
 from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent
 from jaxbiped.continuation._branch import Branch
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, setup_of
-from jaxbiped.continuation._trace import BranchStop, Trace, trace
+from jaxbiped.continuation._trace import BranchStop, Trace
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import CurvePoint, correct
 
@@ -148,14 +148,7 @@ def _doubled_branch(
             f"doubling at {branch.along} = {doubling.value:.6g} is not allowed: no gait of "
             f"{setup.footsteps} footsteps was found near it."
         )
-    beyond = trace(
-        setup.curve,
-        setup.axis,
-        begin,
-        largest_step=largest_step,
-        max_points=max_points,
-        until=until,
-    )
+    beyond = setup.trace(begin, largest_step=largest_step, max_points=max_points, until=until)
     stop = BranchStop(
         BranchEnd.BRANCHES_OFF,
         f"a branch of {branch.footsteps} footsteps doubles its period",

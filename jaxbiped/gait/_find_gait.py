@@ -230,11 +230,16 @@ def _adam() -> "optax.GradientTransformation":
     return optax.adam(1e-2)
 
 
-def _compile_once(problem: FixedPointProblem, *summarising: Any) -> None:
+def _compile_once(
+    problem: FixedPointProblem,
+    asked: FixedPointProblem,
+    names: tuple[str, ...],
+    radius: bool,
+    origin: Origin,
+) -> None:
     """Compiles what is not compiled yet for this kind of search and what is asked of its gait."""
-    _, *asked, _ = summarising
-    once = _compilation_of(_kind_of((problem, *asked)))
-    once(lambda: _compile(problem, *summarising))
+    once = _compilation_of(_kind_of((problem, names, radius)))
+    once(lambda: _compile(problem, asked, names, radius, origin))
 
 
 @bounded_cache(PROGRAMS)

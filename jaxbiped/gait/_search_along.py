@@ -16,7 +16,6 @@ from jaxbiped.gait._poincare_map import recurring_components
 from jaxbiped.gait._search_provenance import FoundBy, Origin
 from jaxbiped.gait._search_starts import default_guess
 from jaxbiped.linalg._small_matrices import eigenpairs
-from jaxbiped.scene._scene import AbstractWalkerScene
 
 _FIRST, _LARGEST, _SMALLEST = 0.05, 0.3, 1e-3
 """Steps along the line: the first, at most, and at which it is given up."""
@@ -122,7 +121,7 @@ def _after(way: _Way, latest: Found, line: Homotopy, first: Scalar) -> _Way:
         found_by=jnp.where(better & ~from_start, int(FoundBy.CONTINUATION), way.origin.found_by),
         branch_end=jnp.where(followed, end, way.origin.branch_end),
         branch_walk_ending=jnp.where(followed & lost, latest.code, way.origin.branch_walk_ending),
-        nearest=_nearest(way.origin.nearest, line, at[1], followed & ~from_seed),
+        nearest=select(followed & ~from_seed, line.at(at[1]).minimal, way.origin.nearest),
     )
     return _Way(
         s=s,
@@ -147,13 +146,6 @@ def _is_ahead(way: _Way, point: Scalar) -> Scalar:
 
     aside, length = distance(point, way.ahead), distance(point, way.latest_point)
     return jnp.where(way.at[1] > way.at[0], aside < _ASIDE * length + 0.01, length < _JUMP)
-
-
-def _nearest(
-    kept: AbstractWalkerScene, line: Homotopy, s: Scalar, wanted: Scalar
-) -> AbstractWalkerScene:
-    scene = line.at(s)
-    return select(wanted, scene.minimal, kept)
 
 
 def _radius(found: Found) -> Scalar:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from jaxbiped._ending import NamedCode
-from jaxbiped._types import Scalar, by_numpy
+from jaxbiped._types import Numbers, Scalar, by_numpy
 from jaxbiped.linalg._small_matrices import eigenpairs
 
 
@@ -76,7 +76,7 @@ def stability_of(
     )
 
 
-def critical_bifurcation(values: Scalar, errors: Scalar, closeness: float) -> Scalar:
+def critical_bifurcation(values: Numbers, errors: Numbers, closeness: float) -> Scalar:
     """Code of the `Bifurcation` that multipliers on the unit circle announce."""
 
     def code(numpy: Any, values: Any, errors: Any) -> Any:

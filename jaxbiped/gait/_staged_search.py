@@ -100,7 +100,7 @@ def search_in_stages(
         scout: how to follow the branch: cycles of one footstep, in minimal coordinates.
         first: what the first stage came to.
     """
-    modelled = problem.args.minimal
+    modelled: Scene | RigidScene = problem.args.minimal
     seen: list[Seen] = []
     branch = line = None
     start = default_guess(modelled)

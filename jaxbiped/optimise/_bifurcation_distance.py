@@ -17,7 +17,7 @@ from jaxbiped.continuation._bifurcations import BifurcationPoint, BranchEvent, a
 from jaxbiped.continuation._branch_point import axis_of, start_of
 from jaxbiped.continuation._continuation_setup import ContinuationSetup, continuation_setup
 from jaxbiped.continuation._nearest_bifurcation import range_of
-from jaxbiped.continuation._trace import LIMITS, Trace, trace
+from jaxbiped.continuation._trace import LIMITS, Trace
 from jaxbiped.gait._fixed_point_search import LOOSER
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._homotopy import BranchEnd
@@ -155,9 +155,7 @@ def _both_ways(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> list[
     if begin is None:
         return []
     return [
-        trace(
-            setup.curve,
-            setup.axis,
+        setup.trace(
             begin._replace(tangent=way * begin.tangent),
             largest_step=_LARGEST_STEP,
             max_points=_MOST_POINTS,

@@ -63,12 +63,3 @@ def test_draft_tells_measures_to_a_hundredth_in_two_fifths_of_the_steps():
         assert told == pytest.approx(true, rel=1e-2), name
     assert draft.error is None
     assert balanced.error is None
-
-
-@pytest.mark.parametrize(
-    ("accuracy", "words"),
-    [(0.0, "accuracy = 0 is not allowed"), ("fine", "choose one of draft, balanced, tight")],
-)
-def test_bad_accuracies_cost_one_sentence(accuracy, words):
-    with pytest.raises(jb.ArgumentError, match=words):
-        jb.find_gait(SCENE, accuracy=accuracy)

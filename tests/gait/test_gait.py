@@ -1,6 +1,5 @@
 """The seed's gait, against published measures and differences; what a search costs."""
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -79,32 +78,19 @@ def test_no_gait_on_the_level():
     assert not bool(gait.stable)
 
 
-def test_vmap_over_scenes_changes_nothing(found):
-    stiffness = jnp.array([1e6, 2e6])
-
-    def one(k):
-        scene = eqx.tree_at(lambda s: s.normal.K, jb.seed_scene(), k)
-        return jb.find_gait(scene, parameters=("K",), radius_sensitivities=False)
-
-    both = jax.jit(jax.vmap(one))(stiffness)
-    assert np.all(np.asarray(both.ending) == 0)
-    assert float(both.measures.period[0]) == pytest.approx(float(found.measures.period), abs=1e-8)
-    k = found.parameters.index("K")
-    assert float(both.elasticities.period[0, 0]) == pytest.approx(
-        float(found.elasticities.period[k]), rel=5e-4
-    )
-
-
 @pytest.mark.parametrize(
     ("options", "named"),
     [
-        (dict(accuracy="fast"), "accuracy"),
+        (dict(accuracy="fast"), "choose one of draft, balanced, tight"),
+        (dict(accuracy=0.0), "accuracy = 0 is not allowed"),
         (dict(footsteps=0), "footsteps"),
         (dict(footsteps=1.5), "footsteps"),
         (dict(parameters=("K", "stiffness")), "parameters"),
         (dict(method="secant"), "method"),
         (dict(max_evaluations=0), "max_evaluations"),
         (dict(solver="euler"), "solver"),
+        (dict(solver="kvaerno3", engine="lanes"), "Kvaerno3 is not one of its solvers"),
+        (dict(engine="fast"), "choose one of auto, xla, lanes"),
     ],
 )
 def test_bad_arguments(options, named):

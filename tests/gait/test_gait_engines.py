@@ -69,8 +69,8 @@ def test_many_scenes_at_once_give_what_each_gives_alone(gait):
         one = jb.find_gait(jb.seed_scene(slope=slope), engine="lanes", radius_sensitivities=False)
         return one.measures.period, one.elasticities.period
 
-    together = jax.vmap(period)(slopes)
-    np.testing.assert_allclose(together[0][1], gait.measures.period, rtol=1e-6)
+    together = jax.jit(jax.vmap(period))(slopes)
+    assert float(together[0][1]) == pytest.approx(float(gait.measures.period), abs=1e-8)
     np.testing.assert_allclose(together[1][1], gait.elasticities.period, rtol=5e-4, atol=1e-8)
     assert np.all(np.diff(together[0]) > 0.0)
 
@@ -109,13 +109,6 @@ def test_a_large_batch_of_gaits_ends():
     radii, endings = jax.jit(jax.vmap(radius))(jnp.linspace(0.0195, 0.0205, 256))
     assert np.all(np.asarray(endings) == int(jb.gait.Search.FOUND))
     assert np.all(np.abs(np.diff(radii)) < 1e-3)
-
-
-def test_lanes_are_refused_what_they_cannot_do():
-    with pytest.raises(jb.ArgumentError, match="Kvaerno3 is not one of its solvers"):
-        jb.find_gait(jb.seed_scene(), solver="kvaerno3", engine="lanes")
-    with pytest.raises(jb.ArgumentError, match="choose one of auto, xla, lanes"):
-        jb.find_gait(jb.seed_scene(), engine="fast")
 
 
 def test_every_search_by_what_lanes_lack_is_refused_in_the_same_sentence():

@@ -46,28 +46,19 @@ def test_on_stiff_ground_the_gait_is_the_one_that_walks_settle_on(stiffness, opt
     np.testing.assert_allclose(settled, float(gait.measures.period), atol=2e-6)
 
 
-def test_the_unstable_gait_that_was_seen_is_told():
+def test_the_unstable_gait_that_was_seen_is_told_and_found_from_its_state():
     scene = jb.seed_scene(slope=0.03)
     gait = jb.find_gait(scene, **PLAIN)
     assert gait.found_by is jb.gait.FoundBy.WALKING
     (other,) = gait.others
     assert other.period == pytest.approx(0.38827, abs=1e-5)
     assert other.spectral_radius == pytest.approx(2.39, abs=0.01)
-    # The state that is told is the other gait's.
-    state = jax.tree.map(jnp.asarray, other.state)
-    assert float(jb.find_gait(scene, state, **PLAIN).measures.period) == pytest.approx(
-        0.38827, abs=1e-5
-    )
     assert "0.388268 s (spectral radius 2.39)" in jb.gait.explain_search(scene, gait)
-
-
-def test_with_a_guess_the_gait_near_it_is_returned():
-    scene = jb.seed_scene(slope=0.03)
-    other = jax.tree.map(jnp.asarray, jb.find_gait(scene, **PLAIN).others[0].state)
-    gait = jb.find_gait(scene, other, **PLAIN)
-    assert gait.found_by is jb.gait.FoundBy.GUESS
-    assert not bool(gait.stable)
-    assert gait.others == []
+    near = jb.find_gait(scene, jax.tree.map(jnp.asarray, other.state), **PLAIN)
+    assert float(near.measures.period) == pytest.approx(0.38827, abs=1e-5)
+    assert near.found_by is jb.gait.FoundBy.GUESS
+    assert not bool(near.stable)
+    assert near.others == []
 
 
 @pytest.mark.parametrize(
