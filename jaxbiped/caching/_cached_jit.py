@@ -17,7 +17,7 @@ import numpy as np
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._jax_versions import nothing_is_traced
 from jaxbiped.caching import _caches
-from jaxbiped.caching._caches import Once, register_programs
+from jaxbiped.caching._caches import Once, name_of, register_cache
 from jaxbiped.caching._compiled_store import (
     ArrayFunction,
     KeptProgram,
@@ -96,7 +96,7 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         self._jitted: Any = eqx.filter_jit(function)
         self._programs: dict[Hashable, Once[KeptProgram | None]] = {}
         self._lock = threading.Lock()
-        register_programs(function, self._count, self.clear)
+        register_cache(name_of(function), self._count, lambda: _caches.PROGRAMS, self.clear)
 
     @without_switches
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:

@@ -7,16 +7,19 @@ from typing import NamedTuple, Optional
 import numpy as np
 
 from jaxbiped._types import Numbers
-from jaxbiped.caching._caches import half_of_cache_bytes, register_bytes
+from jaxbiped.caching._caches import half_of_cache_bytes, register_cache
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._host_cpu import default_threads
 from jaxbiped.compiler.runtime._program import Recorded
 from jaxbiped.compiler.runtime._record_cache import BLOCK, BufferPool, RecordCache, Tables
 
-_RECORDS = RecordCache(most=half_of_cache_bytes)
-_BUFFERS = BufferPool(most=half_of_cache_bytes)
-register_bytes("records of simulations", _RECORDS)
-register_bytes("buffers for records", _BUFFERS)
+_RECORDS, _BUFFERS = RecordCache(half_of_cache_bytes), BufferPool(half_of_cache_bytes)
+register_cache(
+    "records of simulations", lambda: _RECORDS.kept, half_of_cache_bytes, _RECORDS.clear, "bytes"
+)
+register_cache(
+    "buffers for records", lambda: _BUFFERS.kept, half_of_cache_bytes, _BUFFERS.clear, "bytes"
+)
 
 
 class Part(enum.Enum):
