@@ -145,11 +145,13 @@ class LaneCall(NamedTuple):
     how: LaneRun
     wants: Part
 
-    def __call__(self, numbers: Numbers, *rest: Numbers) -> list[np.ndarray]:
-        given = [np.asarray(each) for each in (numbers, *rest)]
-        if self.wants is Part.OUTPUTS:
-            return self.how.outputs(*given)
-        return (self.how.everything if self.wants is Part.ALL else self.how.columns)(*given)
+    def __call__(self, *given: Numbers) -> list[np.ndarray]:
+        run: Callable[..., list[np.ndarray]] = {
+            Part.ALL: self.how.everything,
+            Part.OUTPUTS: self.how.outputs,
+            Part.COLUMNS: self.how.columns,
+        }[self.wants]
+        return run(*map(np.asarray, given))
 
     def __fingerprint__(self) -> object:
         return tuple(self)
