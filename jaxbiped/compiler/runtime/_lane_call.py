@@ -48,7 +48,7 @@ class LaneRun(NamedTuple):
         quick: whether a single simulation is over before a user could interrupt.
         once: whether records that are kept on the host are read only once.
         reads: how those were run whose records are its stream, if it reads such.
-        schedule: of its records, where it has one; its length is then their `room`.
+        schedule: of its records, one at each time, where it has such.
     """
 
     compiled: CompiledProgram
@@ -118,12 +118,11 @@ class LaneRun(NamedTuple):
         width: int,
         memory: Callable[[tuple[int, ...]], np.ndarray] = np.zeros,
     ) -> tuple[np.ndarray, Recorded | None]:
-        times = None if self.schedule is None else self.schedule.times
         return self.compiled.run_table(
             own,
-            schedule=times,
+            schedule=None if self.schedule is None else self.schedule.times,
             stream=rows,
-            room=room if times is None else len(times),
+            room=room,
             memory=memory,
             quick=self.quick and own.shape[1] == 1,
             width=width,

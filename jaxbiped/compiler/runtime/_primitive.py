@@ -92,6 +92,7 @@ def call(
     if isinstance(stream, Recording):
         reads, rows, inputs = stream.how, [], (inputs, stream.numbers)
     numbers = _numbers(inputs)
+    room = room if schedule is None else len(schedule.times)
     how = LaneRun(compiled, room, quick, reads_once, reads, schedule)
     if keeps_records:
         (table,) = _bind([numbers], how, Part.OUTPUTS)
@@ -153,8 +154,7 @@ def _abstract_evaluation(
     size = sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(outline.outputs))
     found = [jax.core.ShapedArray((count, size), jnp.float64)]
     if outline.recorded is not None and wants is Part.ALL:
-        room = how.room if how.schedule is None else len(how.schedule.times)
-        found.append(jax.core.ShapedArray((count, room, outline.recorded), jnp.float64))
+        found.append(jax.core.ShapedArray((count, how.room, outline.recorded), jnp.float64))
         found.append(jax.core.ShapedArray((count,), jnp.int64))
     return found
 
