@@ -145,12 +145,12 @@ class LaneCall(NamedTuple):
     wants: Part
 
     def __call__(self, *given: Numbers) -> list[np.ndarray]:
-        run: Callable[..., list[np.ndarray]] = {
-            Part.ALL: self.how.everything,
-            Part.OUTPUTS: self.how.outputs,
-            Part.COLUMNS: self.how.columns,
-        }[self.wants]
-        return run(*map(np.asarray, given))
+        numbers, *rest = map(np.asarray, given)
+        if self.wants is Part.OUTPUTS:
+            return self.how.outputs(numbers)
+        if self.wants is Part.COLUMNS:
+            return self.how.columns(numbers, *rest)
+        return self.how.everything(numbers, *rest)
 
     def __fingerprint__(self) -> object:
         return tuple(self)
