@@ -9,7 +9,7 @@ import contextlib
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 if TYPE_CHECKING:
     import numpy as np
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 MOST_ROOM = 1 << 27
 """States that may be kept of one simulation: some ten gigabytes."""
+_T = TypeVar("_T")
 _Test: TypeAlias = "Callable[[Any], Any]"
 
 
@@ -69,20 +70,30 @@ _RULES: ContextVar["list[ArrayLike] | None"] = ContextVar("rules", default=None)
 
 
 @contextlib.contextmanager
+def gathered(variable: "ContextVar[list[_T] | None]") -> "Iterator[list[_T]]":
+    """A new list that the variable holds within."""
+    found: list[_T] = []
+    token = variable.set(found)
+    try:
+        yield found
+    finally:
+        variable.reset(token)
+
+
+@contextlib.contextmanager
 def traced_rules() -> "Iterator[list[ArrayLike]]":
     """Gathers, of all that is checked within and traced, whether it is allowed (booleans).
 
     A door puts NaN where one of them does not hold, so that this lane fails and no other does.
     Doors within doors gather for both.
     """
-    rules: list[ArrayLike] = []
-    outer, token = _RULES.get(), _RULES.set(rules)
-    try:
-        yield rules
-    finally:
-        _RULES.reset(token)
-        if outer is not None:
-            outer.extend(rules)
+    outer = _RULES.get()
+    with gathered(_RULES) as rules:
+        try:
+            yield rules
+        finally:
+            if outer is not None:
+                outer.extend(rules)
 
 
 def _note(holds: "Callable[[], ArrayLike]") -> None:

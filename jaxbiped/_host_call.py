@@ -4,19 +4,20 @@ A call back of `jax.pure_callback`'s kind lives in one process. A foreign call i
 a key, so that the compiled program around it can be kept and run by another process.
 """
 
-import contextlib
 import contextvars
 import ctypes
 import threading
 import uuid
 import weakref
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from ctypes import POINTER, Structure, c_char_p, c_int, c_int64, c_size_t, c_void_p
 from typing import Any, Protocol
 
 import jax
 import numpy as np
 
+from jaxbiped._checks import gathered
 from jaxbiped.caching._caches import Once
 from jaxbiped.caching._fingerprint import fingerprint
 
@@ -29,7 +30,7 @@ _DTYPES = {1: np.bool_, 4: np.int32, 5: np.int64, 11: np.float32, 12: np.float64
 _FUNCTIONS: "weakref.WeakValueDictionary[str, HostCall]" = weakref.WeakValueDictionary()
 _LOCK = threading.Lock()
 _REGISTERED = Once[object]()
-_LOWERED: contextvars.ContextVar[list[Any] | None] = contextvars.ContextVar(
+_LOWERED: "contextvars.ContextVar[list[HostCall] | None]" = contextvars.ContextVar(
     "calls in what is being lowered", default=None
 )
 
@@ -84,15 +85,9 @@ def lower_host_call(context: Any, call: HostCall, operands: Sequence[Any]) -> An
     return jax.ffi.ffi_lowering(TARGET)(context, *operands, **{_KEY: call.key})
 
 
-@contextlib.contextmanager
-def lowered_host_calls() -> Iterator[list[HostCall]]:
+def lowered_host_calls() -> AbstractContextManager[list[HostCall]]:
     """The calls in what is lowered within; who compiles that has to keep them."""
-    calls: list[HostCall] = []
-    token = _LOWERED.set(calls)
-    try:
-        yield calls
-    finally:
-        _LOWERED.reset(token)
+    return gathered(_LOWERED)
 
 
 def _run(frame: "_CallFrame") -> None:

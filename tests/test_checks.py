@@ -80,54 +80,40 @@ def test_simulate_arguments(options, words):
     _check_refusal(words, jb.simulate, jb.seed_scene(), jb.seed_state(), **options)
 
 
-def test_a_start_that_is_no_number_is_refused_by_name():
-    start = jb.seed_state()._replace(theta_1=jnp.asarray(float("nan")))
-    with pytest.raises(jb.ArgumentError, match=r"state\.theta_1 = nan"):
-        jb.simulate(jb.seed_scene(), start, duration=1.0)
-
-
-def test_a_start_of_mixed_shapes_is_refused():
-    start = jb.seed_state()._replace(theta_1=jnp.zeros(3))
-    with pytest.raises(jb.ArgumentError, match="shape"):
-        jb.simulate(jb.seed_scene(), start, duration=1.0)
-
-
 _TWO_STARTS = jax.tree.map(lambda leaf: jnp.stack([leaf, leaf]), jb.seed_state())
 _TWO_SCENES = jb.seed_scene(slope=jnp.array([0.01, 0.02]))
 
 
+def _walk(scene, state):
+    jb.simulate(scene, state, duration=1.0)
+
+
+def _roll(scene, state):
+    rigid = jb.RigidScene(jb.seed_scene().walker, scene.ground)
+    jb.rigid_walk(rigid, jb.dynamics.rigid_state(state), footsteps=1)
+
+
 @pytest.mark.parametrize(
-    ("run", "name"),
+    ("angle", "words"), [(float("nan"), r"state\.theta_1 = nan"), (jnp.zeros(3), "shape")]
+)
+def test_a_start_that_is_no_number_or_of_mixed_shapes_is_refused(angle, words):
+    with pytest.raises(jb.ArgumentError, match=words):
+        _walk(jb.seed_scene(), jb.seed_state()._replace(theta_1=jnp.asarray(angle)))
+
+
+@pytest.mark.parametrize(
+    ("run", "scene", "state", "name"),
     [
-        (lambda: jb.simulate(_TWO_SCENES, jb.seed_state(), duration=1.0), "scene.ground.slope"),
-        (lambda: jb.simulate(jb.seed_scene(), _TWO_STARTS, duration=1.0), "state.hip_x"),
-        (
-            lambda: jb.simulate(
-                jb.RedundantScene(jb.seed_scene(), "index1"), _TWO_STARTS, duration=1.0
-            ),
-            "state.hip_x",
-        ),
-        (
-            lambda: jb.rigid_walk(
-                jb.RigidScene(_TWO_SCENES.walker, _TWO_SCENES.ground),
-                jb.dynamics.rigid_state(jb.seed_state()),
-                footsteps=1,
-            ),
-            "scene.ground.slope",
-        ),
-        (
-            lambda: jb.rigid_walk(
-                jb.RigidScene(_TWO_SCENES.walker, jb.seed_scene().ground),
-                jb.dynamics.rigid_state(_TWO_STARTS),
-                footsteps=1,
-            ),
-            "state.hip_x",
-        ),
+        (_walk, _TWO_SCENES, jb.seed_state(), "scene.ground.slope"),
+        (_walk, jb.seed_scene(), _TWO_STARTS, "state.hip_x"),
+        (_walk, jb.RedundantScene(jb.seed_scene(), "index1"), _TWO_STARTS, "state.hip_x"),
+        (_roll, _TWO_SCENES, jb.seed_state(), "scene.ground.slope"),
+        (_roll, jb.seed_scene(), _TWO_STARTS, "state.hip_x"),
     ],
 )
-def test_batches_are_told_of_vmap(run, name):
+def test_batches_are_told_of_vmap(run, scene, state, name):
     with pytest.raises(jb.ArgumentError, match=r"jax\.vmap") as caught:
-        run()
+        run(scene, state)
     assert f"{name} has the shape (2,)" in str(caught.value)
 
 

@@ -17,10 +17,9 @@ import numpy as np
 from jaxbiped._debug_switches import without_switches
 from jaxbiped._jax_versions import nothing_is_traced
 from jaxbiped.caching import _caches
-from jaxbiped.caching._caches import Once, register_programs
+from jaxbiped.caching._caches import Once, name_of, register_cache
 from jaxbiped.caching._compiled_store import (
     ArrayFunction,
-    CompiledCall,
     KeptProgram,
     Skeleton,
     read_call,
@@ -48,8 +47,8 @@ class Arguments(NamedTuple):
     kind: Hashable
 
 
-class OtherForm(NamedTuple):
-    """How a function is run without XLA.
+class Form(NamedTuple):
+    """In which form a function is run.
 
     Attributes:
         where: whether it is, by its arguments.
@@ -58,6 +57,16 @@ class OtherForm(NamedTuple):
 
     where: Callable[..., bool]
     make: Callable[[ArrayFunction, Sequence[Any], str | None], KeptProgram | None]
+
+
+def _compiled(
+    function: ArrayFunction, arrays: Sequence[Any], key: str | None
+) -> KeptProgram | None:
+    """A program of XLA; None where it is not to be kept and so left to `equinox`."""
+    return None if key is None else read_call(key) or trace_call(function, arrays, key)[0]()
+
+
+_XLA = Form(lambda *_, **__: True, _compiled)
 
 
 class Begun(NamedTuple):
@@ -80,23 +89,20 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
     its libraries define. Another `form` goes before XLA's.
     """
 
-    def __init__(self, function: Callable[_P, _T], form: OtherForm | None = None) -> None:
+    def __init__(self, function: Callable[_P, _T], form: Form | None = None) -> None:
         functools.update_wrapper(self, function)
-        self._form = form
+        self._others = [] if form is None else [form]
         self._function: Callable[..., Any] = function
         self._jitted: Any = eqx.filter_jit(function)
         self._programs: dict[Hashable, Once[KeptProgram | None]] = {}
         self._lock = threading.Lock()
-        register_programs(function, self._count, self.clear)
+        register_cache(name_of(function), self._count, lambda: _caches.PROGRAMS, self.clear)
 
     @without_switches
     def __call__(self, *args: _P.args, **kwargs: _P.kwargs) -> _T:
         """Runs the function, compiled."""
         arguments = arguments_of((args, kwargs))
-        program = None
-        if arguments is not None:
-            program = self._in_other_form(arguments)
-            program = program or self._once(arguments.kind)(lambda: self._make(arguments))
+        program = None if arguments is None else self._program(arguments, *self._others, _XLA)
         found: _T
         if arguments is None or program is None:
             self._make_room()
@@ -110,9 +116,9 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
         """Traces the function, where no process did."""
         arguments = arguments_of((args, kwargs))
         key = None if arguments is None else self._key_of(arguments)
-        program = None if arguments is None else self._in_other_form(arguments)
+        program = None if arguments is None else self._program(arguments, *self._others)
         if program is None and arguments is not None and key is not None:
-            once = self._once(arguments.kind)
+            once = self._once((_XLA, arguments.kind))
             kept = None if once.done else read_call(key)
             if once.done or kept is not None:
                 program = once(lambda: kept)
@@ -144,23 +150,19 @@ class cached_jit(Generic[_P, _T]):  # noqa: N801
                 known = self._programs.setdefault(kind, Once())
         return known
 
-    def _in_other_form(self, arguments: Arguments) -> KeptProgram | None:
-        form = self._form
+    def _program(self, arguments: Arguments, *forms: Form) -> KeptProgram | None:
+        """The program for such arguments in the first of these forms that it has."""
         args, kwargs = arguments.given
-        if form is None or not form.where(*args, **kwargs):
-            return None
+        for form in forms:
+            if form.where(*args, **kwargs):
+                make = functools.partial(self._make, arguments, form)
+                program = self._once((form, arguments.kind))(make)
+                if program is not None:
+                    return program
+        return None
 
-        def make() -> KeptProgram | None:
-            return form.make(self._flat(arguments), arguments.arrays, self._key_of(arguments))
-
-        return self._once((form, arguments.kind))(make)
-
-    def _make(self, arguments: Arguments) -> CompiledCall | None:
-        """The program for such arguments; None where it is left to `equinox`."""
-        key = self._key_of(arguments)
-        if key is None:
-            return None
-        return read_call(key) or trace_call(self._flat(arguments), arguments.arrays, key)[0]()
+    def _make(self, arguments: Arguments, form: Form) -> KeptProgram | None:
+        return form.make(self._flat(arguments), arguments.arrays, self._key_of(arguments))
 
     def _flat(self, arguments: Arguments) -> ArrayFunction:
         """The function of the arrays among such arguments."""

@@ -9,7 +9,7 @@ import gc
 import threading
 import weakref
 from collections.abc import Callable, Hashable
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from jaxbiped._environment import CACHE_BYTES_VARIABLE, environment_number
 
@@ -42,8 +42,15 @@ class _Cache(NamedTuple):
 _CACHES: dict[str, _Cache] = {}
 
 
-def _register(name: str, info: Callable[[], CacheInfo], clear: Callable[[], object]) -> None:
-    _CACHES[name] = _Cache(info, clear)
+def register_cache(
+    name: str,
+    size: Callable[[], int],
+    bound: Callable[[], int],
+    clear: Callable[[], object],
+    unit: str = "entries",
+) -> None:
+    """Puts a cache that bounds itself under `clear_caches` and `cache_info`."""
+    _CACHES[name] = _Cache(lambda: CacheInfo(size(), bound(), unit), clear)
 
 
 def clear_caches() -> None:
@@ -66,22 +73,6 @@ def cache_info() -> dict[str, CacheInfo]:
         A `CacheInfo` of size, bound and unit for each cache.
     """
     return {name: cache.info() for name, cache in sorted(_CACHES.items())}
-
-
-class Store(Protocol):
-    """What keeps bytes."""
-
-    @property
-    def kept(self) -> int:
-        """How many."""
-
-    def clear(self) -> None:
-        """Keeps none."""
-
-
-def register_bytes(name: str, store: Store) -> None:
-    """Puts one that keeps at most `half_of_cache_bytes` under `clear_caches`."""
-    _register(name, lambda: CacheInfo(store.kept, half_of_cache_bytes(), "bytes"), store.clear)
 
 
 def half_of_cache_bytes() -> int:
@@ -160,21 +151,15 @@ def bounded_cache(bound: int) -> Callable[[Callable[..., _T]], Callable[..., _T]
                 result = result_of(*args)
             return result(lambda: make(args))
 
-        def info() -> CacheInfo:
-            return CacheInfo(result_of.cache_info().currsize, bound, "entries")
+        def size() -> int:
+            return result_of.cache_info().currsize
 
-        _register(_name_of(function), info, result_of.cache_clear)
+        register_cache(name_of(function), size, lambda: bound, result_of.cache_clear)
         return cached
 
     return decorate
 
 
-def register_programs(
-    function: Callable[..., object], count: Callable[[], int], clear: Callable[[], object]
-) -> None:
-    """Puts a function's compiled programs, `PROGRAMS` at most, under `clear_caches`."""
-    _register(_name_of(function), lambda: CacheInfo(count(), PROGRAMS, "entries"), clear)
-
-
-def _name_of(function: Callable[..., object]) -> str:
+def name_of(function: Callable[..., object]) -> str:
+    """By which the results of a function are listed."""
     return f"{function.__module__}.{function.__qualname__}"

@@ -8,7 +8,6 @@ and layout. So a change in another layer, or of words, leaves every program wher
 import ast
 import hashlib
 import importlib.util
-import json
 import sys
 import threading
 import time
@@ -16,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from jaxbiped.caching._disk_cache import read_entry, write_entry
+from jaxbiped.caching._disk_cache import read_object, write_object
 
 _KIND = "sources"
 _SETTLED = 1_000_000_000
@@ -46,7 +45,8 @@ class SourceDigests:
         self._package, self._loaded = folder.name, loaded
         self._entry = hashlib.sha256(f"{folder.resolve()}\n{sys.version}".encode()).hexdigest()
         self._paths = {_module_of(path, folder): path for path in folder.rglob("*.py")}
-        self._known, self._digests = _read(self._entry), dict[str, str]()
+        self._known: dict[str, _Module] = read_object(_KIND, self._entry, dict) or {}
+        self._digests = dict[str, str]()
         self._current, self._unsaved = set[str](), False
         self._lock = threading.Lock()
 
@@ -121,14 +121,8 @@ class SourceDigests:
         if self._unsaved:
             before = time.time_ns() - _SETTLED
             found = {name: each for name, each in self._known.items() if each.stamp[2] < before}
-            write_entry(_KIND, self._entry, json.dumps(found).encode())
+            write_object(_KIND, self._entry, found)
             self._unsaved = False
-
-
-def _read(entry: str) -> dict[str, _Module]:
-    """What an earlier process knew."""
-    content = read_entry(_KIND, entry)
-    return {} if content is None else {n: _Module(*m) for n, m in json.loads(content).items()}
 
 
 def _module_of(path: Path, folder: Path) -> str:

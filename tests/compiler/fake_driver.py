@@ -5,7 +5,7 @@ is its own, at which the warp's threads wait for each other. All else of the ker
 memory and atomic addition among it, is the same.
 """
 
-# ruff: noqa: N802 (names are the driver's)
+# ruff: noqa: N802, N815 (names are the driver's)
 
 import ctypes
 import functools
@@ -102,8 +102,10 @@ class FakeDriver:
             if name.startswith("cu"):
                 setattr(self, name, _Function(getattr(self, name)))
 
-    def cuInit(self, flags):
+    def cuInit(self, _):
         return 0
+
+    cuCtxSetCurrent = cuInit
 
     def cuDeviceGetCount(self, count):
         return _give(count, self.devices)
@@ -120,9 +122,6 @@ class FakeDriver:
 
     def cuDevicePrimaryCtxRetain(self, context, device):
         return _give(context, device + 1)
-
-    def cuCtxSetCurrent(self, context):
-        return 0
 
     def cuModuleLoadData(self, module, image):
         handle = next(self._handles)
@@ -148,18 +147,17 @@ class FakeDriver:
         del self.memory[address]
         return 0
 
-    def cuMemcpyHtoD_v2(self, target, source, size):
+    def cuMemcpyHtoD_v2(self, target, source, size, stream=None):
         assert self.memory[target].nbytes == size
         ctypes.memmove(target, source, size)
         return 0
+
+    cuMemcpyHtoDAsync_v2 = cuMemcpyHtoD_v2
 
     def cuMemcpyDtoH_v2(self, target, source, size):
         assert self.memory[source].nbytes == size
         ctypes.memmove(target, source, size)
         return 0
-
-    def cuMemcpyHtoDAsync_v2(self, target, source, size, stream):
-        return self.cuMemcpyHtoD_v2(target, source, size)
 
     def cuStreamCreate(self, stream, flags):
         return _give(stream, next(self._handles))

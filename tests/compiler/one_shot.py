@@ -1,10 +1,14 @@
 """Functions run once by lanes, to look at what the emitter makes of them."""
 
+import ctypes
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
+from jaxbiped.compiler.runtime._host_cpu import host
+from jaxbiped.compiler.runtime._machine_code import machine_code
 from jaxbiped.compiler.runtime._program import Program
 
 NUMBER = jax.ShapeDtypeStruct((), jnp.float64)
@@ -36,3 +40,10 @@ def evaluate(function, *columns, **options):
     columns = [np.asarray(column, dtype=float) for column in columns]
     program = compiled(function, *[column.shape[1:] for column in columns])
     return program.run(columns, **options).outputs
+
+
+def loaded(text, entry, count):
+    """A function of so many numbers in a module of LLVM's, on this machine."""
+    code = machine_code(text, entry, host(), as_written=False)
+    function = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * count)(code.address)
+    return lambda *numbers, _keep=code: function(*numbers)

@@ -10,27 +10,10 @@ from jaxbiped.compiler.ir._array_primitives import padded as padded
 from jaxbiped.compiler.ir._powers import whole_power
 
 
-def spread(value: Any, shape: tuple[int, ...]) -> np.ndarray:
-    """An array of this shape with a value that NumPy spreads over it."""
-    whole = np.empty(shape, np.result_type(value))
-    whole[...] = value
-    return whole
-
-
-def stacked(arrays: Sequence[Any], axis: int) -> np.ndarray:
-    """Arrays of one shape along a new axis."""
-    return np.moveaxis(np.array(arrays), 0, axis)
-
-
 def divide_whole(a: Any, b: Any) -> Any:
     """Quotient of whole numbers, rounded towards zero; −1 by zero."""
     quotient = np.abs(a) // np.where(b == 0, 1, np.abs(b))
     return np.where(b == 0, -1, np.sign(a) * np.sign(b) * quotient).astype(np.result_type(a))[()]
-
-
-def remainder(a: Any, b: Any) -> Any:
-    """Remainder with the sign of `a`."""
-    return np.fmod(a, b)
 
 
 def power_of(a: Any, exponent: int) -> Any:

@@ -11,7 +11,7 @@ from typing import Any, ParamSpec, Protocol, TypeAlias, TypeVar, runtime_checkab
 import jax
 import numpy as np
 
-from jaxbiped.caching._cached_jit import OtherForm, cached_jit
+from jaxbiped.caching._cached_jit import Form, cached_jit
 from jaxbiped.caching._collector_pause import long_trace
 from jaxbiped.caching._compiled_store import ArrayFunction, Skeleton, flattened
 from jaxbiped.caching._disk_cache import read_object, write_object
@@ -136,7 +136,7 @@ def host_jit(
             return kept or write_host_program(function, arrays, key, convert)
         return None
 
-    return lambda function: cached_jit(function, OtherForm(where, make))
+    return lambda function: cached_jit(function, Form(where, make))
 
 
 @cached_jit

@@ -18,8 +18,8 @@ from jaxbiped.compiler.host_code import _arrays
 
 _OF_NUMPY = (
     "abs add arccos arcsin arctan arctan2 array ceil complex128 concatenate conj cos cosh exp "
-    "expm1 float32 float64 floor int32 int64 isfinite log log1p log2 logical_and logical_or "
-    "maximum minimum multiply nextafter rint sign sin sinh sqrt tan tanh where"
+    "expm1 float32 float64 floor fmod full int32 int64 isfinite log log1p log2 logical_and "
+    "logical_or maximum minimum multiply nextafter rint sign sin sinh sqrt stack tan tanh where"
 )
 NAMES: dict[str, Any] = {name: getattr(np, name) for name in _OF_NUMPY.split()} | {
     name: each for name, each in vars(_arrays).items() if isinstance(each, FunctionType)
@@ -211,7 +211,7 @@ class HostWriter:
         """The same, held in its whole shape."""
         if value.held == value.shape:
             return value
-        form = f"spread({{0}}, {value.shape!r})"
+        form = f"full({value.shape!r}, {{0}})"
         return self.emit(form, [value], value.shape, value.dtype)
 
     def inline(

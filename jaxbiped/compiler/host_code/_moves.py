@@ -160,7 +160,7 @@ def _split(w: HostWriter, op: Operation) -> list[Any]:
 
 def _stack(w: HostWriter, op: Operation) -> list[Value]:
     axis, names = op.params["axis"], listed(len(op.inputs))
-    return w.emit_whole(f"stacked(({names},), {axis})" if axis else f"array(({names},))", op)
+    return w.emit_whole(f"stack(({names},), {axis})" if axis else f"array(({names},))", op)
 
 
 def _concatenate(w: HostWriter, op: Operation) -> list[Value]:

@@ -171,7 +171,7 @@ OPERATIONS: dict[str, Rule] = (
     | {name: _reduce_rule(how) for name, how in _REDUCTIONS.items()}
     | {
         "div": _divide,
-        "rem": _entrywise_rule("remainder({0}, {1})"),
+        "rem": _entrywise_rule("fmod({0}, {1})"),
         "convert_element_type": _convert,
         "round": _round,
         "integer_pow": _whole_power,

@@ -180,7 +180,7 @@ class CompiledProgram:
             count=count, record_room=room, schedule_length=len(times), stream_stride=streams.stride
         )
         if count:
-            launch = Launch(arrays, numbers, streams)
+            launch = Launch(arrays, numbers, streams.rows)
             job = self.processor.job(self.kernel, launch, chosen, many)
             run_in_threads(job.run, job.workers, stop, quick=quick)
             job.finish()

@@ -5,7 +5,7 @@ import ctypes
 import threading
 import time
 import weakref
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from jaxbiped.compiler.codegen._llvm_lane_loop import ENTRY
 from jaxbiped.compiler.codegen._ptx_kernel import THREADS, Architecture, architecture_of
 from jaxbiped.compiler.runtime._cuda_driver import CudaDriver, CudaError, load_library
 from jaxbiped.compiler.runtime._kernel import Kernel
+from jaxbiped.compiler.runtime._processor import Launch
 
 _MULTIPROCESSORS, _MAJOR, _MINOR = 16, 75, 76
 _NON_BLOCKING, _OUT_OF_MEMORY = 1, 2
@@ -24,21 +25,6 @@ _POLL = 2e-4
 """How long to wait before looking whether a kernel is over [s]."""
 WRITTEN = ("outputs", "records", "record_counts")
 """Arrays that a kernel writes for the host."""
-
-
-class DevicePart(NamedTuple):
-    """A part of a batch, for one launch.
-
-    Attributes:
-        arrays: on the host, contiguous, by the names of `FIELDS`; those of `WRITTEN` are
-            overwritten. `streams` are places in `rows`, in bytes.
-        rows: of all streams.
-        numbers: the whole numbers among `FIELDS`.
-    """
-
-    arrays: Mapping[str, np.ndarray]
-    rows: np.ndarray
-    numbers: Mapping[str, int]
 
 
 class LoadedKernel(NamedTuple):
@@ -89,8 +75,11 @@ class CudaDevice:
         blocks = driver.number("cuOccupancyMaxActiveBlocksPerMultiprocessor", function, THREADS, 0)
         return LoadedKernel(function, blocks)
 
-    def run(self, kernel: LoadedKernel, part: DevicePart, stop: np.ndarray) -> None:
+    def run(self, kernel: LoadedKernel, part: Launch, stop: np.ndarray) -> None:
         """Launches a kernel over a part and waits for its end; `stop` not zero ends it early.
+
+        The part's arrays are contiguous; those of `WRITTEN` are overwritten. Its streams are places
+        in its only array of rows, in bytes.
 
         Raises:
             ResourceError: the device has not enough memory, or fails.
@@ -105,22 +94,21 @@ class CudaDevice:
             )
             raise ResourceError(f"the device {self.name} failed: {error}; {mend}.") from None
 
-    def _run(self, kernel: LoadedKernel, part: DevicePart, stop: np.ndarray) -> None:
+    def _run(self, kernel: LoadedKernel, part: Launch, stop: np.ndarray) -> None:
         driver = self._driver
         driver.call("cuCtxSetCurrent", self._context)
         with contextlib.ExitStack() as stack:
+            (rows,) = part.rows
+            streams = part.arrays["streams"] + stack.enter_context(self._copied(rows))
             address = {
                 name: stack.enter_context(self._copied(array))
-                for name, array in {**part.arrays, "rows": part.rows}.items()
-                if name != "streams"
+                for name, array in {**part.arrays, "streams": streams}.items()
             }
-            streams = part.arrays["streams"] + address["rows"]
-            address["streams"] = stack.enter_context(self._copied(streams))
             fields = np.array(
                 [{**address, **part.numbers}[name] for name in FIELDS], dtype=np.int64
             )
             at = ctypes.c_uint64(stack.enter_context(self._copied(fields)))
-            blocks = -(-part.numbers["count"] // THREADS)
+            blocks = -(-part.simulations // THREADS)
             blocks = min(blocks, max(kernel.blocks, 1) * self.multiprocessors)
             self._launch(kernel, blocks, at, stop, address["stop"])
             for name in WRITTEN:

@@ -10,7 +10,7 @@ import threading
 import numpy as np
 
 from jaxbiped.compiler.codegen._ptx_kernel import THREADS
-from jaxbiped.compiler.runtime._cuda_device import DevicePart, devices
+from jaxbiped.compiler.runtime._cuda_device import devices
 from jaxbiped.compiler.runtime._kernel import Kernel
 from jaxbiped.compiler.runtime._processor import AbstractProcessor, Job, Launch
 
@@ -85,18 +85,17 @@ class DeviceProcessor(AbstractProcessor):
 def _parts(launch: Launch, count: int) -> list[slice]:
     """A batch cut for `count` devices, and so that each part has room on one."""
     size = sum(array.nbytes for name, array in launch.arrays.items() if name != "schedule")
-    size += sum(each.nbytes for each in launch.streams.rows)
+    size += sum(each.nbytes for each in launch.rows)
     wanted = max(-(-size // _MOST_BYTES), min(count, -(-launch.simulations // THREADS)))
     bounds = np.linspace(0, launch.simulations, wanted + 1).astype(int)
     return [slice(a, b) for a, b in itertools.pairwise(map(int, bounds)) if b > a]
 
 
-def _part(launch: Launch, place: slice) -> DevicePart:
-    arrays, streams = launch.arrays, launch.streams
-    rows = streams.rows[place] if streams.rows else []
+def _part(launch: Launch, place: slice) -> Launch:
+    arrays, rows = launch.arrays, launch.rows[place]
     before = np.cumsum([0, *(each.nbytes for each in rows)])[: len(rows)]
     own = np.array([each.ctypes.data for each in rows], dtype=np.int64)
-    starts = streams.starts[place] - own + before if rows else np.zeros(0, dtype=np.int64)
+    starts = arrays["streams"][place] - own + before if rows else np.zeros(0, dtype=np.int64)
     taken = dict(
         queue=np.zeros(1, dtype=np.int64),
         stop=np.zeros(1, dtype=np.int64),
@@ -106,12 +105,12 @@ def _part(launch: Launch, place: slice) -> DevicePart:
         record_counts=arrays["record_counts"][place],
         schedule=arrays["schedule"],
         streams=starts,
-        stream_lengths=streams.lengths[place],
+        stream_lengths=arrays["stream_lengths"][place],
     )
     every = np.concatenate([each.ravel() for each in rows]) if rows else np.zeros(0)
-    return DevicePart(taken, every, {**launch.numbers, "count": place.stop - place.start})
+    return Launch(taken, {**launch.numbers, "count": place.stop - place.start}, [every])
 
 
-def _give(launch: Launch, place: slice, part: DevicePart) -> None:
+def _give(launch: Launch, place: slice, part: Launch) -> None:
     """Puts what a part gave where it belongs; its records are there already."""
     launch.arrays["outputs"][:, place] = part.arrays["outputs"]

@@ -7,16 +7,19 @@ from typing import NamedTuple, Optional
 import numpy as np
 
 from jaxbiped._types import Numbers
-from jaxbiped.caching._caches import half_of_cache_bytes, register_bytes
+from jaxbiped.caching._caches import half_of_cache_bytes, register_cache
 from jaxbiped.compiler.runtime._compiled_program import CompiledProgram
 from jaxbiped.compiler.runtime._host_cpu import default_threads
 from jaxbiped.compiler.runtime._program import Recorded
 from jaxbiped.compiler.runtime._record_cache import BLOCK, BufferPool, RecordCache, Tables
 
-_RECORDS = RecordCache(most=half_of_cache_bytes)
-_BUFFERS = BufferPool(most=half_of_cache_bytes)
-register_bytes("records of simulations", _RECORDS)
-register_bytes("buffers for records", _BUFFERS)
+_RECORDS, _BUFFERS = RecordCache(half_of_cache_bytes), BufferPool(half_of_cache_bytes)
+register_cache(
+    "records of simulations", lambda: _RECORDS.kept, half_of_cache_bytes, _RECORDS.clear, "bytes"
+)
+register_cache(
+    "buffers for records", lambda: _BUFFERS.kept, half_of_cache_bytes, _BUFFERS.clear, "bytes"
+)
 
 
 class Part(enum.Enum):
@@ -45,7 +48,7 @@ class LaneRun(NamedTuple):
         quick: whether a single simulation is over before a user could interrupt.
         once: whether records that are kept on the host are read only once.
         reads: how those were run whose records are its stream, if it reads such.
-        schedule: of its records, where it has one; its length is then their `room`.
+        schedule: of its records, one at each time, where it has such.
     """
 
     compiled: CompiledProgram
@@ -115,12 +118,11 @@ class LaneRun(NamedTuple):
         width: int,
         memory: Callable[[tuple[int, ...]], np.ndarray] = np.zeros,
     ) -> tuple[np.ndarray, Recorded | None]:
-        times = None if self.schedule is None else self.schedule.times
         return self.compiled.run_table(
             own,
-            schedule=times,
+            schedule=None if self.schedule is None else self.schedule.times,
             stream=rows,
-            room=room if times is None else len(times),
+            room=room,
             memory=memory,
             quick=self.quick and own.shape[1] == 1,
             width=width,
@@ -142,11 +144,13 @@ class LaneCall(NamedTuple):
     how: LaneRun
     wants: Part
 
-    def __call__(self, numbers: Numbers, *rest: Numbers) -> list[np.ndarray]:
-        given = [np.asarray(each) for each in (numbers, *rest)]
+    def __call__(self, *given: Numbers) -> list[np.ndarray]:
+        numbers, *rest = map(np.asarray, given)
         if self.wants is Part.OUTPUTS:
-            return self.how.outputs(*given)
-        return (self.how.everything if self.wants is Part.ALL else self.how.columns)(*given)
+            return self.how.outputs(numbers)
+        if self.wants is Part.COLUMNS:
+            return self.how.columns(numbers, *rest)
+        return self.how.everything(numbers, *rest)
 
     def __fingerprint__(self) -> object:
         return tuple(self)

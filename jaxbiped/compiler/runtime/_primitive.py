@@ -1,9 +1,9 @@
 """Compiled programs as a primitive of JAX: they run under `jit` and `vmap`."""
 
-import contextlib
 import contextvars
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from typing import Any, NoReturn
 
 import equinox as eqx
@@ -15,7 +15,7 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 from jaxtyping import Array, PyTree
 
-from jaxbiped._checks import ArgumentError
+from jaxbiped._checks import ArgumentError, gathered
 from jaxbiped._host_call import host_call, lower_host_call
 from jaxbiped._types import Numbers, as_array
 from jaxbiped.compiler.host_code._host_jit import register_rule
@@ -29,18 +29,12 @@ _UNTRACED: contextvars.ContextVar[list[CompiledProgram] | None] = contextvars.Co
 )
 
 
-@contextlib.contextmanager
-def deferred_checks() -> Iterator[list[CompiledProgram]]:
+def deferred_checks() -> AbstractContextManager[list[CompiledProgram]]:
     """Within, nothing that is lowered waits until its programs are traced.
 
     They are listed: whoever goes on to run them first has to `check` each.
     """
-    programs: list[CompiledProgram] = []
-    token = _UNTRACED.set(programs)
-    try:
-        yield programs
-    finally:
-        _UNTRACED.reset(token)
+    return gathered(_UNTRACED)
 
 
 class Recording(eqx.Module):
@@ -92,6 +86,7 @@ def call(
     if isinstance(stream, Recording):
         reads, rows, inputs = stream.how, [], (inputs, stream.numbers)
     numbers = _numbers(inputs)
+    room = room if schedule is None else len(schedule.times)
     how = LaneRun(compiled, room, quick, reads_once, reads, schedule)
     if keeps_records:
         (table,) = _bind([numbers], how, Part.OUTPUTS)
@@ -153,8 +148,7 @@ def _abstract_evaluation(
     size = sum(int(np.prod(leaf.shape)) for leaf in jtu.tree_leaves(outline.outputs))
     found = [jax.core.ShapedArray((count, size), jnp.float64)]
     if outline.recorded is not None and wants is Part.ALL:
-        room = how.room if how.schedule is None else len(how.schedule.times)
-        found.append(jax.core.ShapedArray((count, room, outline.recorded), jnp.float64))
+        found.append(jax.core.ShapedArray((count, how.room, outline.recorded), jnp.float64))
         found.append(jax.core.ShapedArray((count,), jnp.int64))
     return found
 

@@ -66,12 +66,12 @@ class Launch(NamedTuple):
     Attributes:
         arrays: on the host; `outputs`, `records` and `record_counts` are written.
         numbers: whole numbers; `count` is that of the simulations.
-        streams: that they read.
+        rows: of the streams that they read: what must stay in memory.
     """
 
     arrays: Mapping[str, np.ndarray]
     numbers: Mapping[str, int]
-    streams: InputStreams
+    rows: list[np.ndarray]
 
     @property
     def simulations(self) -> int:

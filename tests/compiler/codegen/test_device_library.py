@@ -10,8 +10,7 @@ import pytest
 
 from jaxbiped.compiler.codegen._kernel_target import OWN_LIBRARY
 from jaxbiped.compiler.codegen._ptx_kernel import library_text
-from jaxbiped.compiler.runtime._host_cpu import host
-from jaxbiped.compiler.runtime._machine_code import machine_code
+from tests.compiler.one_shot import loaded
 
 SPECIAL = [0.0, -0.0, 5e-324, 1e-310, 1.0, -1.0, 2.0, -3.0, 0.5, -2.5, 1e300]
 SPECIAL += [math.inf, -math.inf, math.nan]
@@ -27,9 +26,7 @@ define double @entry({given}) {{
   ret double %found
 }}
 """
-    code = machine_code(text, "entry", host(), as_written=False)
-    entry = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * count)(code.address)
-    return lambda *args, _keep=code: entry(*args)
+    return loaded(text, "entry", count)
 
 
 def _ulps(found, true):

@@ -1,15 +1,13 @@
 """Fused multiply-add in software against exact arithmetic."""
 
-import ctypes
 import math
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from jaxbiped.compiler import host
-from jaxbiped.compiler.runtime._machine_code import machine_code
 from jaxbiped.compiler.runtime._web_assembly import with_software_fma
+from tests.compiler.one_shot import loaded
 
 _MODULE = """\
 declare double @llvm.fma.f64(double, double, double)
@@ -22,9 +20,7 @@ define double @fused(double %a, double %b, double %c) {
 
 @pytest.fixture(scope="module")
 def fused():
-    code = machine_code(with_software_fma(_MODULE), "fused", host(), as_written=False)
-    call = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_double] * 3)(code.address)
-    return lambda *numbers, keep=code: call(*numbers)
+    return loaded(with_software_fma(_MODULE), "fused", 3)
 
 
 def exact(a, b, c):
