@@ -12,6 +12,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_provenance import explain_search
+from jaxbiped.optimise._cycle_functionals import Functional, weighted_sum
 from jaxbiped.optimise._design_gaits import GaitSettings, are_walks
 from jaxbiped.optimise._design_variables import Requirement, Variables
 from jaxbiped.optimise._ensemble import Ensemble, evaluate_ensemble, with_worse_members
@@ -144,12 +145,12 @@ class DesignProblem:
         self.asked.append(self.latest)
         return self.latest
 
-    def objective(self, known: Evaluation) -> tuple[float, np.ndarray, float]:
-        """The sum that is minimised, its gradient in parameters (p,), its error."""
-        value = sum(w * known.values[name] for name, w in self.weights.items())
-        slopes = sum(w * known.slopes[name] for name, w in self.weights.items())
-        error = sum(abs(w) * known.errors[name] for name, w in self.weights.items())
-        return float(value), np.asarray(slopes), float(error)
+    def objective(self, known: Evaluation, weights: dict[str, float] | None = None) -> Functional:
+        """The sum that is minimised, or that of other weights."""
+        weights = self.weights if weights is None else weights
+        return weighted_sum(
+            weights.values(), map(known.functional, weights), known.state_slopes.shape[1]
+        )
 
     def gradient(self, u: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """Derivatives with respect to u from those with respect to all parameters."""

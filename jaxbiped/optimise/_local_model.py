@@ -90,13 +90,12 @@ def local_of(
     weights, weight = smooth_weights(problem)
     of_cluster = [row for row in rows if isinstance(row, ClusterRow)]
     others = [r for r in rows if not isinstance(r, ClusterRow) and r.name != "next_modulus"]
-    every = len(next(iter(known.slopes.values())))
-    total = sum((w * known.slopes[name] for name, w in weights.items()), np.zeros(every))
-    slopes = np.reshape([row.slopes(known) for row in others], (len(others), every))
+    total = problem.objective(known, weights)
+    slopes = np.reshape([row.slopes(known) for row in others], (len(others), len(total.slopes)))
     here = Local(
         u=np.array(u),
-        objective=float(sum(w * known.values[name] for name, w in weights.items()) / scale),
-        gradient=problem.gradient(u, total) / scale,
+        objective=total.value / scale,
+        gradient=problem.gradient(u, total.slopes) / scale,
         spare=np.asarray([row.value(known) for row in others]),
         spare_gradients=problem.gradient(u, slopes),
         equal=np.asarray([row.equality for row in others], dtype=bool),

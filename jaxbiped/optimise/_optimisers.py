@@ -112,13 +112,14 @@ class Functions:
     def __init__(self, problem: DesignProblem) -> None:
         self.problem, self.rows = problem, rows_of(problem)
         assert problem.latest is not None
-        self.scale = scale_of(problem.objective(problem.latest.known)[0])
+        self.scale = scale_of(problem.objective(problem.latest.known).value)
 
     def objective(self, u: np.ndarray) -> tuple[float, np.ndarray]:
         """The scaled objective and its gradient."""
         known, raised = self._known(u)
-        value, slopes, _ = self.problem.objective(known)
-        return value / self.scale + raised, self.problem.gradient(u, slopes) / self.scale
+        found = self.problem.objective(known)
+        gradient = self.problem.gradient(u, found.slopes)
+        return found.value / self.scale + raised, gradient / self.scale
 
     def spare(self, u: np.ndarray, rows: tuple[AnyRow, ...]) -> np.ndarray:
         """Values of the requirements."""

@@ -131,7 +131,7 @@ class Runs:
         known = self.problem.evaluations.get(u)
         if known is None:
             return
-        value = self.problem.sense * self.problem.objective(known)[0]
+        value = self.problem.sense * self.problem.objective(known).value
         excess = self.problem.excess(known)
         measures = {name: known.values[name] for name in self.problem.wanted}
         named, beyond = self.problem.variables.named(u), known.beyond_range
@@ -141,7 +141,7 @@ class Runs:
     def _rank(self, design: Design) -> tuple[float, float]:
         """Designs nearer to the requirements come first, and of those that keep them the better."""
         excess = self.problem.excess(design.known)
-        return 0.0 if excess <= KEPT else excess, self.problem.objective(design.known)[0]
+        return 0.0 if excess <= KEPT else excess, self.problem.objective(design.known).value
 
 
 class Optimum(NamedTuple):
@@ -204,16 +204,15 @@ def _message(problem: DesignProblem, best: Design, ended: Ended) -> str:
 def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     """The best of the designs that runs came to."""
     best = runs.best
-    assert best is not None
-    value, _, error = problem.objective(best.known)
+    found = problem.objective(best.known)
     return Optimum(
         outcome=runs.outcome(),
         message=_message(problem, best, runs.ended),
         scene=problem.scene_at(best.u),
         gait=problem.gait_of(best),
         variables=problem.variables.named(best.u),
-        objective=problem.sense * value,
-        error=error,
+        objective=problem.sense * found.value,
+        error=found.error,
         known=best.known,
         optimality=optimality_of(problem, best),
         history=runs.history,

@@ -66,7 +66,7 @@ class _Search:
         known = problem.latest.known
         self.problem, self.told, self.left = problem, told, iterations
         self.rows = rows_of(problem)
-        self.scale = max(abs(problem.objective(known)[0]), 1e-300)
+        self.scale = max(abs(problem.objective(known).value), 1e-300)
         self.design = Design(np.array(u), known)
         self.here = local_of(problem, self.rows, self.scale, self.design)
         self.cuts: list[Local] = []

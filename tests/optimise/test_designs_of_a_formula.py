@@ -14,7 +14,7 @@ from jaxbiped.dynamics._actuation import actuator_powers, hip_torques
 from jaxbiped.dynamics._impact import push_off_work
 from jaxbiped.dynamics._rolling import rolling_hip_motion
 from jaxbiped.optimise import _certificate, _ensemble
-from jaxbiped.optimise._cycle_functionals import _totals, with_errors
+from jaxbiped.optimise._cycle_functionals import Functional, _totals, with_errors
 from jaxbiped.optimise._cycle_integrals import integrals_of
 from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._ensemble import (
@@ -26,7 +26,7 @@ from jaxbiped.optimise._ensemble import (
 )
 from jaxbiped.optimise._jacobian_weights import leading_multipliers, weighed
 from jaxbiped.optimise._local_model import Local
-from jaxbiped.optimise._objectives import Evaluation, _cost_of_transport, _root_of_squares, _Row
+from jaxbiped.optimise._objectives import Evaluation, _cost_of_transport, _root_of_squares
 from jaxbiped.optimise._optimality import optimality_of
 from jaxbiped.optimise._runs import Outcome
 from jaxbiped.optimise._trust_region import _updated
@@ -104,7 +104,7 @@ def test_requirements_that_are_missed_are_told_in_units_of_their_bounds():
     assert made.excess(known) == pytest.approx(max(over, under))
     assert over > 0.0 < under
     assert made.allowance(known) == pytest.approx(0.01 * known.values["step_length"])
-    value, slopes, error = made.objective(known)
+    value, error, slopes, _ = made.objective(known)
     assert (value, error) == (-known.values["speed"], known.errors["speed"])
     np.testing.assert_array_equal(slopes, -known.slopes["speed"])
 
@@ -150,7 +150,7 @@ def test_the_cost_of_transport_moves_with_all_that_it_is_made_of(driven):
         for name in base:
             moved = lambda h, name=name: function(base | {name: base[name] + h})
             slopes[names.index(name)] = difference(moved)
-        return _Row(function(base), error, slopes, 0.0 * slopes)
+        return Functional(function(base), error, slopes, 0.0 * slopes)
 
     works = "motor_work" if driven else "impact_loss"
     found = _cost_of_transport(
@@ -166,7 +166,10 @@ def test_the_cost_of_transport_moves_with_all_that_it_is_made_of(driven):
 
 def test_a_root_of_squares_has_the_slopes_of_one():
     none = np.zeros(len(NAMES))
-    rows = _Row(3.0, 0.3, slopes_of(d=1.0, m=2.0), none), _Row(4.0, 0.1, slopes_of(d=-1.0), none)
+    rows = (
+        Functional(3.0, 0.3, slopes_of(d=1.0, m=2.0), none),
+        Functional(4.0, 0.1, slopes_of(d=-1.0), none),
+    )
     found = _root_of_squares(rows)
     assert (found.value, found.error) == (5.0, pytest.approx(0.6 * 0.3 + 0.8 * 0.1))
     assert found.slopes[NAMES.index("d")] == pytest.approx(0.6 - 0.8)
