@@ -199,7 +199,7 @@ class DesignProblem:
 
     def scene_at(self, u: np.ndarray) -> Scene | RigidScene:
         """The scene of a design; raises `ArgumentError` where parameters do not go together."""
-        return with_parameters(self.scene, self.variables.named(u))
+        return with_parameters(self.scene, self.variables.by_name(u))
 
     def _keep(self, u: np.ndarray, scene: Scene | RigidScene, gait: Gait) -> Evaluation | None:
         if self.ensemble is None:

@@ -190,8 +190,8 @@ def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
         residual=float(np.max(np.abs(found.left))),
         error=float(np.max(gradient_error)),
         excess=problem.excess(known),
-        requirements=tuple(_held(problem, row, known, held.get(row[:3])) for row in rows),
-        bounds=tuple(_held_bound(problem, u, scale, *each) for each in at_bounds),
+        requirements=tuple(_held_measure(problem, row, known, held.get(row[:3])) for row in rows),
+        bounds=tuple(_held_variable(problem, u, scale, *each) for each in at_bounds),
     )
 
 
@@ -209,7 +209,7 @@ def _at_bounds(u: np.ndarray) -> list[tuple[int, float]]:
     return lower + [(int(k), -1.0) for k in np.flatnonzero(u >= 1.0 - _AT_BOUND)]
 
 
-def _held(
+def _held_measure(
     problem: DesignProblem, row: AnyRow, known: Evaluation, found: tuple[float, float] | None
 ) -> Held:
     """Multipliers in the units of objective and measure: of moving the bound upwards."""
@@ -225,7 +225,7 @@ def _held(
     )
 
 
-def _held_bound(
+def _held_variable(
     problem: DesignProblem,
     u: np.ndarray,
     scale: float,

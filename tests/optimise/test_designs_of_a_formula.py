@@ -25,12 +25,12 @@ from jaxbiped.optimise._ensemble import (
     ensemble_of,
     with_worse_members,
 )
-from jaxbiped.optimise._jacobian_weights import leading_multipliers, weighed
+from jaxbiped.optimise._jacobian_weights import entry_weights, leading_multipliers
 from jaxbiped.optimise._local_model import Local
 from jaxbiped.optimise._objectives import Evaluation, _cost_of_transport, _root_of_squares
 from jaxbiped.optimise._optimality import optimality_of
 from jaxbiped.optimise._runs import Outcome
-from jaxbiped.optimise._trust_region import _updated
+from jaxbiped.optimise._trust_region import _damped_update
 from tests.optimise.drawn_designs import (
     BOTH,
     NAMES,
@@ -49,7 +49,7 @@ MU = 0.015 / 0.005625
 
 
 def logarithms(runs):
-    named = runs.problem.variables.named(runs.best.u)
+    named = runs.problem.variables.by_name(runs.best.u)
     return np.log([named["d"] / 0.1, named["slope"] / 0.02])
 
 
@@ -84,7 +84,7 @@ def test_a_variable_at_its_bound_is_held_by_it():
     assert (held.name, held.value) == ("d", pytest.approx(0.1))
     assert held.multiplier == pytest.approx(2.0 * 0.2 / 0.1, rel=1e-3)  # dv/dd
     free = solved(formula_problem({"d": (0.04, 0.18)}, *FASTEST))
-    assert np.log(free.problem.variables.named(free.best.u)["d"] / 0.1) == pytest.approx(
+    assert np.log(free.problem.variables.by_name(free.best.u)["d"] / 0.1) == pytest.approx(
         0.2, abs=1e-4
     )
     assert optimality_of(free.problem, free.best).bounds == ()
@@ -268,7 +268,7 @@ def test_functionals_of_a_jacobian_and_their_weights():
 
     @jax.jit
     def told(rows, length):
-        return [tuple(weighed(n, None, rows, length, leading)) for n in names]
+        return [tuple(entry_weights(n, None, rows, length, leading)) for n in names]
 
     def values(rows, length):
         return np.array([float(each[0]) for each in told(rows, length)])
@@ -384,10 +384,10 @@ def test_curvature_is_learnt_from_two_gradients():
     """The secant condition B s = y of a quadratic, and Powell's damping where it curves down."""
     hessian = np.array([[2.0, 0.5], [0.5, 1.0]])
     step = np.array([0.1, -0.3])
-    learnt = _updated(np.eye(2), step, hessian @ step)
+    learnt = _damped_update(np.eye(2), step, hessian @ step)
     np.testing.assert_allclose(learnt @ step, hessian @ step)
     assert np.linalg.eigvalsh(learnt).min() > 0.0
-    damped = _updated(np.eye(2), step, -hessian @ step)
+    damped = _damped_update(np.eye(2), step, -hessian @ step)
     assert step @ damped @ step == pytest.approx(0.2 * step @ step)
 
 
