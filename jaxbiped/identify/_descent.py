@@ -65,29 +65,29 @@ class Descent:
         """
         fit: GaitFit | None = None
         try:
-            fit = self.settled(np.zeros(len(self.names)), most)
+            fit = self.fit_from(np.zeros(len(self.names)), most)
             if fit.ending is FitEnding.NO_GAIT or fit.p_value < UNLIKELY:
                 for begin in self.others():
                     self.best = begin
-                    other = self.settled(begin[1], most)
+                    other = self.fit_from(begin[1], most)
                     fit = fit if fit.chi_squared <= other.chi_squared else other
                     if not fit.p_value < UNLIKELY:
                         break
         except KeyboardInterrupt:
-            now = self.described(FitEnding.INTERRUPTED)
+            now = self.summary(FitEnding.INTERRUPTED)
             if fit is None or now.chi_squared < fit.chi_squared:
                 fit = now
             fit = fit._replace(ending=FitEnding.INTERRUPTED)
         return fit._replace(evaluations=self.evaluations)
 
-    def settled(self, begin: np.ndarray, most: int) -> GaitFit:
+    def fit_from(self, begin: np.ndarray, most: int) -> GaitFit:
         """The fit from a start on; a better one that an interval comes upon is gone on from."""
         if self.predictions(begin) is None:
-            return self.described(FitEnding.NO_GAIT)
+            return self.summary(FitEnding.NO_GAIT)
         for _ in range(_FITS):
             ending = self.minimise(begin, most)
             best = self.best
-            fit = self.described(ending)
+            fit = self.summary(ending)
             if self.best is best or ending is not FitEnding.CONVERGED:
                 break
             assert self.best is not None
@@ -161,7 +161,7 @@ class Descent:
         self.bar.update()
         self.last = (at.copy(), found)
         if found is not None:
-            square = float(np.sum(self._weighted(found) ** 2))
+            square = float(np.sum(self._scaled_misfits(found) ** 2))
             if self.best is None or square < self.best[0]:
                 self.best = (square, at.copy(), found)
         return found
@@ -183,7 +183,7 @@ class Descent:
     def residuals(self, at: np.ndarray) -> np.ndarray:
         """In standard deviations; infinite where a gait is lost, which shortens the step."""
         found = self.predictions(at)
-        return np.full(len(self.values), np.inf) if found is None else self._weighted(found)
+        return np.full(len(self.values), np.inf) if found is None else self._scaled_misfits(found)
 
     def slopes(self, at: np.ndarray) -> np.ndarray:
         """Derivatives of the residuals."""
@@ -191,11 +191,11 @@ class Descent:
         assert found is not None  # no step ends without its gaits
         return np.concatenate([each.slopes for each in found]) / self.deviations[:, None]
 
-    def _weighted(self, found: list[Prediction]) -> np.ndarray:
+    def _scaled_misfits(self, found: list[Prediction]) -> np.ndarray:
         predicted = np.concatenate([each.values for each in found])
         return (predicted - self.values) / self.deviations
 
-    def described(self, ending: FitEnding) -> GaitFit:
+    def summary(self, ending: FitEnding) -> GaitFit:
         """The fit as far as it came."""
         k, names = len(self.names), np.array(self.names)
         at, found = np.zeros(k), None
@@ -209,9 +209,9 @@ class Descent:
                 np.concatenate([getattr(each, part) for each in found]) / self.deviations[:, None]
                 for part in ("slopes", "slope_errors")
             )
-            residuals = self._weighted(found)
+            residuals = self._scaled_misfits(found)
             told = information(slopes, errors)
-            held = self._held(at, residuals, slopes) & told.resolved
+            held = self._at_bounds(at, residuals, slopes) & told.resolved
             free = information(slopes[:, ~held], errors[:, ~held])
             undetermined[held], undetermined[~held] = False, free.undetermined
             covariance[np.ix_(~held, ~held)] = free.covariance
@@ -243,7 +243,7 @@ class Descent:
             evaluations=self.evaluations,
         )
 
-    def _held(self, at: np.ndarray, residuals: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    def _at_bounds(self, at: np.ndarray, residuals: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """Which parameters lie at a bound, within a thousandth of their error, and push there."""
         low, high = map(self.variables, self.limits)
         near = 1e-3 / np.maximum(np.linalg.norm(slopes, axis=0), 1.0)

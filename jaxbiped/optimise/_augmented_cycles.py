@@ -31,12 +31,12 @@ _APART = 1e-2
 PUSH, DROP = "push", "drop"
 
 
-def _augmented(walker: Any, names: tuple[str, ...]) -> Any:
+def _augmented_type(walker: Any, names: tuple[str, ...]) -> Any:
     if (walker, names) not in _KINDS:
         place, *recurring = walker._fields
         fields: Any = namedtuple("_Augmented", (place, *names, *recurring))  # type: ignore[misc]
         # By this other processes know it, see `jaxbiped.caching._fingerprint`.
-        made_by = (_augmented, walker, names)
+        made_by = (_augmented_type, walker, names)
         own: dict[str, Any] = {"__slots__": (), "__made_by__": made_by, "__reduce__": _taken_apart}
         # Whatever they are, their errors count in SI units.
         own["own_units"] = getattr(walker, "own_units", {}) | dict.fromkeys(names, "")
@@ -51,13 +51,13 @@ def _taken_apart(y: Any) -> tuple[Any, ...]:
 
 
 def _put_together(motion: Any, coordinates: dict[str, Any]) -> Any:
-    return _augmented(type(motion), tuple(coordinates))(**coordinates, **motion._asdict())
+    return _augmented_type(type(motion), tuple(coordinates))(**coordinates, **motion._asdict())
 
 
 def augment(state: WalkerState, names: tuple[str, ...]) -> PyTree:
     """A walker's state with coordinates of these names, which begin at zero."""
     zero = by_numpy(lambda numpy, hip_x: numpy.zeros_like(hip_x), state.hip_x)
-    return _augmented(type(state), names)(**dict.fromkeys(names, zero), **state._asdict())
+    return _augmented_type(type(state), names)(**dict.fromkeys(names, zero), **state._asdict())
 
 
 def motion_of(y: PyTree) -> Any:
@@ -66,12 +66,12 @@ def motion_of(y: PyTree) -> Any:
     return walker(*(getattr(y, name) for name in walker._fields))
 
 
-def joined(like: PyTree, motion: PyTree, coordinates: dict[str, Scalar]) -> PyTree:
+def join(like: PyTree, motion: PyTree, coordinates: dict[str, Scalar]) -> PyTree:
     """A walker's state or rates, and those of the further coordinates, as one."""
     return type(like)(**motion._asdict(), **coordinates)
 
 
-class AbstractAugmented(AbstractSystem):
+class AbstractAugmentedSystem(AbstractSystem):
     """A walker with further coordinates.
 
     Attributes:
@@ -92,7 +92,9 @@ class AbstractAugmented(AbstractSystem):
 
     def begin(self, state: WalkerState) -> PyTree:
         """A walker's state with coordinates that begin at zero."""
-        inner = self.walker.begin(state) if isinstance(self.walker, AbstractAugmented) else state
+        inner = (
+            self.walker.begin(state) if isinstance(self.walker, AbstractAugmentedSystem) else state
+        )
         return augment(inner, self.coordinates)
 
 
@@ -112,7 +114,7 @@ class MotionSection(AbstractSection):
         return self.section.counts(args, motion_of(y))
 
 
-class DisturbedCycle(AbstractAugmented):
+class DisturbedCycle(AbstractAugmentedSystem):
     """A walker that is pushed for one cycle, or whose leg 1 comes down on ground that lies lower.
 
     `push` is in units of the weight, which leans downhill by it; `drop` in leg lengths. Behind the
@@ -133,7 +135,7 @@ class DisturbedCycle(AbstractAugmented):
     def vector_field(self, t: Time, y: PyTree, args: AbstractWalkerScene) -> PyTree:
         rates = self.walker.vector_field(t, motion_of(y), self._scene(args, y))
         zero = jnp.zeros_like(y.clock)
-        return joined(y, rates, dict.fromkeys(self.coordinates, zero) | {"clock": zero + 1.0})
+        return join(y, rates, dict.fromkeys(self.coordinates, zero) | {"clock": zero + 1.0})
 
     def switches(self, args: AbstractWalkerScene, y: PyTree) -> tuple[Switch, ...]:
         return self.walker.switches(self._scene(args, y), motion_of(y))
@@ -148,7 +150,7 @@ class DisturbedCycle(AbstractAugmented):
             told["fallen"] = y.drop
             if not isinstance(after, RigidState):
                 after = after._replace(hip_z=after.hip_z + y.drop * args.walker.l)
-        return joined(y, after, told)
+        return join(y, after, told)
 
     def load(self, args: AbstractWalkerScene, y: PyTree) -> None:
         return None

@@ -22,6 +22,7 @@ from jaxbiped.gait._fixed_point_search import LOOSER
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._homotopy import BranchEnd
 from jaxbiped.gait._pseudo_arclength import CurvePoint
+from jaxbiped.optimise._cycle_functionals import Functional
 from jaxbiped.optimise._jacobian_functionals import jacobian_functionals
 from jaxbiped.optimise._jacobian_weights import MODULI
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values, with_parameters
@@ -165,16 +166,7 @@ def _both_ways(setup: ContinuationSetup, gait: Gait, kind: BranchEvent) -> list[
     ]
 
 
-class _Located(NamedTuple):
-    """Where a bifurcation lies: value, derivatives (p,), and their errors."""
-
-    value: float
-    error: float
-    slopes: np.ndarray
-    slope_errors: np.ndarray
-
-
-def _located_fold(setup: ContinuationSetup, event: BifurcationPoint) -> _Located | None:
+def _located_fold(setup: ContinuationSetup, event: BifurcationPoint) -> Functional | None:
     """By the return map itself, and by a looser one."""
     told = []
     problem = setup.problem
@@ -187,7 +179,7 @@ def _located_fold(setup: ContinuationSetup, event: BifurcationPoint) -> _Located
             return None
         told.append(slopes_there)
     (value, slopes), (loose_value, loose_slopes) = told
-    return _Located(value, abs(value - loose_value), slopes, np.abs(slopes - loose_slopes))
+    return Functional(value, abs(value - loose_value), slopes, np.abs(slopes - loose_slopes))
 
 
 def _fold_slopes(setup: ContinuationSetup, fold: CurvePoint) -> tuple[float, np.ndarray] | None:
@@ -202,7 +194,7 @@ def _fold_slopes(setup: ContinuationSetup, fold: CurvePoint) -> tuple[float, np.
     return value, slopes
 
 
-def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> _Located | None:
+def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> Functional | None:
     """By the modulus that is 1 there."""
     along = setup.axis.name
     scene = jtu.tree_map(as_float, with_parameters(setup.scene, {along: event.value}))
@@ -223,4 +215,4 @@ def _located_doubling(setup: ContinuationSetup, event: BifurcationPoint) -> _Loc
     by_all[place] = off[place] = 0.0
     move = -(values[which] - 1.0) / rate
     error = (errors[which] + abs(move) * rate_error) / abs(rate)
-    return _Located(float(event.value + move), float(error), by_all, off)
+    return Functional(float(event.value + move), float(error), by_all, off)

@@ -45,7 +45,7 @@ _FATAL = 1e-4
 _Found = TypeVar("_Found")
 
 
-class Walked(NamedTuple):
+class PushedWalk(NamedTuple):
     """A walk from a pushed start.
 
     Attributes:
@@ -99,7 +99,7 @@ class Certificate(NamedTuple):
     sensitivity_norm: tuple[float, float]
     basin: Fraction | None
     fatal_push: FatalShock | None
-    walk: Walked | None
+    walk: PushedWalk | None
     other_engine: OtherEngine | None
     nearest_bifurcations: tuple[NearestBifurcation, ...]
     failed: dict[str, str]
@@ -257,7 +257,7 @@ def _fatal_push(knows: Labelling) -> FatalShock:
     return nearest_failure(knows, gradients=False, tolerance=_FATAL)
 
 
-def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> Walked:
+def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> PushedWalk:
     state: WalkerState = gait.measures.state
     fast = [name for name in state._fields if name.startswith(("hip_v", "omega"))]
     faster = {name: as_float(float(getattr(state, name)) * (1.0 + push)) for name in fast}
@@ -280,7 +280,7 @@ def _walk(scene: Scene | RigidScene, gait: Gait, count: int, push: float) -> Wal
     last = float(times[-1] - times[-2]) if len(times) > 1 else np.nan
     difference = abs(last / float(gait.measures.period) - 1.0)
     done = len(times)
-    return Walked(push, done, count, difference, done >= count - 1 and difference < _SETTLED)
+    return PushedWalk(push, done, count, difference, done >= count - 1 and difference < _SETTLED)
 
 
 def _by_other(scene: Scene | RigidScene, gait: Gait) -> OtherEngine:

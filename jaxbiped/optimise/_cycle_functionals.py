@@ -1,9 +1,11 @@
 """Functionals of a periodic orbit: values, derivatives by the implicit function theorem, errors."""
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import PyTree
 
 from jaxbiped._types import Scalar, as_float
@@ -35,6 +37,30 @@ errors of derivatives of the spectral radius, of slip and of losses are then bel
 elasticity, as those of the gait's own measures are; it doubles what an evaluation costs."""
 _DRIVEN, _BOUND = 0.3, 0.1
 """Shares of these tolerances that keep the motors' work, and the bound of the radius, to 1e-5."""
+
+
+class Functional(NamedTuple):
+    """One functional, with respect to p parameters.
+
+    Attributes:
+        value: its value; `error` the estimated error.
+        slopes: its derivatives, shape (p,); `slope_errors` their estimated errors.
+    """
+
+    value: float
+    error: float
+    slopes: np.ndarray
+    slope_errors: np.ndarray
+
+
+def weighted_sum(weights: Iterable[float], parts: Iterable[Functional], count: int) -> Functional:
+    """Of functionals with respect to `count` parameters."""
+    value, error, slopes, slope_errors = 0.0, 0.0, np.zeros(count), np.zeros(count)
+    for weight, part in zip(weights, parts, strict=True):
+        value, error = value + weight * part.value, error + abs(weight) * part.error
+        slopes = slopes + weight * part.slopes
+        slope_errors = slope_errors + abs(weight) * part.slope_errors
+    return Functional(value, error, slopes, slope_errors)
 
 
 class Functionals(NamedTuple):

@@ -16,7 +16,7 @@ from jaxbiped.dynamics._impact import impact, push_off_work
 from jaxbiped.dynamics._rolling import inertia_of, rolling_hip_motion, support_of
 from jaxbiped.dynamics._state import RigidState, whole_state
 from jaxbiped.dynamics._switches import Switch
-from jaxbiped.optimise._augmented_cycles import AbstractAugmented, joined, motion_of
+from jaxbiped.optimise._augmented_cycles import AbstractAugmentedSystem, join, motion_of
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.variational._hybrid_system import Rolling, Walking
 
@@ -36,7 +36,7 @@ def _driving(motors: tuple[Scalar, ...], like: Scalar) -> Scalar:
     return power
 
 
-class WalkingIntegrals(AbstractAugmented):
+class WalkingIntegrals(AbstractAugmentedSystem):
     """`Walking` with its integrals; its load is the depth of a foot that swings [m].
 
     Attributes:
@@ -60,7 +60,7 @@ class WalkingIntegrals(AbstractAugmented):
         }
         if power.motors is not None:
             rates[MOTOR_WORK] = _driving(power.motors, slip)
-        return joined(y, self.walker.vector_field(t, state, args), rates)
+        return join(y, self.walker.vector_field(t, state, args), rates)
 
     def switches(self, args: Scene, y: PyTree) -> tuple[Switch, ...]:
         """The walker's, touchdown as a jump of the rate of slip, and changes of sign.
@@ -81,7 +81,7 @@ class WalkingIntegrals(AbstractAugmented):
 
     def reset_map(self, args: Scene, y: PyTree) -> PyTree:
         gained = {name: getattr(y, name) for name in self.coordinates}
-        return joined(y, self.walker.reset_map(args, motion_of(y)), gained)
+        return join(y, self.walker.reset_map(args, motion_of(y)), gained)
 
     def load(self, args: Scene, y: PyTree) -> Scalar:
         """How deep a foot is underground that the clearance rule lets pass [m]."""
@@ -93,7 +93,7 @@ class WalkingIntegrals(AbstractAugmented):
         return found
 
 
-class RollingIntegrals(AbstractAugmented):
+class RollingIntegrals(AbstractAugmentedSystem):
     """`Rolling` with the energy that impacts take; its load is the swing foot's depth [m].
 
     The work of motors is that of the push-off, too.
@@ -111,7 +111,7 @@ class RollingIntegrals(AbstractAugmented):
         rates = {"impact_loss": jnp.zeros_like(state.hip_x)}
         if MOTOR_WORK in self.coordinates:
             rates[MOTOR_WORK] = _driving(_rolling_motors(args, state), state.hip_x)
-        return joined(y, self.walker.vector_field(t, state, args), rates)
+        return join(y, self.walker.vector_field(t, state, args), rates)
 
     def switches(self, args: RigidScene, y: PyTree) -> tuple[Switch, ...]:
         """Each motor's change of sign."""
@@ -128,7 +128,7 @@ class RollingIntegrals(AbstractAugmented):
         gained = {"impact_loss": y.impact_loss + lost}
         if MOTOR_WORK in self.coordinates:
             gained[MOTOR_WORK] = y.motor_work + jnp.maximum(push, 0.0)
-        return joined(y, after, gained)
+        return join(y, after, gained)
 
     def load(self, args: RigidScene, y: PyTree) -> Scalar:
         """How deep the swing foot is underground [m]."""

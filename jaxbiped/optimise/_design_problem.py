@@ -13,6 +13,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.gait._search_provenance import explain_search
+from jaxbiped.optimise._cycle_functionals import Functional, weighted_sum
 from jaxbiped.optimise._design_gaits import GaitSettings, are_walks
 from jaxbiped.optimise._design_variables import Requirement, Variables
 from jaxbiped.optimise._ensemble import Ensemble, evaluate_ensemble, with_worse_members
@@ -145,12 +146,12 @@ class DesignProblem:
         self.asked.append(self.latest)
         return self.latest
 
-    def objective(self, known: Evaluation) -> tuple[float, np.ndarray, float]:
-        """The sum that is minimised, its gradient in parameters (p,), its error."""
-        value = sum(w * known.values[name] for name, w in self.weights.items())
-        slopes = sum(w * known.slopes[name] for name, w in self.weights.items())
-        error = sum(abs(w) * known.errors[name] for name, w in self.weights.items())
-        return float(value), np.asarray(slopes), float(error)
+    def objective(self, known: Evaluation, weights: dict[str, float] | None = None) -> Functional:
+        """The sum that is minimised, or that of other weights."""
+        weights = self.weights if weights is None else weights
+        return weighted_sum(
+            weights.values(), map(known.functional, weights), known.state_slopes.shape[1]
+        )
 
     def gradient(self, u: np.ndarray, slopes: np.ndarray) -> np.ndarray:
         """Derivatives with respect to u from those with respect to all parameters."""
@@ -199,7 +200,7 @@ class DesignProblem:
 
     def scene_at(self, u: np.ndarray) -> Scene | RigidScene:
         """The scene of a design; raises `ArgumentError` where parameters do not go together."""
-        return with_parameters(self.scene, self.variables.named(u))
+        return with_parameters(self.scene, self.variables.by_name(u))
 
     def _keep(self, u: np.ndarray, scene: Scene | RigidScene, gait: Gait) -> Evaluation | None:
         if self.ensemble is None:

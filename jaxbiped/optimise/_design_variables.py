@@ -54,7 +54,7 @@ class Variables(NamedTuple):
         logarithmic = self.logarithmic
         return np.where(logarithmic, self.high, otherwise) / np.where(logarithmic, self.low, 1.0)
 
-    def named(self, u: np.ndarray) -> dict[str, float]:
+    def by_name(self, u: np.ndarray) -> dict[str, float]:
         """The parameters at u by name."""
         return dict(zip(self.names, self.values(u).tolist(), strict=True))
 

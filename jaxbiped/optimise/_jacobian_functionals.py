@@ -18,7 +18,7 @@ from jaxbiped.gait._return_map_spec import ReturnMapSpec
 from jaxbiped.gait._second_variation import second_variation
 from jaxbiped.linalg._small_matrices import singular_pairs
 from jaxbiped.optimise._augmented_cycles import (
-    AbstractAugmented,
+    AbstractAugmentedSystem,
     MotionSection,
     SteppedSection,
     drop_cycle,
@@ -34,8 +34,8 @@ from jaxbiped.optimise._cycle_functionals import (
 from jaxbiped.optimise._jacobian_weights import (
     CLEARANCE_NORMS,
     MODULI,
+    entry_weights,
     leading_multipliers,
-    weighed,
 )
 from jaxbiped.optimise._lowest_swing import LowestSwing, LowestSwingSection
 from jaxbiped.scene._scene import RigidScene, Scene
@@ -109,7 +109,7 @@ def jacobian_functionals(
     for (by_step, has_clearance), group in groups.items():
         on, arrivals = section_of(scene, None), footsteps
         disturbed = (drop_cycle if by_step else push_cycle)(system_of(scene))
-        system: AbstractAugmented = disturbed
+        system: AbstractAugmentedSystem = disturbed
         section: AbstractSection = SteppedSection(on) if by_step else MotionSection(on)
         if has_clearance:
             system, section = LowestSwing(disturbed), LowestSwingSection(section)
@@ -142,7 +142,7 @@ def _functionals(
         # The Jacobian's rows, as components lie: hip_x, the clock, a fall, and what must return.
         rows = jnp.concatenate([once.advance_rows, once.jacobian])[:, :m]
         length = jnp.stack([once.advance[0], once.period])
-        told = [weighed(name, y, rows, length, leading) for name in names]
+        told = [entry_weights(name, y, rows, length, leading) for name in names]
         pairs = [_in_pairs(each.by_rows, each.rank) for each in told]
         along, weights = (jnp.concatenate(part) for part in zip(*pairs, strict=True))
 

@@ -32,7 +32,7 @@ _DOUBLINGS = 24
 """Of the footsteps over which responses are summed: 2 ** 24 of them."""
 
 
-class Weighed(NamedTuple):
+class WeightedEntries(NamedTuple):
     """A function of the Jacobian's rows, and of step length and period.
 
     Attributes:
@@ -71,7 +71,7 @@ def leading_multipliers(jacobian: Scalar) -> Scalar:
     return jnp.where(sizes[order] > 0.0, values[order], jnp.zeros_like(values[order]))
 
 
-def _modulus(k: int, rows: Scalar, length: Scalar, leading: Scalar) -> Weighed:
+def _modulus(k: int, rows: Scalar, length: Scalar, leading: Scalar) -> WeightedEntries:
     """Of the multiplier nearest to the k-th leading one: a looser solve may have another order."""
     eigen = _eigen(rows[2:])
     place = jnp.argmin(jnp.abs(eigen.values - leading[k]))
@@ -80,7 +80,7 @@ def _modulus(k: int, rows: Scalar, length: Scalar, leading: Scalar) -> Weighed:
     divisor = jnp.where(known, size, 1.0).astype(eigen.values.dtype)
     shares = jnp.zeros_like(eigen.values).at[place].set(jnp.conj(eigen.values[place]) / divisor)
     value = jnp.where(known, size, 0.0)
-    return Weighed(value, _by_entries(eigen, shares), 2, jnp.zeros_like(length))
+    return WeightedEntries(value, _by_entries(eigen, shares), 2, jnp.zeros_like(length))
 
 
 def _cluster(values: Scalar) -> tuple[Scalar, Scalar]:
@@ -102,7 +102,7 @@ def _cluster(values: Scalar) -> tuple[Scalar, Scalar]:
     return inside, jnp.arange(len(values)) == outside
 
 
-def _symmetric(k: int, rows: Scalar, length: Scalar) -> Weighed:
+def _symmetric(k: int, rows: Scalar, length: Scalar) -> WeightedEntries:
     """The k-th of the cluster: its derivatives are those of its multipliers, which add up."""
     eigen = _eigen(rows[2:])
     inside, _ = _cluster(eigen.values)
@@ -112,30 +112,30 @@ def _symmetric(k: int, rows: Scalar, length: Scalar) -> Weighed:
     values = (first, product, (first**3 - 3.0 * first * second + 2.0 * third) / 6.0)
     shares = (jnp.ones_like(own), first - own, product - own * (first - own))
     by_rows = _by_entries(eigen, jnp.where(inside, shares[k], 0.0))
-    return Weighed(values[k].real, by_rows, len(SYMMETRIC), jnp.zeros_like(length))
+    return WeightedEntries(values[k].real, by_rows, len(SYMMETRIC), jnp.zeros_like(length))
 
 
-def _next_modulus(rows: Scalar, length: Scalar) -> Weighed:
+def _next_modulus(rows: Scalar, length: Scalar) -> WeightedEntries:
     eigen = _eigen(rows[2:])
     _, outside = _cluster(eigen.values)
     size = jnp.sum(jnp.where(outside, jnp.abs(eigen.values), 0.0))
     known = outside & (size > 0.0)
     divisor = jnp.where(size > 0.0, size, 1.0).astype(eigen.values.dtype)
     shares = jnp.where(known, jnp.conj(eigen.values) / divisor, 0.0)
-    return Weighed(size, _by_entries(eigen, shares), 2, jnp.zeros_like(length))
+    return WeightedEntries(size, _by_entries(eigen, shares), 2, jnp.zeros_like(length))
 
 
-def _divergence(rows: Scalar, length: Scalar) -> Weighed:
+def _divergence(rows: Scalar, length: Scalar) -> WeightedEntries:
     """Without the zeros of the push and of the section."""
     eigen = _eigen(rows[2:])
     order = jnp.argsort(-jnp.abs(eigen.values))[:-2]
     leading = eigen.values[order]
     shares = jnp.zeros_like(eigen.values).at[order].set(1.0 / leading)
     value = jnp.sum(jnp.log(jnp.abs(leading)))
-    return Weighed(value, _by_entries(eigen, shares), len(order), jnp.zeros_like(length))
+    return WeightedEntries(value, _by_entries(eigen, shares), len(order), jnp.zeros_like(length))
 
 
-def _radius_bound(sizes: Scalar, rows: Scalar, length: Scalar) -> Weighed:
+def _radius_bound(sizes: Scalar, rows: Scalar, length: Scalar) -> WeightedEntries:
     def bound(rows: Scalar) -> Scalar:
         # Without the push, which has no response of its own.
         power, logarithm = rows[3:, 1:] * sizes / sizes[:, None], jnp.zeros(())
@@ -147,34 +147,36 @@ def _radius_bound(sizes: Scalar, rows: Scalar, length: Scalar) -> Weighed:
         return jnp.exp(logarithm + 0.5 * jnp.log(jnp.sum(power * power)) / 2**SQUARINGS)
 
     value, weights = jax.value_and_grad(bound)(rows)
-    return Weighed(value, weights, rows.shape[1], jnp.zeros_like(length))
+    return WeightedEntries(value, weights, rows.shape[1], jnp.zeros_like(length))
 
 
-def _push_norm(rows: Scalar, length: Scalar) -> Weighed:
+def _push_norm(rows: Scalar, length: Scalar) -> WeightedEntries:
     """Of relative changes of step length and step time."""
     return _norm_of(lambda rows, length: rows[:2] / length[:, None], rows, length)
 
 
-def _clearance_norm(rows: Scalar, length: Scalar) -> Weighed:
+def _clearance_norm(rows: Scalar, length: Scalar) -> WeightedEntries:
     """Of changes of foot clearance, in leg lengths."""
     return _norm_of(lambda rows, length: rows[1:2], rows, length)
 
 
-def _norm_of(response: Callable[[Scalar, Scalar], Scalar], rows: Scalar, length: Scalar) -> Weighed:
+def _norm_of(
+    response: Callable[[Scalar, Scalar], Scalar], rows: Scalar, length: Scalar
+) -> WeightedEntries:
     own = rows[-rows.shape[1] :]
     jacobian = jnp.where(jnp.isfinite(own), own, 0.0)
     stable = jnp.max(jnp.abs(eigenpairs(jacobian)[0])) < 1.0
 
     def norm(rows: Scalar, length: Scalar) -> Scalar:
-        return _summed(rows[-rows.shape[1] :], response(rows, length))
+        return _response_norm(rows[-rows.shape[1] :], response(rows, length))
 
     value, (weights, by_length) = jax.value_and_grad(norm, argnums=(0, 1))(
         jnp.where(stable, rows, rows.at[-rows.shape[1] :].set(0.0)), length
     )
-    return Weighed(jnp.where(stable, value, jnp.inf), weights, rows.shape[1], by_length)
+    return WeightedEntries(jnp.where(stable, value, jnp.inf), weights, rows.shape[1], by_length)
 
 
-def _summed(power: Scalar, told: Scalar) -> Scalar:
+def _response_norm(power: Scalar, told: Scalar) -> Scalar:
     """√(Q₀₀), where Q = Σ (Aⁿ)ᵀ CᵀC Aⁿ solves Q = CᵀC + Aᵀ Q A, by doubling."""
     total = told.T @ told
     for _ in range(_DOUBLINGS):
@@ -182,7 +184,9 @@ def _summed(power: Scalar, told: Scalar) -> Scalar:
     return jnp.sqrt(total[0, 0])
 
 
-def weighed(name: str, y: PyTree, rows: Scalar, length: Scalar, leading: Scalar) -> Weighed:
+def entry_weights(
+    name: str, y: PyTree, rows: Scalar, length: Scalar, leading: Scalar
+) -> WeightedEntries:
     """A functional by name.
 
     Args:

@@ -90,13 +90,12 @@ def local_of(
     weights, weight = smooth_weights(problem)
     of_cluster = [row for row in rows if isinstance(row, ClusterRow)]
     others = [r for r in rows if not isinstance(r, ClusterRow) and r.name != "next_modulus"]
-    every = len(next(iter(known.slopes.values())))
-    total = sum((w * known.slopes[name] for name, w in weights.items()), np.zeros(every))
-    slopes = np.reshape([row.slopes(known) for row in others], (len(others), every))
+    total = problem.objective(known, weights)
+    slopes = np.reshape([row.slopes(known) for row in others], (len(others), len(total.slopes)))
     here = Local(
         u=np.array(u),
-        objective=float(sum(w * known.values[name] for name, w in weights.items()) / scale),
-        gradient=problem.gradient(u, total) / scale,
+        objective=total.value / scale,
+        gradient=problem.gradient(u, total.slopes) / scale,
         spare=np.asarray([row.value(known) for row in others]),
         spare_gradients=problem.gradient(u, slopes),
         equal=np.asarray([row.equality for row in others], dtype=bool),
@@ -132,13 +131,13 @@ class Model(NamedTuple):
         """The merit there."""
         here, every = self.here, [self.here, *self.cuts]
         moves = [here.u + step - each.u for each in every]
-        sums = [self._lowered(e) + e.gradient @ m for e, m in zip(every, moves, strict=True)]
+        sums = [self._lower_sum(e) + e.gradient @ m for e, m in zip(every, moves, strict=True)]
         value = max(sums) + 0.5 * float(step @ self.curvature @ step)
         if here.weight:
             value += here.weight * max(e.radius(m) for e, m in zip(every, moves, strict=True))
-        return float(value) + penalty * self.missed(step)
+        return float(value) + penalty * self.violation(step)
 
-    def missed(self, step: np.ndarray) -> float:
+    def violation(self, step: np.ndarray) -> float:
         """By how much requirements are missed there."""
         here, worst, over = self.here, np.zeros(len(self.here.spare)), 0.0
         for each in (here, *self.cuts):
@@ -150,7 +149,7 @@ class Model(NamedTuple):
                 over = max(over, each.radius(move) / here.bound - 1.0)
         return float(worst.sum()) + over
 
-    def _lowered(self, each: Local) -> float:
+    def _lower_sum(self, each: Local) -> float:
         """The linearised sum at that design, lowered to at most this one's where that is needed."""
         back = self.here.u - each.u
         above = each.objective + each.gradient @ back - self.here.objective
@@ -170,7 +169,7 @@ class Model(NamedTuple):
                 begins += [(scale * reach, begins[0][1]), (scale * reach, inverse @ shrunk)]
         found = [self._step(size, penalty, begin) for size, begin in begins]
         step = min(found, key=lambda each: self.merit(each, penalty))
-        return step, self.missed(step)
+        return step, self.violation(step)
 
     def _step(self, reach: float, penalty: float, begin: np.ndarray) -> np.ndarray:
         """The step that SciPy's SLSQP finds from one where it begins.
@@ -191,7 +190,7 @@ class Model(NamedTuple):
 
         for each in every:
             back = here.u - each.u
-            add(each.gradient, self._lowered(each) + each.gradient @ back, k, -1.0)
+            add(each.gradient, self._lower_sum(each) + each.gradient @ back, k, -1.0)
             for i in range(r):
                 value = each.spare[i] + each.spare_gradients[i] @ back
                 if each is here or not here.equal[i]:

@@ -17,15 +17,15 @@ from jaxbiped.dynamics._section import AbstractSection
 from jaxbiped.dynamics._switches import Switch
 from jaxbiped.optimise._augmented_cycles import (
     DROP,
-    AbstractAugmented,
+    AbstractAugmentedSystem,
     DisturbedCycle,
-    joined,
+    join,
     motion_of,
 )
 from jaxbiped.scene._scene import AbstractWalkerScene, Scene
 
 
-class LowestSwing(AbstractAugmented):
+class LowestSwing(AbstractAugmentedSystem):
     """A disturbed walker whose `clearance`, in leg lengths, is told at its foot's lowest place.
 
     `passed` is 1 from there to the section, else 0. Clearances of several footsteps add up, as
@@ -42,7 +42,7 @@ class LowestSwing(AbstractAugmented):
     def vector_field(self, t: Time, y: PyTree, args: AbstractWalkerScene) -> PyTree:
         zero = jnp.zeros_like(y.passed)
         rates = self.walker.vector_field(t, motion_of(y), args)
-        return joined(y, rates, dict.fromkeys(self.coordinates, zero))
+        return join(y, rates, dict.fromkeys(self.coordinates, zero))
 
     def switches(self, args: AbstractWalkerScene, y: PyTree) -> tuple[Switch, ...]:
         return self.walker.switches(args, motion_of(y))
@@ -58,8 +58,8 @@ class LowestSwing(AbstractAugmented):
         height = _swing_height(args, motion_of(motion)) + lowered
         told = {"clearance": y.clearance + height / args.walker.l, "passed": y.passed + 1.0}
         after = self.walker.reset_map(args, motion)
-        at_section = joined(y, after, {"clearance": y.clearance, "passed": zero})
-        return select(y.passed < 0.5, joined(y, motion, told), at_section)
+        at_section = join(y, after, {"clearance": y.clearance, "passed": zero})
+        return select(y.passed < 0.5, join(y, motion, told), at_section)
 
     def load(self, args: AbstractWalkerScene, y: PyTree) -> None:
         return None

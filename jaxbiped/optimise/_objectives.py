@@ -13,16 +13,18 @@ from jaxbiped.continuation._bifurcations import BranchEvent
 from jaxbiped.dynamics._state_quantities import recurring_leaves
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._bifurcation_distance import Sought, bifurcation_distance
-from jaxbiped.optimise._cycle_functionals import Functionals, cycle_functionals, integral_names
+from jaxbiped.optimise._cycle_functionals import (
+    Functional,
+    Functionals,
+    cycle_functionals,
+    integral_names,
+    weighted_sum,
+)
 from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
 from jaxbiped.optimise._jacobian_weights import CLEARANCE_NORMS, CLUSTER, SYMMETRIC
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values
 from jaxbiped.scene._scene import RigidScene, Scene
 from jaxbiped.scene.laws.friction._coulomb import Frictionless
-
-
-def _of_any(scene: Scene | RigidScene) -> str | None:
-    return None
 
 
 def _of_driven(scene: Scene | RigidScene) -> str | None:
@@ -66,7 +68,7 @@ class Objective(NamedTuple):
     """
 
     quantity: Quantity
-    lacks: Callable[[Scene | RigidScene], str | None] = _of_any
+    lacks: Callable[[Scene | RigidScene], str | None] = lambda _: None
     measured: Callable[[Scene | RigidScene, Gait], tuple[Any, Any, Any, Any]] | None = None
 
 
@@ -153,6 +155,12 @@ class Evaluation(NamedTuple):
     state_slopes: np.ndarray
     beyond_range: tuple[str, ...] = ()
 
+    def functional(self, name: str) -> Functional:
+        """All that is known of one objective."""
+        return Functional(
+            self.values[name], self.errors[name], self.slopes[name], self.slope_errors[name]
+        )
+
 
 def check_objective(name: str, scene: Scene | RigidScene, what: str = "objective") -> None:
     """Raises `ArgumentError` for an unknown objective, or one that the scene lacks."""
@@ -212,7 +220,7 @@ def evaluate(
     wanted = tuple(names)
     both = (gait.measures, gait.measure_errors, gait.sensitivities, gait.sensitivity_errors)
     rows = {name: _row(*(getattr(each, name) for each in both)) for name in _OF_THE_GAIT}
-    rows |= {name: _Row(*measured(scene, gait)) for name, measured in _own(wanted).items()}
+    rows |= {name: Functional(*measured(scene, gait)) for name, measured in _own(wanted).items()}
     if functionals is None:
         footsteps = gait.orbit[0].shape[0]
         functionals = functionals_of(scene, gait, wanted, footsteps, accuracy)
@@ -236,10 +244,10 @@ def evaluate(
     beyond_range = []
     for name in (name for name in wanted if name in _DISTANCES):
         told = bifurcation_distance(scene, gait, _DISTANCES[name], accuracy=accuracy)
-        rows[name] = _Row(told.distance, told.error, told.slopes, told.slope_errors)
+        rows[name] = Functional(told.distance, told.error, told.slopes, told.slope_errors)
         if told.outcome is Sought.NONE_IN_RANGE:
             none = np.zeros_like(told.slopes)
-            rows[name] = _Row(told.distance, 0.0, none, none)
+            rows[name] = Functional(told.distance, 0.0, none, none)
             beyond_range.append(name)
     kept = {
         name: _row(*rows[name]) for name in dict.fromkeys((*wanted, *of_jacobian, *_OF_THE_GAIT))
@@ -256,33 +264,21 @@ def evaluate(
     )
 
 
-class _Row(NamedTuple):
-    value: float
-    error: float
-    slopes: np.ndarray
-    slope_errors: np.ndarray
+def _row(value: Any, error: Any, slopes: Any, slope_errors: Any) -> Functional:
+    return Functional(float(value), float(error), np.asarray(slopes), np.asarray(slope_errors))
 
 
-def _row(value: Any, error: Any, slopes: Any, slope_errors: Any) -> _Row:
-    return _Row(float(value), float(error), np.asarray(slopes), np.asarray(slope_errors))
-
-
-def _rows_of(found: Functionals) -> list[_Row]:
+def _rows_of(found: Functionals) -> list[Functional]:
     return [_row(*each) for each in zip(*map(np.asarray, found[:4]), strict=True)]
 
 
-def _root_of_squares(rows: list[_Row]) -> _Row:
+def _root_of_squares(rows: list[Functional]) -> Functional:
     value = float(np.sqrt(sum(row.value**2 for row in rows)))
     shares = [row.value / value for row in rows]
-    each = list(zip(shares, rows, strict=True))
-    slopes, slope_errors = (
-        np.asarray(sum(share * getattr(row, name) for share, row in each))
-        for name in ("slopes", "slope_errors")
-    )
-    return _Row(value, sum(share * row.error for share, row in each), slopes, slope_errors)
+    return weighted_sum(shares, rows, len(rows[0].slopes))._replace(value=value)
 
 
-def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, _Row]) -> _Row:
+def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, Functional]) -> Functional:
     """Losses, or what the motors do and gravity's share, over weight times length."""
     if scene.actuation is None:
         losses = [rows[name] for name in ("impact_loss", "friction_loss") if name in rows]
@@ -294,15 +290,20 @@ def _cost_of_transport(scene: Scene | RigidScene, rows: dict[str, _Row]) -> _Row
     return driven._replace(value=driven.value + np.sin(slope), slopes=driven.slopes + by_slope)
 
 
-def _over_weight_and_length(scene: Scene | RigidScene, works: list[_Row], length: _Row) -> _Row:
+def _over_weight_and_length(
+    scene: Scene | RigidScene, works: list[Functional], length: Functional
+) -> Functional:
     known = {name: float(value) for name, value in parameter_values(scene).items()}
     mass, names = float(scene.walker.total_mass), parameter_names(scene)
     own = length.slopes / length.value
     for name, share in (("m", 2.0 / mass), ("hip_mass", 1.0 / mass), ("g", 1.0 / known["g"])):
         own[names.index(name)] += share
     divisor = mass * known["g"] * length.value
-    cost = sum(row.value for row in works) / divisor
-    slopes = sum(row.slopes for row in works) / divisor - cost * own
-    errors = sum(row.error for row in works) / divisor + cost * length.error / length.value
-    slope_errors = sum(row.slope_errors for row in works) / divisor
-    return _Row(cost, errors, slopes, slope_errors + cost * length.slope_errors / length.value)
+    work = weighted_sum([1.0] * len(works), works, len(names))
+    cost = work.value / divisor
+    return Functional(
+        value=cost,
+        error=work.error / divisor + cost * length.error / length.value,
+        slopes=work.slopes / divisor - cost * own,
+        slope_errors=work.slope_errors / divisor + cost * length.slope_errors / length.value,
+    )

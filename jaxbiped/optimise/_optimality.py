@@ -105,8 +105,7 @@ class _Balance(NamedTuple):
 def _smooth_gradient(problem: DesignProblem, design: Design) -> np.ndarray:
     """Of the sum but for the spectral radius's part."""
     weights, _ = smooth_weights(problem)
-    slopes = [w * design.known.slopes[name] for name, w in weights.items()]
-    return problem.gradient(design.u, np.sum(slopes, axis=0)) if slopes else 0.0 * design.u
+    return problem.gradient(design.u, problem.objective(design.known, weights).slopes)
 
 
 def _balance(
@@ -116,8 +115,7 @@ def _balance(
     weights, of_radius = smooth_weights(problem)
     every = [design, *others]
     gradients = [_smooth_gradient(problem, each) / scale for each in every]
-    spreads = [abs(w) * known.slope_errors[name] for name, w in weights.items()]
-    error = problem.gradient(u, np.sum(spreads, axis=0)) / scale if spreads else 0.0 * u
+    error = problem.gradient(u, problem.objective(known, weights).slope_errors) / scale
     radius = known.values["spectral_radius"] if of_radius else np.inf
     rows = [(row, False) for row in rows_of(problem)]
     rows += [(row, True) for row in (cluster_rows(problem, radius) if of_radius else ())]
@@ -165,7 +163,7 @@ def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
     combination that balances says that no direction is better (Clarke's ε-subdifferential).
     """
     u, known = design
-    scale = max(abs(problem.objective(known)[0]), 1e-300)
+    scale = max(abs(problem.objective(known).value), 1e-300)
     found = _balance(problem, design, [], scale)
     if np.max(np.abs(found.left)) > OPTIMAL:
         near = [e for e in problem.asked if 0.0 < np.max(np.abs(e.u - u)) <= _NEAR]
@@ -192,8 +190,8 @@ def optimality_of(problem: DesignProblem, design: Design) -> Optimality:
         residual=float(np.max(np.abs(found.left))),
         error=float(np.max(gradient_error)),
         excess=problem.excess(known),
-        requirements=tuple(_held(problem, row, known, held.get(row[:3])) for row in rows),
-        bounds=tuple(_held_bound(problem, u, scale, *each) for each in at_bounds),
+        requirements=tuple(_held_measure(problem, row, known, held.get(row[:3])) for row in rows),
+        bounds=tuple(_held_variable(problem, u, scale, *each) for each in at_bounds),
     )
 
 
@@ -211,7 +209,7 @@ def _at_bounds(u: np.ndarray) -> list[tuple[int, float]]:
     return lower + [(int(k), -1.0) for k in np.flatnonzero(u >= 1.0 - _AT_BOUND)]
 
 
-def _held(
+def _held_measure(
     problem: DesignProblem, row: AnyRow, known: Evaluation, found: tuple[float, float] | None
 ) -> Held:
     """Multipliers in the units of objective and measure: of moving the bound upwards."""
@@ -227,7 +225,7 @@ def _held(
     )
 
 
-def _held_bound(
+def _held_variable(
     problem: DesignProblem,
     u: np.ndarray,
     scale: float,

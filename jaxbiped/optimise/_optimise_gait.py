@@ -29,7 +29,7 @@ from jaxbiped.optimise._design_variables import (
 from jaxbiped.optimise._ensemble import Ensemble, ensemble_of
 from jaxbiped.optimise._evaluations import Evaluations
 from jaxbiped.optimise._objectives import check_objective
-from jaxbiped.optimise._optimisers import OPTIMISERS, Ended
+from jaxbiped.optimise._optimisers import OPTIMISERS, RunEnding
 from jaxbiped.optimise._runs import Optimum, Runs, optimum_of
 from jaxbiped.optimise._scattered_designs import scattered_designs
 from jaxbiped.scene._parameter_access import scene_identity
@@ -163,11 +163,11 @@ def optimise_gait(
                     again = problem.begin_again(runs.best, harder)
                 except ArgumentError:
                     lost = f"{runs.ended.message} Within the box there are members without a gait."
-                    runs.ended = Ended(runs.ended.converged, lost)
+                    runs.ended = RunEnding(runs.ended.converged, lost)
                     break
                 runs.run(again)
         except KeyboardInterrupt:
-            runs.ended, runs.interrupted = Ended(False, "Interrupted."), True
+            runs.ended, runs.interrupted = RunEnding(False, "Interrupted."), True
     return optimum_of(problem, runs)
 
 

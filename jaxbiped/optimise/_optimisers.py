@@ -32,7 +32,7 @@ _EDGE = 1e-3
 """Distance from a bound, in u, at which optax begins at least: logits are infinite there."""
 
 
-class Ended(NamedTuple):
+class RunEnding(NamedTuple):
     """How an optimiser ended: whether it says that it converged, and its own words."""
 
     converged: bool
@@ -112,25 +112,26 @@ class Functions:
     def __init__(self, problem: DesignProblem) -> None:
         self.problem, self.rows = problem, rows_of(problem)
         assert problem.latest is not None
-        self.scale = scale_of(problem.objective(problem.latest.known)[0])
+        self.scale = scale_of(problem.objective(problem.latest.known).value)
 
     def objective(self, u: np.ndarray) -> tuple[float, np.ndarray]:
         """The scaled objective and its gradient."""
-        known, raised = self._known(u)
-        value, slopes, _ = self.problem.objective(known)
-        return value / self.scale + raised, self.problem.gradient(u, slopes) / self.scale
+        known, raised = self._evaluation(u)
+        found = self.problem.objective(known)
+        gradient = self.problem.gradient(u, found.slopes)
+        return found.value / self.scale + raised, gradient / self.scale
 
     def spare(self, u: np.ndarray, rows: tuple[AnyRow, ...]) -> np.ndarray:
         """Values of the requirements."""
-        known, _ = self._known(u)
+        known, _ = self._evaluation(u)
         return np.asarray([row.value(known) for row in rows])
 
     def spare_gradients(self, u: np.ndarray, rows: tuple[AnyRow, ...]) -> np.ndarray:
         """Their gradients, one a row."""
-        known, _ = self._known(u)
+        known, _ = self._evaluation(u)
         return np.stack([self.problem.gradient(u, row.slopes(known)) for row in rows])
 
-    def _known(self, u: np.ndarray) -> tuple[Evaluation, float]:
+    def _evaluation(self, u: np.ndarray) -> tuple[Evaluation, float]:
         u = np.clip(np.asarray(u, dtype=float), 0.0, 1.0)
         known = self.problem.at(u)
         if known is not None:
@@ -142,7 +143,7 @@ class Functions:
 Callback = Callable[[np.ndarray], None]
 
 
-def run_slsqp(functions: Functions, u: np.ndarray, iterations: int, told: Callback) -> Ended:
+def run_slsqp(functions: Functions, u: np.ndarray, iterations: int, report: Callback) -> RunEnding:
     """Sequential quadratic programming with a line search (Kraft 1988), by SciPy."""
     kinds = {
         "eq": tuple(row for row in functions.rows if row.equality),
@@ -160,13 +161,15 @@ def run_slsqp(functions: Functions, u: np.ndarray, iterations: int, told: Callba
         method="SLSQP",
         bounds=scipy.optimize.Bounds(0.0, 1.0),
         constraints=constraints,
-        callback=told,
+        callback=report,
         options={"maxiter": iterations, "ftol": 1e-8},
     )
-    return Ended(bool(found.success), str(found.message))
+    return RunEnding(bool(found.success), str(found.message))
 
 
-def run_trust_constr(functions: Functions, u: np.ndarray, iterations: int, told: Callback) -> Ended:
+def run_trust_constr(
+    functions: Functions, u: np.ndarray, iterations: int, report: Callback
+) -> RunEnding:
     """Byrd and Omojokun's trust region with an interior point (Conn, Gould, Toint), by SciPy."""
     constraints = []
     if functions.rows:
@@ -188,24 +191,24 @@ def run_trust_constr(functions: Functions, u: np.ndarray, iterations: int, told:
             method="trust-constr",
             bounds=scipy.optimize.Bounds(0.0, 1.0, keep_feasible=True),
             constraints=constraints,
-            callback=lambda x, _: told(x),
+            callback=lambda x, _: report(x),
             options={"maxiter": iterations, "gtol": 1e-6, "xtol": 1e-7},
         )
     except ArgumentError:
         raise
     except (ValueError, np.linalg.LinAlgError) as error:
         # Where derivatives grow without bound, as at corners of the spectral radius.
-        return Ended(False, f"SciPy's trust-constr broke down: {error}.")
-    return Ended(found.status in (1, 2), str(found.message))
+        return RunEnding(False, f"SciPy's trust-constr broke down: {error}.")
+    return RunEnding(found.status in (1, 2), str(found.message))
 
 
 def run_optax(
     functions: Functions,
     u: np.ndarray,
     iterations: int,
-    told: Callback,
+    report: Callback,
     transformation: "optax.GradientTransformation | None" = None,
-) -> Ended:
+) -> RunEnding:
     """Descent in logits of u, which keep the bounds; requirements it knows none.
 
     Raises:
@@ -224,7 +227,7 @@ def run_optax(
     for _ in range(iterations):
         now = 1.0 / (1.0 + np.exp(-np.asarray(logits)))
         value, gradient = functions.objective(now)
-        told(now)
+        report(now)
         if value < best:
             best, at_best = value, logits
         if value > best + 0.5 * _RAISED:
@@ -233,6 +236,6 @@ def run_optax(
         with jax.numpy_dtype_promotion("standard"):  # optax's own
             step, state = method.update(jnp.asarray(gradient * now * (1.0 - now)), state, logits)
         if float(jnp.max(jnp.abs(jnp.asarray(step)))) < 1e-6:
-            return Ended(True, "Steps became small.")
+            return RunEnding(True, "Steps became small.")
         logits = jnp.asarray(optax.apply_updates(logits, step))
-    return Ended(False, "Iteration limit reached")
+    return RunEnding(False, "Iteration limit reached")

@@ -1,6 +1,8 @@
 """Runs of an optimiser over a design problem, and the optimum: the best design of all of them."""
 
 import enum
+import functools
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,12 +13,27 @@ from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
 from jaxbiped.optimise._objectives import Evaluation
 from jaxbiped.optimise._optimality import OPTIMAL, Optimality, optimality_of
-from jaxbiped.optimise._optimisers import Ended, Functions, run_optax, run_slsqp, run_trust_constr
+from jaxbiped.optimise._optimisers import (
+    Callback,
+    Functions,
+    RunEnding,
+    run_optax,
+    run_slsqp,
+    run_trust_constr,
+)
 from jaxbiped.optimise._trust_region import run_trust_region
 from jaxbiped.scene._scene import RigidScene, Scene
 
 if TYPE_CHECKING:
     import optax
+
+
+_BY_NAME: dict[str, Callable[[Functions, np.ndarray, int, Callback], RunEnding]] = {
+    "trust-region": run_trust_region,
+    "slsqp": run_slsqp,
+    "trust-constr": run_trust_constr,
+    "optax": run_optax,
+}
 
 
 class Outcome(enum.IntEnum):
@@ -85,7 +102,7 @@ class Runs:
         self.problem, self.iterations, self.optimiser = problem, iterations, optimiser
         self.bar = tqdm(unit="iterations", disable=not progress)
         self.history: list[Iteration] = []
-        self.ended, self.interrupted = Ended(False, ""), False
+        self.ended, self.interrupted = RunEnding(False, ""), False
 
     @property
     def best(self) -> Design:
@@ -95,18 +112,14 @@ class Runs:
     def run(self, begin: Design) -> None:
         """From a design whose gait is known."""
         self.problem.latest = begin
-        self.told(begin.u)
+        self.note(begin.u)
         before = self.best
         functions = Functions(self.problem)
-        if self.optimiser == "trust-region":
-            ended = run_trust_region(self.problem, begin.u, self.iterations, self.told)
-        elif self.optimiser == "slsqp":
-            ended = run_slsqp(functions, begin.u, self.iterations, self.told)
-        elif self.optimiser == "trust-constr":
-            ended = run_trust_constr(functions, begin.u, self.iterations, self.told)
+        if isinstance(self.optimiser, str):
+            optimise = _BY_NAME[self.optimiser]
         else:
-            own = None if isinstance(self.optimiser, str) else self.optimiser
-            ended = run_optax(functions, begin.u, self.iterations, self.told, own)
+            optimise = functools.partial(run_optax, transformation=self.optimiser)
+        ended = optimise(functions, begin.u, self.iterations, self.note)
         if not self.ended.message or self._rank(self.best) < self._rank(before):
             self.ended = ended
 
@@ -124,24 +137,24 @@ class Runs:
             return Outcome.UNFINISHED
         return Outcome.CONVERGED if optimal else Outcome.CORNER
 
-    def told(self, u: np.ndarray) -> None:
+    def note(self, u: np.ndarray) -> None:
         """Notes an iterate."""
         u = np.clip(np.array(u, dtype=float), 0.0, 1.0)
         self.bar.update()
         known = self.problem.evaluations.get(u)
         if known is None:
             return
-        value = self.problem.sense * self.problem.objective(known)[0]
+        value = self.problem.sense * self.problem.objective(known).value
         excess = self.problem.excess(known)
         measures = {name: known.values[name] for name in self.problem.wanted}
-        named, beyond = self.problem.variables.named(u), known.beyond_range
+        named, beyond = self.problem.variables.by_name(u), known.beyond_range
         self.history.append(Iteration(named, value, excess, measures, beyond))
         self.bar.set_postfix(objective=f"{value:.6g}", excess=f"{excess:.1e}")
 
     def _rank(self, design: Design) -> tuple[float, float]:
         """Designs nearer to the requirements come first, and of those that keep them the better."""
         excess = self.problem.excess(design.known)
-        return 0.0 if excess <= KEPT else excess, self.problem.objective(design.known)[0]
+        return 0.0 if excess <= KEPT else excess, self.problem.objective(design.known).value
 
 
 class Optimum(NamedTuple):
@@ -185,7 +198,7 @@ class Optimum(NamedTuple):
         )
 
 
-def _message(problem: DesignProblem, best: Design, ended: Ended) -> str:
+def _message(problem: DesignProblem, best: Design, ended: RunEnding) -> str:
     """The optimiser's own words, and which bifurcations the best design does not meet."""
     low, high = range_of(problem.scene_at(best.u), "slope")
     ensemble = problem.ensemble
@@ -204,16 +217,15 @@ def _message(problem: DesignProblem, best: Design, ended: Ended) -> str:
 def optimum_of(problem: DesignProblem, runs: Runs) -> Optimum:
     """The best of the designs that runs came to."""
     best = runs.best
-    assert best is not None
-    value, _, error = problem.objective(best.known)
+    found = problem.objective(best.known)
     return Optimum(
         outcome=runs.outcome(),
         message=_message(problem, best, runs.ended),
         scene=problem.scene_at(best.u),
         gait=problem.gait_of(best),
-        variables=problem.variables.named(best.u),
-        objective=problem.sense * value,
-        error=error,
+        variables=problem.variables.by_name(best.u),
+        objective=problem.sense * found.value,
+        error=found.error,
         known=best.known,
         optimality=optimality_of(problem, best),
         history=runs.history,

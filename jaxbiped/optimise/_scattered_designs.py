@@ -26,7 +26,7 @@ def scattered_designs(problem: DesignProblem, begin: Design, count: int, seed: i
         if known is not None:
             found.append(Design(each, known))
     found.sort(
-        key=lambda design: (problem.excess(design.known), problem.objective(design.known)[0])
+        key=lambda design: (problem.excess(design.known), problem.objective(design.known).value)
     )
     return found[:count]
 

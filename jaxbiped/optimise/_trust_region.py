@@ -7,14 +7,12 @@ about it at several distances, and their linearisations are cuts, too (gradient 
 Lewis and Overton, SIAM J. Optim. 15, 2005).
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from jaxbiped.optimise._design_problem import Design, DesignProblem
 from jaxbiped.optimise._local_model import Local, Model, local_of
 from jaxbiped.optimise._optimality import OPTIMAL, lagrangian_change, optimality_of
-from jaxbiped.optimise._optimisers import Ended, rows_of
+from jaxbiped.optimise._optimisers import Callback, Functions, RunEnding, rows_of
 
 _FIRST, _LARGEST, _SMALLEST = 0.1, 0.5, 1e-7
 """Half-widths of the trust region in u: at first, at most, and at which it is given up."""
@@ -34,16 +32,17 @@ _DISTANCES = (1e-2, 1e-3, 1e-4)
 
 
 def run_trust_region(
-    problem: DesignProblem, u: np.ndarray, iterations: int, told: Callable[[np.ndarray], None]
-) -> Ended:
+    functions: Functions, u: np.ndarray, iterations: int, report: Callback
+) -> RunEnding:
     """Minimises from a design whose gait is known."""
-    search = _Search(problem, u, iterations, told)
+    problem = functions.problem
+    search = _Search(problem, u, iterations, report)
     while search.descend():
         if optimality_of(problem, search.design).residual <= OPTIMAL:
-            return Ended(True, search.message)
+            return RunEnding(True, search.message)
         if not any(search.leaves(distance) for distance in _DISTANCES) and search.left > 0:
-            return Ended(True, f"{search.message} None of those scattered about it is better.")
-    return Ended(False, "Iteration limit reached.")
+            return RunEnding(True, f"{search.message} None of those scattered about it is better.")
+    return RunEnding(False, "Iteration limit reached.")
 
 
 class _Search:
@@ -56,17 +55,13 @@ class _Search:
     """
 
     def __init__(
-        self,
-        problem: DesignProblem,
-        u: np.ndarray,
-        iterations: int,
-        told: Callable[[np.ndarray], None],
+        self, problem: DesignProblem, u: np.ndarray, iterations: int, report: Callback
     ) -> None:
         assert problem.latest is not None
         known = problem.latest.known
-        self.problem, self.told, self.left = problem, told, iterations
+        self.problem, self.report, self.left = problem, report, iterations
         self.rows = rows_of(problem)
-        self.scale = max(abs(problem.objective(known)[0]), 1e-300)
+        self.scale = max(abs(problem.objective(known).value), 1e-300)
         self.design = Design(np.array(u), known)
         self.here = local_of(problem, self.rows, self.scale, self.design)
         self.cuts: list[Local] = []
@@ -147,21 +142,21 @@ class _Search:
         """
         u, self.left = np.clip(u, 0.0, 1.0), self.left - 1
         known = self.problem.at(u)
-        self.told(u if known is not None else self.here.u)
+        self.report(u if known is not None else self.here.u)
         if known is None:
             return None
         design = Design(u, known)
         there = local_of(self.problem, self.rows, self.scale, design)
         if self.here.merit(self.penalty) - there.merit(self.penalty) > least:
             change = lagrangian_change(self.problem, self.design, design, self.scale)
-            self.curvature = _updated(self.curvature, u - self.here.u, change)
+            self.curvature = _damped_update(self.curvature, u - self.here.u, change)
             self.design, self.here, self.cuts = design, there, []
         else:
             self.cuts = [*self.cuts, there]
         return there
 
 
-def _updated(curvature: np.ndarray, step: np.ndarray, change: np.ndarray) -> np.ndarray:
+def _damped_update(curvature: np.ndarray, step: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Powell's damped BFGS update of the Lagrangian's curvature by a change of its gradient."""
     image = curvature @ step
     own = float(step @ image)

@@ -85,7 +85,7 @@ def test_where_one_was_not_located_the_nearer_end_counts(monkeypatch):
 def test_a_distance_moves_with_the_bifurcation_and_against_the_gait(value, monkeypatch):
     slopes = np.arange(len(NAMES)) * 0.1
     slopes[NAMES.index("slope")] = 0.0
-    located = distances._Located(value, 1e-6, slopes, 0.01 * slopes)
+    located = distances.Functional(value, 1e-6, slopes, 0.01 * slopes)
     other = OWN + 0.02
     parts = [SimpleNamespace(bifurcations=branch(other).bifurcations, stop=None),
              SimpleNamespace(bifurcations=branch(value).bifurcations, stop=None)]  # fmt: skip

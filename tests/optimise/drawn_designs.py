@@ -35,7 +35,7 @@ class Drawn(DesignProblem):
     """
 
     def _follow(self, u):
-        told = self.function(self.variables.named(u), u)
+        told = self.function(self.variables.by_name(u), u)
         if told is None:
             return None
         values = {name: float(value) for name, (value, _) in told.items()}

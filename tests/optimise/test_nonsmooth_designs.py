@@ -29,7 +29,7 @@ def best_of(count, function, goal="speed", subject_to=None, iterations=300):
 def gained(runs, function):
     """By how much the best of the allowed designs all round is better, at three distances."""
     made, best = runs.problem, runs.best
-    random, own, gain = np.random.default_rng(1), made.objective(best.known)[0], 0.0
+    random, own, gain = np.random.default_rng(1), made.objective(best.known).value, 0.0
     for distance in (1e-4, 1e-3, 1e-2):
         for _ in range(200):
             aside = random.standard_normal(len(best.u))

@@ -119,7 +119,7 @@ def test_a_lost_gait_turns_the_search_back(monkeypatch):
     plain = DesignProblem.at
 
     def at(problem, u):
-        if problem.variables.named(np.clip(u, 0.0, 1.0))["d"] < 0.09:
+        if problem.variables.by_name(np.clip(u, 0.0, 1.0))["d"] < 0.09:
             problem.lost += 1
             return None
         return plain(problem, u)
