@@ -1,4 +1,4 @@
-"""Following of starts until the label of each is certain, by any engine."""
+"""Following of starts until the label of each is certain: how far and accurately, by any engine."""
 
 from typing import Any, NamedTuple
 

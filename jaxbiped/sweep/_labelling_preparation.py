@@ -1,4 +1,4 @@
-"""Preparation of a labelling: its gaits found, from a start or from the starts themselves."""
+"""Preparation of a labelling: its settings checked, its gaits found, from a start or the starts."""
 
 import warnings
 from collections.abc import Mapping, Sequence
