@@ -47,7 +47,7 @@ class Options(NamedTuple):
     duration: float | None = None
     footsteps: int | None = None
     solver: str | diffrax.AbstractSolver[PyTree] = "rodas4p"
-    accuracy: str | float = "balanced"
+    accuracy: Any = "balanced"
     rtol: float | None = None
     atol: float | None = None
     dt: float | None = None
