@@ -43,15 +43,12 @@ _LONGER, _LONG = 2.0, 1e-2
 state from which they are too long."""
 
 
-_ALLOWED = ("solver", "accuracy", "rtol", "atol", "dt", "save", "max_solver_steps", "adjoint")
-"""Options that apply."""
-
-
 def simulate_linkage(
     scene: LinkageScene, state: LinkageState, asked: Options
 ) -> Trajectory[LinkageState]:
     """Checks what is asked, and simulates a linkage from a start put on its constraints."""
-    asked.refuse_others(scene, _ALLOWED)
+    walks = ("duration", "footsteps", "max_arrivals", "extremes", "watch", "engine")
+    asked.refuse(scene, *walks)
     times, dt, adjoint = asked.times, asked.dt, asked.adjoint
     if times is None:
         raise ArgumentError(

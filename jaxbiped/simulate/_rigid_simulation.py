@@ -58,11 +58,6 @@ _LOOSEST = 1e-3
 """Loosest tolerance to begin with."""
 _PATIENCE = 50.0
 """Time allowed for each footstep, in units of √(l/g)."""
-_ALLOWED = (
-    *("duration", "footsteps", "accuracy", "rtol", "save", "max_arrivals", "max_solver_steps"),
-    "engine",
-)
-"""Options that apply."""
 
 
 class RigidSimulation(eqx.Module):
@@ -88,7 +83,7 @@ class RigidSimulation(eqx.Module):
     @staticmethod
     def of(scene: RigidScene, state: RigidState, asked: Options) -> "RigidSimulation":
         """Checks what is asked, and forms it."""
-        asked.refuse_others(scene, _ALLOWED)
+        asked.refuse(scene, "solver", "atol", "dt", "extremes", "watch", "adjoint")
         section, duration, footsteps = asked.section, asked.duration, asked.footsteps
         ends_alone = isinstance(asked.save, str) and asked.save == "end"
         if not ends_alone and not isinstance(section, HeelStrike):

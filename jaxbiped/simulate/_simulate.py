@@ -1,7 +1,7 @@
 """Simulation of a scene from a start: the door for every kind of scene, and its short names."""
 
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import diffrax
 from jaxtyping import Array, PyTree
@@ -15,7 +15,6 @@ from jaxbiped.dynamics._state import RigidState
 from jaxbiped.scene._scene import RedundantScene, RigidScene, Scene
 from jaxbiped.scene._walker import LinkageScene
 from jaxbiped.simulate._error_witnesses import (
-    AnySimulation,
     accurate_walk,
     check_accurate_walk,
     warn_of_long_steps,
@@ -49,7 +48,7 @@ def simulate(
     max_solver_steps: int = 65536,
     adjoint: diffrax.AbstractAdjoint | None = None,
     engine: str = "auto",
-) -> Trajectory:
+) -> Trajectory[Any]:
     """Simulates a scene from a state, for a time, a number of footsteps, or whichever ends first.
 
     Works under `jit`, `vmap` and differentiation; one lane that falls or fails neither changes nor
@@ -140,14 +139,16 @@ def simulate(
     wanted = check_accurate_walk(accuracy, rtol=rtol, atol=atol, dt=dt)
     if wanted is not None:
         asked = asked._replace(accuracy="balanced")
-    kind = RigidSimulation if isinstance(scene, RigidScene) else Simulation
-    run: AnySimulation = kind.of(scene, state, asked)
+    if isinstance(scene, RigidScene):
+        rolls = RigidSimulation.of(scene, state, asked)
+        return rolls() if wanted is None else accurate_walk(rolls, wanted)
+    run = Simulation.of(scene, state, asked)
     if wanted is not None:
         return accurate_walk(run, wanted)
-    if isinstance(run, Simulation) and rtol is not None and dt is None:
+    if rtol is not None and dt is None:
         warn_of_unresolved_slip(rtol, scene.minimal)
     walk = run()
-    if isinstance(run, Simulation) and dt is not None:
+    if dt is not None:
         warn_of_missed_contacts(run, walk)
         warn_of_long_steps(run, walk)
     return walk

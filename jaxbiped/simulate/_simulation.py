@@ -119,7 +119,8 @@ class Simulation(eqx.Module):
         """Checks what is asked, and forms it."""
         given, dt, footsteps, times = state, asked.dt, asked.footsteps, asked.times
         check_limits(asked.duration, footsteps, asked.max_solver_steps)
-        time = PATIENCE * footsteps if asked.duration is None else asked.duration
+        allowed_time = PATIENCE * footsteps if footsteps is not None else 0.0
+        time = allowed_time if asked.duration is None else asked.duration
         for name, value in (("rtol", asked.rtol), ("atol", asked.atol)):
             check_unbatched(name, value)
         with traced_rules() as rules:
@@ -204,7 +205,7 @@ class Simulation(eqx.Module):
         """The same at another relative tolerance, the absolute one in proportion."""
         share = float(self.atol) / float(self.rtol)
         both = (jnp.asarray(np.asarray(x, self.rtol.dtype)) for x in (rtol, share * rtol))
-        return dataclasses.replace(self, **dict(zip(("rtol", "atol"), both, strict=True)))
+        return eqx.tree_at(lambda run: (run.rtol, run.atol), self, tuple(both))
 
     def by_other_method(self) -> tuple["Simulation", float, float]:
         """The same by another method; its tolerance in units of the walk's, and its weight."""

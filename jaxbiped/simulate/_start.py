@@ -44,7 +44,7 @@ class Options(NamedTuple):
     duration: float | None = None
     footsteps: int | None = None
     solver: str | diffrax.AbstractSolver[PyTree] = "rodas4p"
-    accuracy: str | float = "balanced"
+    accuracy: Any = "balanced"
     rtol: float | None = None
     atol: float | None = None
     dt: float | None = None
@@ -71,13 +71,14 @@ class Options(NamedTuple):
         """The times to save at, as they are given."""
         return None if isinstance(self.save, str | AbstractSection) else self.save
 
-    def refuse_others(self, scene: Any, allowed: tuple[str, ...]) -> None:
-        """Raises `ArgumentError` for an option that does not apply to such a scene."""
-        for name, value in self._asdict().items():
-            if name not in allowed and value != self._field_defaults[name]:
+    def refuse(self, scene: Any, *names: str) -> None:
+        """Raises `ArgumentError` for one of these options: they do not apply to such a scene."""
+        for name in names:
+            value = getattr(self, name)
+            if value != self._field_defaults[name]:
+                kind = type(scene).__name__
                 raise ArgumentError(
-                    f"{name} = {value!r} is not allowed for a {type(scene).__name__}: choose among "
-                    f"{', '.join(allowed)}."
+                    f"{name} = {value!r} is not allowed for a {kind}: leave it out."
                 )
 
 

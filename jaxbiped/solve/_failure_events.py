@@ -1,6 +1,7 @@
 """Failure events, which end a simulation, and the surfaces of the state on which endings lie."""
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import jax.numpy as jnp
 import jax.tree_util as jtu
@@ -135,7 +136,7 @@ def _failed(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:
     return ~jnp.isfinite(sum(jtu.tree_leaves(y)))
 
 
-def _event(condition: Callable[[Scene, State], Scalar]) -> Callable[..., Scalar]:
+def _event(condition: Callable[[Scene, Any], Scalar]) -> Callable[..., Scalar]:
     """A condition of scene and minimal state as diffrax asks it."""
 
     def happens(t: Time, y: PyTree, args: PyTree, **kwargs: object) -> Scalar:

@@ -53,12 +53,17 @@ def exact(y, v, level, time):
     return jnp.stack([level + speed * rest + 0.5 * AFTER * rest**2, speed + AFTER * rest])
 
 
+def saltation(watch, y, v, happens=True):
+    """At a height and a speed."""
+    at = jax.jit(lambda y, happens: saltation_at(watch, y, seeded(3), happens))
+    return at((jnp.asarray(y), jnp.asarray(v)), happens)
+
+
 def test_saltation_is_the_change_of_the_field_over_the_rate_of_crossing():
-    at = (jnp.asarray(0.5 - 1e-12), jnp.asarray(-3.0))
-    told = jax.jit(lambda y, happens: saltation_at(WATCH, y, seeded(3), happens))
-    found = told(at, True)
+    at = 0.5 - 1e-12, -3.0
+    found = saltation(WATCH, *at)
     np.testing.assert_allclose(found.change, [0.0, (AFTER - BEFORE) / -3.0], atol=1e-9)
-    np.testing.assert_array_equal(told(at, False).change, [0.0, 0.0])
+    np.testing.assert_array_equal(saltation(WATCH, *at, False).change, [0.0, 0.0])
     np.testing.assert_array_equal(found.by_state, [1.0, 0.0])
     np.testing.assert_array_equal(found.by_parameter, [-1.0])
     np.testing.assert_array_equal(found.which, [True, False])
@@ -70,8 +75,7 @@ def test_of_two_switches_it_is_the_one_that_was_passed_last():
 
     other = Watch(field=field, switches=watch)
     # The level was passed a millionth of a second ago, the speed of −3 a ten-millionth of that.
-    at = (jnp.asarray(0.5 - 3e-6), jnp.asarray(-3.0 + 1e-6 + 1e-12))
-    found = jax.jit(lambda y: saltation_at(other, y, seeded(3), jnp.asarray(True)))(at)
+    found = saltation(other, 0.5 - 3e-6, -3.0 + 1e-6 + 1e-12)
     np.testing.assert_array_equal(found.which, [False, False, True])
     np.testing.assert_array_equal(found.by_state, [0.0, 1.0])
 
@@ -82,8 +86,7 @@ def test_across_a_speed_the_rate_of_crossing_is_the_one_before():
         field=lambda t, y, args: (y[1], jnp.where(y[1] > -2.0, -9.8, -4.8)),
         switches=lambda args, y: (Switch(y[1] + 2.0, True, force_jumps=True),),
     )
-    at = (jnp.asarray(1.0), jnp.asarray(-2.0 - 1e-12))
-    found = jax.jit(lambda y: saltation_at(watch, y, seeded(3), jnp.asarray(True)))(at)
+    found = saltation(watch, 1.0, -2.0 - 1e-12)
     np.testing.assert_allclose(found.change, [0.0, 5.0 / -9.8], atol=1e-9)
 
 

@@ -8,7 +8,8 @@ The corner of the force where a foot comes down rejects steps of any size that g
 by size this would cost some ten attempts at every touchdown of the seed's walker: `TouchdownAhead`
 lets a step that was rejected end just past that the next time.
 
-Steps of one size are not cut short: `MissedContacts` counts those that step over a contact.
+Steps of one size are not cut short: `MissedContacts` counts those that step over a contact. The
+solve's `args` must be the scene.
 """
 
 import functools
@@ -51,10 +52,7 @@ _LARGEST = 0.95
 
 
 class ShallowContact(AbstractMemorylessControl):
-    """Wraps a controller; a step within which a foot dips into the ground is tried again, to there.
-
-    The solve's `args` must be the scene.
-    """
+    """Wraps a controller; a step in which a foot dips into the ground is tried again, to there."""
 
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does, but for shallow contacts."""
@@ -118,10 +116,7 @@ def _part_above(
 
 
 class TouchdownAhead(AbstractMemorylessControl):
-    """Wraps a controller; what is tried after a rejected step may be longer than that says.
-
-    The solve's `args` must be the scene.
-    """
+    """Wraps a controller; what is tried after a rejected step may be longer than that says."""
 
     def adapt(self, attempt: Attempt) -> Adapted:
         """Accepts or rejects a step as the wrapped controller does; the next one's size differs."""
@@ -151,10 +146,7 @@ def _to_touchdown(scene: CompliantScene, span: Scalar, state: PyTree) -> Scalar:
 
 
 class MissedContacts(AbstractWrappedControl):
-    """Wraps a controller; its state carries how many contacts lie between two steps.
-
-    The solve's `args` must be the scene.
-    """
+    """Wraps a controller; its state carries how many contacts lie between two steps."""
 
     def init(self, *request: Any) -> tuple[Scalar, Any]:
         first, inner = self.controller.init(*request)
