@@ -60,16 +60,8 @@ class Bouncing(jb.gait.AbstractSystem):
         return None
 
 
-class Deadline(jb.dynamics.AbstractSection):
-    """The clock passes the duration."""
-
-    def value(self, args: Ball, y: Any) -> Any:
-        """Time past the duration [s]."""
-        return y[2] - args.duration
-
-    def counts(self, args: Ball, y: Any) -> Any:
-        """Always."""
-        return jnp.asarray(True)
+DEADLINE = jb.Section(lambda args, y: y[2] - args.duration)
+"""The clock passes the duration."""
 
 
 def ours(problem: Problem, rtol: float) -> Run:
@@ -83,7 +75,7 @@ def ours(problem: Problem, rtol: float) -> Run:
             rtol=rtol,
             tangent_rtol=rtol,
             parameters=problem.parameters[1:],
-            section=Deadline(),
+            section=DEADLINE,
             system=Bouncing(damped=problem.c != 0.0),
             solver=solver,
             engine="lanes",

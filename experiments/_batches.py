@@ -1,5 +1,7 @@
 """Batches of starts to label, and how long that takes."""
 
+import functools
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -35,6 +37,21 @@ def swept(labelling: jb.Labelling, count: int, **options: Any) -> Callable[[], A
     """A sweep of starts, to be run and timed; in memory unless a store is given."""
     starts, how = starts_of(labelling.scene, count), {"chunk": 16384} | options
     return lambda: jb.sweep(labelling, starts, look_for_gaits=False, **how)
+
+
+@functools.cache  # its gait is found once
+def _labelling(model: str, how: tuple[tuple[str, Any], ...]) -> jb.Labelling:
+    return labelling_of(model, **dict(how))
+
+
+def labelled(model: str, starts: jb.starts.Sample, *, look: bool = True, **how: Any) -> Any:
+    """A sweep's dataset, which tells what a warning would: of labels in doubt, or out of steps.
+
+    `look`: whether the sweep looks for gaits that the labelling does not know.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return jb.sweep(_labelling(model, tuple(how.items())), starts, look_for_gaits=look)
 
 
 def least_seconds(work: dict[Any, Callable[[], Any]], rounds: int) -> dict[Any, float]:

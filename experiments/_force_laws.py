@@ -45,20 +45,28 @@ MEASURES = {
 """Measures of a gait by their names here and in `jb.gait.Measures`."""
 
 
+def foot_loads(scene, state):
+    """For each foot its depth while it touches, its forces and its slip: pairs by name."""
+    both, forces = jb.dynamics.feet(scene, state), jb.dynamics.foot_forces(scene, state)
+    none = jnp.zeros_like(state.theta_1)
+    return {
+        "depth": [jnp.where(jb.dynamics.touches(foot), foot.penetration, 0.0) for foot in both],
+        "normal": [force.normal for force in forces],
+        "tangential": [none if each.tangential is None else each.tangential for each in forces],
+        "slip": [foot.slip_speed for foot in both],
+    }
+
+
 def extremes(scene, state):
     """Loads and depths of both feet, for the `extremes` of a simulation."""
-    both, forces = jb.dynamics.feet(scene, state), jb.dynamics.foot_forces(scene, state)
-    normal = [force.normal for force in forces]
-    depths = [jnp.where(jb.dynamics.touches(foot), foot.penetration, 0.0) for foot in both]
-    tangential = [
-        0.0 if force.tangential is None else jnp.abs(force.tangential) for force in forces
-    ]
+    loads = foot_loads(scene, state)
+    normal = loads["normal"]
     ratios = [
-        jnp.where(load > 0.0, pull / jnp.where(load > 0.0, load, 1.0), 0.0)
-        for pull, load in zip(tangential, normal, strict=True)
+        jnp.where(load > 0.0, jnp.abs(pull) / jnp.where(load > 0.0, load, 1.0), 0.0)
+        for pull, load in zip(loads["tangential"], normal, strict=True)
     ]
     return {
-        "depth": jnp.maximum(*depths),
+        "depth": jnp.maximum(*loads["depth"]),
         "least": jnp.minimum(*normal),
         "most": jnp.maximum(*normal),
         "total": normal[0] + normal[1],

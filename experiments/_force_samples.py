@@ -5,6 +5,7 @@ from typing import NamedTuple
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
+from _force_laws import foot_loads
 
 import jaxbiped as jb
 
@@ -43,17 +44,9 @@ def motion(scene, duration):
 
 @eqx.filter_jit
 def _rows(scene, state):
-    both, forces = jb.dynamics.feet(scene, state), jb.dynamics.foot_forces(scene, state)
-    nothing = jnp.zeros_like(state.theta_1)
-    tangential = [nothing if each.tangential is None else each.tangential for each in forces]
-    return {
-        "kinetic": jb.dynamics.energies(scene, state).kinetic,
-        "angle": jnp.stack([state.theta_1, state.theta_2]),
-        "depth": jnp.stack([jnp.where(jb.dynamics.touches(f), f.penetration, 0.0) for f in both]),
-        "normal": jnp.stack([each.normal for each in forces]),
-        "tangential": jnp.stack(tangential),
-        "slip": jnp.stack([foot.slip_speed for foot in both]),
-    }
+    pairs = foot_loads(scene, state) | {"angle": [state.theta_1, state.theta_2]}
+    rows = {name: jnp.stack(pair) for name, pair in pairs.items()}
+    return rows | {"kinetic": jb.dynamics.energies(scene, state).kinetic}
 
 
 def strikes(found):

@@ -55,16 +55,13 @@ def of_gradient_cost(numbers: dict[str, Any]) -> Iterator[str]:
 
 def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
     """Errors of state and gradient of each way and setting, and what it says of them."""
-    for each in numbers["rows"]:
-        if each["outcome"] == "answered":
-            said = "nothing" if each["said"] is None else small(each["said"])
-            setting = f"{each['setting']} = {small(each['value'], 0)}"
-            errors = small(each["state_error"]), small(each["gradient_error"])
-            yield row(each["problem"], each["way"], setting, *errors, *_cpu_time(each), said)
+    answered = [each for each in numbers["rows"] if each["outcome"] == "answered"]
+    for each in answered:
+        yield row(each["problem"], each["way"], _setting(each), *_answer(each))
     damped = {
         (each["way"], each["value"]): each
-        for each in numbers["rows"]
-        if each["problem"] == "spring and damper" and each["outcome"] == "answered"
+        for each in answered
+        if each["problem"] == "spring and damper"
     }
     ours, tsit5 = damped["jaxbiped", 1e-6], damped["diffrax Tsit5", 1e-6]
     warp = damped["Warp", 1e-5]
@@ -75,13 +72,9 @@ def of_gradient_truth(numbers: dict[str, Any]) -> Iterator[str]:
 def of_footstep_truth(numbers: dict[str, Any]) -> Iterator[str]:
     """Errors of a footstep and its gradient by each way and setting, and what it says of them."""
     for each in numbers["rows"]:
-        setting = f"{each['setting']} = {small(each['value'], 0)}"
-        if each.get("outcome", "answered") != "answered":
-            yield row(each["way"], setting, UNKNOWN, each["outcome"], UNKNOWN, UNKNOWN)
-            continue
-        said = "nothing" if each["said"] is None else small(each["said"])
-        errors = small(each["state_error"]), small(each["gradient_error"])
-        yield row(each["way"], setting, *errors, *_cpu_time(each), said)
+        answered = each.get("outcome", "answered") == "answered"
+        cells = _answer(each) if answered else (UNKNOWN, each["outcome"], UNKNOWN, UNKNOWN)
+        yield row(each["way"], _setting(each), *cells)
     yield f"changes by {small(numbers['problem']['coarser_collocation'])}"
     yield f"differs from our finest solve by {small(numbers['problem']['our_finest'])}"
 
@@ -208,9 +201,15 @@ _COMPARED = (1, 2, 3, 4, 5)
 """Which of the errors at which ways are compared are quoted: 1e-3 to 1e-7."""
 
 
-def _cpu_time(found: dict[str, Any]) -> tuple[str, ...]:
-    """A cell with the CPU time [ms], where it was measured."""
-    return (_milliseconds(found["cpu_s"]),) if "cpu_s" in found else ()
+def _setting(found: dict[str, Any]) -> str:
+    return f"{found['setting']} = {small(found['value'], 0)}"
+
+
+def _answer(found: dict[str, Any]) -> tuple[str, ...]:
+    """Errors of state and gradient, CPU time [ms] where it was measured, and what is said."""
+    errors = small(found["state_error"]), small(found["gradient_error"])
+    spent = (_milliseconds(found["cpu_s"]),) if "cpu_s" in found else ()
+    return *errors, *spent, "nothing" if found["said"] is None else small(found["said"])
 
 
 def _milliseconds(seconds: float | str | None) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-MOST = 8
+MOST = 4
 """Numbers of a list that are printed; of a longer one it is said how many there are."""
 
 

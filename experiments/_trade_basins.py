@@ -1,7 +1,6 @@
 """Cases of a trade study: labels of a fixed draw of starts, and the share of them that walk."""
 
 import functools
-import warnings
 from collections.abc import Iterator
 from typing import Any
 
@@ -55,7 +54,7 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
 
     def peer(rtol: float) -> Row:
         """On all of numba's threads, its pieces judged by plain rules of their own."""
-        known, labelling = truth(), labelling_of((("rtol", 1e-6),))
+        known, labelling = truth(), _batches.labelling_of("compliant", rtol=1e-6)
         batch = _batches.starts_of(labelling.scene, count).batch(labelling, 0, count)
         states = np.stack(list(map(np.asarray, batch.states)), axis=1)
         attractor = labelling.family.rows[0][0]
@@ -81,16 +80,9 @@ def cases(store: Store, quick: bool) -> Iterator[Case]:
 
 def swept(count: int, **how: Any) -> tuple[np.ndarray, int]:
     """Codes of the labels of a fixed draw, and the steps that all of them took."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of starts that ran out of steps
-        found = _batches.swept(labelling_of(tuple(how.items())), count)()
+    starts = _batches.starts_of(jb.seed_scene(), count)
+    found = _batches.labelled("compliant", starts, look=False, max_solver_steps=MOST_STEPS, **how)
     return found["label"].values, int(found["attempted"].sum())
-
-
-@functools.cache  # its gait is found once
-def labelling_of(how: tuple[tuple[str, Any], ...]) -> jb.Labelling:
-    """A labelling of the seed's walker."""
-    return _batches.labelling_of("compliant", max_solver_steps=MOST_STEPS, **dict(how))
 
 
 def shares_off(codes: np.ndarray, exact: np.ndarray) -> dict[str, np.ndarray]:

@@ -15,7 +15,7 @@ from _basin_slice import OMEGA, THETA
 from _experiment import Options, experiment
 from _pictures import label
 from _timing import seconds_of
-from _walks import walk_from
+from _walks import errors_of, perturbed, walker
 
 import jaxbiped as jb
 from jaxbiped.compiler import CUDA, DEVICES, Program, Request
@@ -77,23 +77,6 @@ def peak(count, attempts, rounds):
     return 2.0 * count * attempts * CHAINS * TURNS / seconds
 
 
-def perturbed(count):
-    """Starts about the seed's, every number off by about a thousandth of itself."""
-    noise = 1.0 + 1e-3 * np.random.default_rng(0).standard_normal((8, count))
-    return jb.State(*map(jnp.asarray, np.array([*jb.seed_state()])[:, None] * noise))
-
-
-def walker(engine, duration, rtol=2e-6):
-    """Walks starts: their final states, and attempted steps."""
-
-    def one(state):
-        end = walk_from(state, rtol, duration=duration, engine=engine)
-        return end.final, end.attempted
-
-    many = jax.jit(jax.vmap(one))
-    return lambda states: jax.block_until_ready(many(states))
-
-
 def walks(sizes, duration, rounds):
     """Attempted steps a second by each engine."""
     engines = ["cuda", "lanes", *(["xla"] if jax.default_backend() == "gpu" else [])]
@@ -101,7 +84,7 @@ def walks(sizes, duration, rounds):
     for size in sizes:
         starts, row = perturbed(size), {"size": size}
         for engine in engines if size <= MOST_BY_LANES else engines[:1]:
-            run = partial(walker(engine, duration), starts)
+            run = partial(walker(2e-6, engine=engine, duration=duration), starts)
             steps = float(np.sum(run()[1]))
             row[f"{engine}_steps_per_s"] = steps / seconds_of({0: run}, rounds)[0]
         rows.append(row)
@@ -110,15 +93,12 @@ def walks(sizes, duration, rounds):
 
 def errors(tolerances, size):
     """Median error of final states against a tight solve, and how many are the lanes' bits."""
-    starts, rows = perturbed(size), []
-    truth = np.array(walker("lanes", QUICK_DURATION, 1e-9)(starts)[0])
+    starts, rows, short = perturbed(size), [], dict(duration=QUICK_DURATION)
+    truth = walker(1e-9, engine="lanes", **short)(starts)[0]
     for rtol in tolerances:
-        found, ours = (
-            np.array(walker(engine, QUICK_DURATION, rtol)(starts)[0])
-            for engine in ("cuda", "lanes")
-        )
-        error = float(np.median(np.abs(found - truth).max(axis=0)))
-        same = float(np.mean(np.all(found == ours, axis=0)))
+        found, ours = (walker(rtol, engine=e, **short)(starts)[0] for e in ("cuda", "lanes"))
+        error = float(np.median(errors_of(found, truth)))
+        same = float(np.mean(np.all(found == ours, axis=1)))
         rows.append({"rtol": rtol, "error": error, "same_bits": same})
     return rows
 

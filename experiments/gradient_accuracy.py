@@ -76,16 +76,11 @@ class Stepped(jb.gait.AbstractSystem):
         return None
 
 
-class Stance(jb.dynamics.AbstractSection):
-    """Mid-stance."""
-
-    def value(self, args, y):
-        """That of the scene."""
-        return jb.MidStance().value(args.scene, y)
-
-    def counts(self, args, y):
-        """Whether leg 2 stands."""
-        return jb.MidStance().counts(args.scene, y)
+STANCE = jb.Section(
+    lambda args, y: jb.MidStance().value(args.scene, y),
+    lambda args, y: jb.MidStance().counts(args.scene, y),
+)
+"""Mid-stance of leg 2."""
 
 
 class Exact(NamedTuple):
@@ -129,7 +124,7 @@ def footstep(scene, start, lands, rtol, tangent_rtol):
         tangent_rtol=tangent_rtol,
         parameters=("K",),
         system=Stepped(),
-        section=Stance(),
+        section=STANCE,
         engine="xla",
     )
 

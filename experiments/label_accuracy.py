@@ -5,12 +5,11 @@ rigid walker's. References are ours at a tolerance finer than any accuracy's: of
 walker by rodas5p, which gives no label, held against rodas4; of the rigid walker at 1e-13.
 """
 
-import functools
 import itertools
-import warnings
 
 import numpy as np
 from _basin_slice import AXES, OMEGA, THETA, UNITS, WALKING
+from _batches import labelled
 from _experiment import Options, experiment
 from _pictures import label
 from _scenes import rigid_seed
@@ -48,21 +47,9 @@ def starts_of(name, count, seed):
     return jb.starts.sample(SCENES[name], BOUNDS[name], count, method="uniform", seed=seed)
 
 
-@functools.cache  # gaits are found once, not in each draw
-def labelling_of(name, how):
-    return jb.labelling(SCENES[name], **dict(how))
-
-
-def swept(name, starts, **how):
-    """A sweep's dataset."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # the numbers tell it
-        return jb.sweep(labelling_of(name, tuple(how.items())), starts)
-
-
 def reference(name, starts, **how):
     """Labels to compare with; pending where the reference itself ran out of steps."""
-    found = swept(name, starts, rtol=FINEST[name], max_solver_steps=MOST_STEPS, **how)
+    found = labelled(name, starts, rtol=FINEST[name], max_solver_steps=MOST_STEPS, **how)
     codes = found["label"].values
     return np.where(codes == OUT_OF_STEPS, PENDING, codes)
 
@@ -83,7 +70,7 @@ def of_names(options, count):
         ways[f"{solver} {rtol:g}"] = {"rtol": rtol, "solver": solver}
     found, rows = {}, []
     for name, how in tqdm(ways.items(), unit="ways"):
-        each = swept("compliant", starts, max_solver_steps=MOST_STEPS, **how)
+        each = labelled("compliant", starts, max_solver_steps=MOST_STEPS, **how)
         found[name] = codes = each["label"].values
         changed, either = differ(codes, exact), (codes == WALKING) | (exact == WALKING)
         rows.append(
@@ -112,10 +99,10 @@ def of_numbers(name, wishes, count, draws):
         starts = starts_of(name, count, seed)
         exact = reference(name, starts, solver="rodas5p")
         for wanted in wishes:
-            found = swept(name, starts, accuracy=wanted)
+            found = labelled(name, starts, accuracy=wanted)
             said = jb.basins.label_errors(found)
             sure = found["doubt"].values != int(jb.basins.Doubt.REMAINS)
-            plain = swept(name, starts, rtol=said.rtol)
+            plain = labelled(name, starts, rtol=said.rtol)
             own = {
                 "truly_wrong": int((differ(found["label"].values, exact) & sure).sum()),
                 "wrong_before": int(differ(plain["label"].values, exact).sum()),

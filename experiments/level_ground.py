@@ -26,16 +26,12 @@ SPEEDS, QUICK_SPEEDS = (0.2, 0.28, 0.4), (0.28,)
 VARY = {"impulse": (0.02, 0.4), "d": (0.05, 0.2), "J": (0.003, 0.02)}
 LEVEL = jb.seed_scene(slope=0.0)
 PUSHED = dataclasses.replace(rigid_seed(0.0), actuation=jb.actuation.PushOff(0.1))
+PRESSED = dataclasses.replace(LEVEL, actuation=jb.actuation.FootPreload(3e-3))
+TURNED = dataclasses.replace(LEVEL, actuation=jb.actuation.HipTorque(0.1))
 DRIVES = {
     "push-off, rigid": (PUSHED, "impulse", 0.1, (0.02, 0.5, 9)),
-    "foot preload": (
-        dataclasses.replace(LEVEL, actuation=jb.actuation.FootPreload(3e-3)),
-        *("extension", 3e-3, (1.2e-3, 1.2e-2, 10)),
-    ),
-    "hip torque": (
-        dataclasses.replace(LEVEL, actuation=jb.actuation.HipTorque(0.1)),
-        *("torque", 0.1, (0.06, 0.2, 11)),
-    ),
+    "foot preload": (PRESSED, "extension", 3e-3, (1.2e-3, 1.2e-2, 10)),
+    "hip torque": (TURNED, "torque", 0.1, (0.06, 0.2, 11)),
     "gravity, rigid": (rigid_seed(0.0), "slope", 0.02, (2e-3, 0.1, 33)),
     "gravity": (LEVEL, "slope", 0.02, (8e-3, 0.08, 13)),
 }

@@ -1,8 +1,8 @@
 """The paper's figures 4 to 8: the seed's walk on its slope of 0.02 rad, and a moving picture."""
 
-import jax.numpy as jnp
 import numpy as np
 from _experiment import Options, experiment
+from _force_laws import foot_loads
 
 import jaxbiped as jb
 from jaxbiped import plot
@@ -36,8 +36,7 @@ def main(options: Options):
 def measure(scene, walk):
     """The numbers that each figure shows, at the solver's own steps."""
     state = walk.state
-    both, forces = jb.dynamics.feet(scene, state), jb.dynamics.foot_forces(scene, state)
-    depths = [jnp.where(jb.dynamics.touches(foot), foot.penetration, 0.0) for foot in both]
+    loads = foot_loads(scene, state)
 
     def ends(values):
         return [float(np.min(values)), float(np.max(values))]
@@ -52,10 +51,10 @@ def measure(scene, walk):
             "angle_range_leg_1_rad": ends(state.theta_1),
             "angle_range_leg_2_rad": ends(state.theta_2),
         },
-        "fig7_penetrations": {"largest_m": [float(jnp.max(depth)) for depth in depths]},
+        "fig7_penetrations": {"largest_m": [float(np.max(each)) for each in loads["depth"]]},
         "fig8_contact_forces": {
-            "peak_normal_N": [float(jnp.max(force.normal)) for force in forces],
-            "peak_tangential_N": [float(jnp.max(jnp.abs(force.tangential))) for force in forces],
+            "peak_normal_N": [float(np.max(each)) for each in loads["normal"]],
+            "peak_tangential_N": [float(np.max(np.abs(each))) for each in loads["tangential"]],
         },
     }
 

@@ -8,7 +8,6 @@ is an entry into a file that lies above the caller's: one that imports it, direc
 into a file that was entered before is a return.
 """
 
-import ast
 import os
 import sys
 import tempfile
@@ -17,6 +16,7 @@ from pathlib import Path
 
 import jaxbiped as jb
 from jaxbiped.scene._scene import AbstractScene
+from tests.import_graph import imports_of
 
 ROOT = Path(jb.__file__).parent
 DOORS = {
@@ -30,12 +30,8 @@ def imports():
     """The files of the package that each file of it imports."""
     found = {}
     for path in sorted(ROOT.rglob("*.py")):
-        names = set()
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("jaxbiped"):
-                names.add(node.module)
-                names.update(f"{node.module}.{alias.name}" for alias in node.names)
-        paths = (ROOT.parent.joinpath(*name.split(".")).with_suffix(".py") for name in names)
+        names = (name.split(".") for name in imports_of(path))
+        paths = (ROOT.parent.joinpath(*name).with_suffix(".py") for name in names)
         found[str(path)] = {str(each) for each in paths if each.exists()}
     return found
 

@@ -27,11 +27,8 @@ def short(scene, state=START, **options):
 def put(scene, name, value):
     """As a user does it who passes the constructors by."""
     part = "normal" if name == "K" else "walker"
-    return eqx.tree_at(lambda s: getattr(getattr(s, part), name), scene, value, is_leaf=_is_none)
-
-
-def _is_none(leaf):
-    return leaf is None
+    none = lambda leaf: leaf is None
+    return eqx.tree_at(lambda s: getattr(getattr(s, part), name), scene, value, is_leaf=none)
 
 
 DOORS = {

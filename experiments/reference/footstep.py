@@ -46,7 +46,6 @@ class Footstep(NamedTuple):
         gradient: of the state at the end, (8, 8 + k).
         switches: names of the surfaces that were met, in order, with their times [s].
         peak: the largest normal force [N].
-        steps: how many it took.
     """
 
     time: float
@@ -55,7 +54,6 @@ class Footstep(NamedTuple):
     gradient: np.ndarray
     switches: list[tuple[str, float]]
     peak: float
-    steps: int
 
 
 class _Motion(NamedTuple):
@@ -117,7 +115,7 @@ def footstep(
     places = np.array([LAWS_AT[name] for name in varied], np.int64)
     y, w = np.array(start, float), np.eye(8, 8 + len(places))
     pieces = Pieces(np.array([FREE, PRESSING]), np.array([0, band_of(y, 1, p)]))
-    t, h, met, steps, peak = 0.0, FIRST_STEP, [], 0, 0.0
+    t, h, met, peak = 0.0, FIRST_STEP, [], 0.0
     while t < 2.0:
         motion = _Motion(y, p, pieces, nodes, matrix)
         trial, converged = motion.stages(h)
@@ -133,7 +131,7 @@ def footstep(
         if rough > resolution:
             h = span * max(0.2, 0.9 * (resolution / rough) ** (1.0 / stages))
             continue
-        y, w, t, steps = trial[-1], moved[-1], t + span, steps + 1
+        y, w, t = trial[-1], moved[-1], t + span
         peak = max(peak, motion.peak(y, span))
         room = (resolution / max(rough, 1e-30)) ** (1.0 / stages)
         h = span * min(GROWTH, max(0.2, 0.9 * room))
@@ -144,7 +142,7 @@ def footstep(
         slope = surface_slopes(y, p, which, places)
         later = -(slope[:8] @ w + np.append(np.zeros(8), slope[8:])) / (slope[:8] @ before)
         if which == UPRIGHT:
-            return Footstep(t, y, later, w + np.outer(before, later), met, peak, steps)
+            return Footstep(t, y, later, w + np.outer(before, later), met, peak)
         pieces = pieces.beyond(which, y, p)
         w = w + np.outer(before - field(y, p, *pieces), later)
         h = FIRST_STEP

@@ -27,12 +27,12 @@ def lsoda_address() -> int | None:
     return numba.cfunc(numbalsoda.lsoda_sig)(rates).address
 
 
-def lsoda(duration: float, rtol: float, atol: float, start: np.ndarray = START) -> np.ndarray:
-    """The final state, by numbalsoda."""
+def lsoda(duration: float, rtol: float, atol: float) -> np.ndarray:
+    """The final state of the seed's walk, by numbalsoda."""
     import numbalsoda
 
     times = np.array([0.0, duration])
-    states, _ = numbalsoda.lsoda(lsoda_address(), start, times, rtol=rtol, atol=atol)
+    states, _ = numbalsoda.lsoda(lsoda_address(), START, times, rtol=rtol, atol=atol)
     return states[-1]
 
 
