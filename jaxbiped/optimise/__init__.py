@@ -5,8 +5,8 @@ from jaxbiped.optimise._bifurcation_distance import Sought as Sought
 from jaxbiped.optimise._bifurcation_distance import bifurcation_distance as bifurcation_distance
 from jaxbiped.optimise._certificate import Certificate as Certificate
 from jaxbiped.optimise._certificate import certify as certify
+from jaxbiped.optimise._objective_values import Evaluation as Evaluation
 from jaxbiped.optimise._objectives import OBJECTIVES as OBJECTIVES
-from jaxbiped.optimise._objectives import Evaluation as Evaluation
 from jaxbiped.optimise._objectives import Objective as Objective
 from jaxbiped.optimise._optimality import Held as Held
 from jaxbiped.optimise._optimality import Optimality as Optimality

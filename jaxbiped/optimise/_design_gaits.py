@@ -14,7 +14,7 @@ from jaxbiped.dynamics._state import state_type
 from jaxbiped.gait._find_gait import find_gait
 from jaxbiped.gait._fixed_point_search import Search
 from jaxbiped.gait._gait import Gait
-from jaxbiped.optimise._objectives import BothFunctionals, functionals_of
+from jaxbiped.optimise._objective_values import BothFunctionals, functionals_of
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 

@@ -18,7 +18,7 @@ from jaxbiped.optimise._design_gaits import GaitSettings, are_walks
 from jaxbiped.optimise._design_variables import Requirement, Variables
 from jaxbiped.optimise._ensemble import Ensemble, evaluate_ensemble, with_worse_members
 from jaxbiped.optimise._evaluations import Evaluations
-from jaxbiped.optimise._objectives import Evaluation, evaluate
+from jaxbiped.optimise._objective_values import Evaluation, evaluate
 from jaxbiped.scene._parameter_access import with_parameters
 from jaxbiped.scene._scene import RigidScene, Scene
 

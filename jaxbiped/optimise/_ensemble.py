@@ -10,7 +10,7 @@ import numpy as np
 from jaxbiped._checks import ArgumentError, check_choice, check_count, check_within
 from jaxbiped.optimise._design_gaits import GaitSettings, are_walks, gaits_near
 from jaxbiped.optimise._jacobian_weights import CLUSTER
-from jaxbiped.optimise._objectives import Evaluation, evaluate
+from jaxbiped.optimise._objective_values import Evaluation, evaluate
 from jaxbiped.scene._parameter_access import parameter_names, parameter_values
 from jaxbiped.scene._scene import RigidScene, Scene
 

@@ -14,7 +14,7 @@ from jaxbiped._checks import ArgumentError
 from jaxbiped._files import failure_kind, strict_json
 from jaxbiped._identity import difference_of
 from jaxbiped._types import JsonObject
-from jaxbiped.optimise._objectives import Evaluation
+from jaxbiped.optimise._objective_values import Evaluation
 
 
 class Evaluations:

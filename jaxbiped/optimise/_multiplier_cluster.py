@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxbiped.optimise._jacobian_weights import SYMMETRIC
-from jaxbiped.optimise._objectives import Evaluation
+from jaxbiped.optimise._objective_values import Evaluation
 
 _LEADING = np.array([1.0, 3.0, 3.0, 1.0])
 _BY_COEFFICIENT = np.array([[1.0, 1, 1], [1, -1, -3], [-1, -1, 3], [-1, 1, -1]])

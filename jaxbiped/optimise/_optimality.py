@@ -6,7 +6,7 @@ import numpy as np
 import scipy  # its submodules are imported where they are first used
 
 from jaxbiped.optimise._design_problem import Design, DesignProblem
-from jaxbiped.optimise._objectives import Evaluation
+from jaxbiped.optimise._objective_values import Evaluation
 from jaxbiped.optimise._optimisers import AnyRow, cluster_rows, rows_of
 
 OPTIMAL = 1e-3

@@ -16,7 +16,7 @@ import scipy  # its submodules are imported where they are first used
 from jaxbiped._checks import ArgumentError
 from jaxbiped.optimise._design_problem import DesignProblem, scale_of
 from jaxbiped.optimise._multiplier_cluster import CONDITIONS, ClusterRow, cluster_of
-from jaxbiped.optimise._objectives import Evaluation
+from jaxbiped.optimise._objective_values import Evaluation
 
 if TYPE_CHECKING:
     import optax

@@ -11,7 +11,7 @@ from tqdm import tqdm
 from jaxbiped.continuation._nearest_bifurcation import range_of
 from jaxbiped.gait._gait import Gait
 from jaxbiped.optimise._design_problem import KEPT, Design, DesignProblem
-from jaxbiped.optimise._objectives import Evaluation
+from jaxbiped.optimise._objective_values import Evaluation
 from jaxbiped.optimise._optimality import OPTIMAL, Optimality, optimality_of
 from jaxbiped.optimise._optimisers import (
     Callback,

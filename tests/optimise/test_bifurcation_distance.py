@@ -5,7 +5,7 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.optimise import Sought
-from jaxbiped.optimise._objectives import evaluate
+from jaxbiped.optimise._objective_values import evaluate
 
 pytestmark = pytest.mark.slow
 STEP = 2e-3

@@ -14,7 +14,8 @@ from jaxbiped.dynamics._rolling import inertia_of, rolling_field, support_of
 from jaxbiped.dynamics._state import RigidState
 from jaxbiped.optimise._cycle_functionals import cycle_functionals, integral_names
 from jaxbiped.optimise._jacobian_functionals import JACOBIAN_FUNCTIONALS, jacobian_functionals
-from jaxbiped.optimise._objectives import check_objective, evaluate
+from jaxbiped.optimise._objective_values import evaluate
+from jaxbiped.optimise._objectives import check_objective
 
 pytestmark = pytest.mark.slow
 SCENES = jb.ladder() | {"heavy hip": jb.seed_scene(hip_mass=0.5, slope=0.025, r=0.1)}

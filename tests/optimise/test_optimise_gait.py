@@ -12,7 +12,7 @@ import jaxbiped as jb
 from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._design_problem import DesignProblem
 from jaxbiped.optimise._evaluations import Evaluations
-from jaxbiped.optimise._objectives import Evaluation
+from jaxbiped.optimise._objective_values import Evaluation
 from jaxbiped.optimise._optimise_gait import _problem_settings
 
 pytestmark = pytest.mark.slow

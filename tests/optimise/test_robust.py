@@ -6,7 +6,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.optimise._design_gaits import GaitSettings
 from jaxbiped.optimise._ensemble import ensemble_of, evaluate_ensemble
-from jaxbiped.optimise._objectives import evaluate
+from jaxbiped.optimise._objective_values import evaluate
 
 pytestmark = pytest.mark.slow
 RIGID = jb.ladder()["rigid"]

@@ -23,6 +23,15 @@ def _error(trajectory, state):
     return np.abs(np.array(trajectory.final) - state).max()
 
 
+def test_tight_state_error_is_below_1e_6(seed_walk, reference):
+    times, states = reference
+    _, walk = seed_walk
+    assert walk.outcome == jb.Ending.WALKING
+    assert _error(walk, states[-1]) < 1e-6
+    between = np.array(walk.at(times)).T
+    assert np.abs(between - states).max() < 1e-5
+
+
 @pytest.mark.parametrize("solver", ["rodas4", "rodas4p", "rodas5p"])
 def test_balanced_state_errors(solver, reference):
     assert _error(_walk(duration=2.0, solver=solver), reference[1][-1]) < 2e-4
