@@ -1,14 +1,14 @@
-"""Torques of what acts at the joints of a mechanism, and couplings, which need constraint torques."""
+"""Loads of what acts at the joints of a mechanism, and the constraint torques of couplings."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._tree import Loads, Motion, plus, weighted
 from jaxbiped.dynamics._tree_inertia import Elimination, substitute
-from jaxbiped.linalg._elimination import inverse
+from jaxbiped.linalg._elimination import Entry, inverse
 from jaxbiped.scene._ground import Ground
 from jaxbiped.scene._joint_parts import Coupling, Latch, Spring, Stop
 from jaxbiped.scene._mechanism import Mechanism
@@ -20,13 +20,12 @@ _ROOT_E = 1.6487212707001282
 
 def angle_value(angle: Angle, values: tuple[Scalar, ...], vertical: Scalar | None) -> Scalar:
     """A sum of angles, or of rates, for which `vertical` is None."""
-    total = None
+    total: Entry = None
     for body, weight in angle.weights:
         total = plus(total, weighted(values[body], weight))
     if angle.vertical and vertical is not None:
         total = plus(total, weighted(vertical, angle.vertical))
-    assert total is not None  # an angle names at least one body
-    return total
+    return jnp.zeros_like(values[0]) if total is None else total
 
 
 class Pressed(NamedTuple):
@@ -48,7 +47,7 @@ def pressed_limits(stop: Stop, angle: Scalar, rate: Scalar) -> list[Pressed]:
 
 
 def _spring_torque(spring: Spring, angle: Scalar, rate: Scalar) -> Scalar:
-    torque = None
+    torque: Any = None
     if spring.stiffness is not None:
         stretched = angle if spring.rest is None else angle - spring.rest
         torque = -(spring.stiffness * stretched)
@@ -59,7 +58,7 @@ def _spring_torque(spring: Spring, angle: Scalar, rate: Scalar) -> Scalar:
 
 def _stop_torque(stop: Stop, angle: Scalar, rate: Scalar) -> Scalar:
     assert stop.law is not None  # the scene has refused a stop without one
-    torque = None
+    torque: Any = None
     for limit in pressed_limits(stop, angle, rate):
         force = stop.law.force(limit.penetration, limit.rate)
         torque = plus(torque, weighted(force, limit.sign))
@@ -131,7 +130,7 @@ def with_constraint_torques(
     structure: Structure, joints: tuple[object, ...], factors: Elimination, loads: Loads
 ) -> list[Scalar]:
     """Accelerations in the falling frame under loads, couplings held by their torques."""
-    free = substitute(structure, factors, loads)
+    free: list[Any] = substitute(structure, factors, loads)
     held = [
         angle
         for angle, part in zip(structure.joints, joints, strict=True)
@@ -155,6 +154,8 @@ def with_constraint_torques(
     mobility = inverse([[along(angle, answer) for answer in answers] for angle in held])
     gaps = [along(angle, free) for angle in held]
     for row, answer in zip(mobility, answers, strict=True):
-        torque = sum((-a * gap for a, gap in zip(row[1:], gaps[1:], strict=True)), -row[0] * gaps[0])
+        torque = sum(
+            (-a * gap for a, gap in zip(row[1:], gaps[1:], strict=True)), -row[0] * gaps[0]
+        )
         free = [plus(a, torque * b) for a, b in zip(free, answer, strict=True)]
     return free

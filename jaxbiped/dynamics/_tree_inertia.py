@@ -4,7 +4,7 @@ Every body is eliminated from the leaves to the root point. Accelerations are th
 that falls freely, so that gravity enters once, at the root point.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from jaxbiped._types import Scalar
 from jaxbiped.dynamics._tree import Arm, Loads, Pose, Vector, arm_of, plus, times
@@ -33,12 +33,13 @@ def composites(mechanism: Mechanism) -> Composites:
     """The composite bodies of a mechanism."""
     structure, bodies = mechanism.structure, mechanism.bodies
     n = len(bodies)
-    masses, along, ahead, inertias = ([None] * n for _ in range(4))
+    masses: list[Any] = [None] * n
+    along, ahead, inertias = list(masses), list(masses), list(masses)
     for j in reversed(range(n)):
         body = bodies[j]
         mass, first = body.mass, body.mass * body.centre.along
         second = times(body.mass, body.centre.ahead)
-        inertia = body.inertia + first * body.centre.along
+        inertia: Any = body.inertia + first * body.centre.along
         inertia = plus(inertia, times(second, body.centre.ahead))
         for k in structure.children[j]:
             mass, at = mass + masses[k], bodies[k].at
@@ -50,7 +51,7 @@ def composites(mechanism: Mechanism) -> Composites:
                 moment = masses[k] * at.ahead
                 second, inertia = plus(second, moment), inertia + moment * at.ahead
         masses[j], along[j], ahead[j], inertias[j] = mass, first, second, inertia
-    total = mechanism.root_mass
+    total: Any = mechanism.root_mass
     for k in structure.children[-1]:
         total = plus(total, masses[k])
     return Composites(tuple(masses), total, tuple(along), tuple(ahead), tuple(inertias))
@@ -85,13 +86,15 @@ def eliminate(structure: Structure, known: Composites, pose: Pose) -> Eliminatio
     n = len(structure.bodies)
     moments = moments_of(known, pose)
     # What a body's hinge feels beyond the composite mass: a symmetric 2 × 2.
-    more: list[tuple[Entry, Entry, Entry]] = [(None, None, None)] * n
+    more: list[tuple[Any, Any, Any]] = [(None, None, None)] * n
     over: list[Scalar] = list(known.inertias)
     shares: list[Vector] = [moments[0]] * n
     for j in reversed(range(n)):
         cx, cz = moments[j]
         inertia = known.inertias[j]
-        xx = xz = zz = None
+        xx: Any = None
+        xz: Any = None
+        zz: Any = None
         for k in structure.children[j]:
             kxx, kxz, kzz = more[k]
             arm = pose.hinges[k]
@@ -114,7 +117,7 @@ def substitute(structure: Structure, factors: Elimination, loads: Loads) -> list
     """What the inverse of the mass matrix makes of generalised forces: x, z, angles."""
     n, pose = len(structure.bodies), factors.pose
     forces: list[tuple[Entry, Entry]] = [(None, None)] * n
-    torques = list(loads.torques)
+    torques: list[Any] = list(loads.torques)
     for j in reversed(range(n)):
         fx = fz = None
         for k in structure.children[j]:
@@ -132,7 +135,8 @@ def substitute(structure: Structure, factors: Elimination, loads: Loads) -> list
     for k in structure.children[-1]:
         fx, fz = plus(fx, forces[k][0]), plus(fz, forces[k][1])
     ax, az = _of_symmetric(factors.root, fx, fz)
-    found, hinges = [ax, az], []
+    found: list[Any] = [ax, az]
+    hinges: list[tuple[Entry, Entry]] = []
     for j, parent in enumerate(structure.parents):
         hx, hz = (ax, az) if parent < 0 else hinges[parent]
         arm = pose.hinges[j]
@@ -147,9 +151,7 @@ def substitute(structure: Structure, factors: Elimination, loads: Loads) -> list
     return found
 
 
-def _of_symmetric(
-    matrix: tuple[Scalar, Entry, Scalar], x: Entry, z: Entry
-) -> tuple[Entry, Entry]:
+def _of_symmetric(matrix: tuple[Scalar, Entry, Scalar], x: Entry, z: Entry) -> tuple[Entry, Entry]:
     """The solution of a symmetric 2 × 2 system."""
     xx, xz, zz = matrix
     if xz is None:

@@ -74,8 +74,8 @@ def check_angle(angle: object) -> None:
     total = sum(weight for _, weight in angle)
     if abs(total) > 1e-12 * max(abs(weight) for _, weight in angle):
         raise ArgumentError(
-            f"angle = {dict(angle)} is not allowed, for its weights sum to {total:g}: a torque from "
-            'nowhere; name its other side, or "normal" or "vertical".'
+            f"angle = {dict(angle)} is not allowed, for its weights sum to {total:g}: a torque "
+            'from nowhere; name its other side, or "normal" or "vertical".'
         )
 
 
@@ -144,9 +144,7 @@ class Stop(AbstractJointPart):
 
     def __check_init__(self) -> None:
         if self.upper is None and self.lower is None:
-            raise ArgumentError(
-                f"Stop({self.angle!r}) has no limit: give upper, lower or both."
-            )
+            raise ArgumentError(f"Stop({self.angle!r}) has no limit: give upper, lower or both.")
         if (
             self.upper is not None
             and self.lower is not None

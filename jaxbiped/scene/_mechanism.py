@@ -105,6 +105,7 @@ class Mechanism(eqx.Module):
 
     def __check_init__(self) -> None:
         check_parameters(self)
+        _check_parameter_names(self)
         check_inertia(self)
 
     @property
@@ -172,7 +173,8 @@ class Mechanism(eqx.Module):
         """What names of each piece's parameters begin with."""
         s, found = self.structure, {}
         names = [
-            name if s.body_twins is None or s.body_twins[j] == j
+            name
+            if s.body_twins is None or s.body_twins[j] == j
             else pair_name(*(s.bodies[i] for i in sorted((j, s.body_twins[j]))))
             for j, name in enumerate(s.bodies)
         ]
@@ -211,12 +213,30 @@ def _check_pieces(root: str, bodies: Any, feet: Any, joints: Any) -> None:
             )
 
 
-def _number(part: str, name: object, names: Sequence[str]) -> int:
+def _check_parameter_names(mechanism: "Mechanism") -> None:
+    structure = mechanism.structure
+    prefixes = list(mechanism._prefixes().values())
+    for k, prefix in zip(structure.body_pieces, structure.bodies, strict=True):
+        called = mechanism._prefixes()[k]
+        if called != prefix and called in structure.bodies:
+            raise ArgumentError(
+                f"a body is called {called!r}, which is not allowed: in names of parameters "
+                f"{called!r} stands for the pair."
+            )
+    for k, part in zip(structure.joint_pieces, mechanism.joints, strict=True):
+        if prefixes.count(mechanism._prefixes()[k]) > 1:
+            raise ArgumentError(
+                f"two {part.kind}s at one body, {mechanism._prefixes()[k]!r}, are not allowed "
+                "without a name each: give name=."
+            )
+
+
+def _number(part: str, name: Any, names: Sequence[str]) -> int:
     if name not in names:
         raise ArgumentError(
             f"{part} names {name!r}, which is no body: there are {', '.join(names)}."
         )
-    return names.index(name)  # type: ignore[arg-type]
+    return names.index(name)
 
 
 def _parents(bodies: Sequence[Body], names: list[str]) -> Indices:

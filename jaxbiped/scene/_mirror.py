@@ -54,9 +54,7 @@ def body_twins(
     return tuple(twin)
 
 
-def foot_twins(
-    feet: Indices, legs: Sequence[str], twin: Indices, pieces: Sequence[Any]
-) -> Indices:
+def foot_twins(feet: Indices, legs: Sequence[str], twin: Indices, pieces: Sequence[Any]) -> Indices:
     """Number of each foot's mirror image; feet of paired bodies pair in order.
 
     Raises:
@@ -142,7 +140,8 @@ def check_alike(one: Any, other: Any) -> None:
 
 def _equal(one: Any, other: Any) -> bool:
     leaves, others = jtu.tree_leaves(one), jtu.tree_leaves(other)
-    if jtu.tree_structure(one) != jtu.tree_structure(other):
+    structure: Any = jtu.tree_structure(one)
+    if structure != jtu.tree_structure(other):
         return False
     for a, b in zip(leaves, others, strict=True):
         if isinstance(a, jax.core.Tracer) or isinstance(b, jax.core.Tracer):

@@ -88,9 +88,7 @@ class Structure:
     def children(self) -> tuple[Indices, ...]:
         """Of each body; the last entry has those of the root point."""
         n = len(self.bodies)
-        return tuple(
-            tuple(k for k in range(n) if self.parents[k] == j) for j in (*range(n), -1)
-        )
+        return tuple(tuple(k for k in range(n) if self.parents[k] == j) for j in (*range(n), -1))
 
     @functools.cached_property
     def chains(self) -> tuple[Indices, ...]:
