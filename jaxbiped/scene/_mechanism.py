@@ -8,14 +8,22 @@ import equinox as eqx
 import jax.numpy as jnp
 import jax.tree_util as jtu
 
-from jaxbiped._checks import ArgumentError, check_type
+from jaxbiped._checks import ArgumentError
 from jaxbiped._parameter_declaration import check_parameters, parameter
 from jaxbiped._types import Parameter, Scalar, by_numpy
-from jaxbiped.scene._bodies import RESERVED, Body, Foot, check_name
+from jaxbiped.scene._bodies import Body, Foot, check_name
 from jaxbiped.scene._couplings import fixed_angles
 from jaxbiped.scene._joint_parts import AbstractJointPart, Coupling
+from jaxbiped.scene._mechanism_pieces import (
+    angle_of_part,
+    check_pieces,
+    foot_names_of,
+    number_of,
+    parents_of,
+    turn_of,
+)
 from jaxbiped.scene._mirror import body_twins, foot_twins, joint_twins
-from jaxbiped.scene._structure import Angle, Indices, Structure, pair_name
+from jaxbiped.scene._structure import Indices, Structure, pair_name
 from jaxbiped.scene._zero_pose import check_inertia
 
 
@@ -64,13 +72,13 @@ class Mechanism(eqx.Module):
         turn: Mapping[str, int] | None = None,
     ) -> None:
         check_name("root", root)
-        _check_pieces(root, bodies, feet, joints)
+        check_pieces(root, bodies, feet, joints)
         names = [each.name for each in bodies]
-        parents = _parents(bodies, names)
-        at_feet = tuple(_number(f"Foot({each.body!r})", each.body, names) for each in feet)
-        foot_names = _foot_names(feet)
+        parents = parents_of(bodies, names)
+        at_feet = tuple(number_of(f"Foot({each.body!r})", each.body, names) for each in feet)
+        foot_names = foot_names_of(feet)
         legs = [each.body if each.leg is None else each.leg for each in feet]
-        angles = tuple(_angle(part, parents, names) for part in joints)
+        angles = tuple(angle_of_part(part, parents, names) for part in joints)
         twins: list[Indices | None] = [None, None, None]
         if mirror:
             twin = body_twins(names, parents, bodies, mirror)
@@ -100,7 +108,7 @@ class Mechanism(eqx.Module):
             body_pieces=places[0],
             foot_pieces=places[1],
             joint_pieces=places[2],
-            turn=_turn(turn, names),
+            turn=turn_of(turn, names),
         )
 
     def __check_init__(self) -> None:
@@ -195,24 +203,6 @@ def _leaf_name(path: tuple[Any, ...]) -> str:
     return names[-1]
 
 
-def _check_pieces(root: str, bodies: Any, feet: Any, joints: Any) -> None:
-    for argument, kind, group in (
-        ("bodies", Body, bodies), ("feet", Foot, feet), ("joints", AbstractJointPart, joints)
-    ):  # fmt: skip
-        if isinstance(group, eqx.Module) or not isinstance(group, Sequence):
-            raise ArgumentError(f"{argument} = {group!r} is not allowed: give a tuple of them.")
-        for each in group:
-            check_type(argument, each, kind)
-    if not feet:
-        raise ArgumentError("feet is empty, which is not allowed: a mechanism needs one foot.")
-    names = [each.name for each in bodies]
-    for name in names:
-        if names.count(name) > 1 or name == root:
-            raise ArgumentError(
-                f"two parts are called {name!r}, which is not allowed: names are unique."
-            )
-
-
 def _check_parameter_names(mechanism: "Mechanism") -> None:
     structure = mechanism.structure
     prefixes = list(mechanism._prefixes().values())
@@ -231,61 +221,6 @@ def _check_parameter_names(mechanism: "Mechanism") -> None:
             )
 
 
-def _number(part: str, name: Any, names: Sequence[str]) -> int:
-    if name not in names:
-        raise ArgumentError(
-            f"{part} names {name!r}, which is no body: there are {', '.join(names)}."
-        )
-    return names.index(name)
-
-
-def _parents(bodies: Sequence[Body], names: list[str]) -> Indices:
-    found = []
-    for j, body in enumerate(bodies):
-        if body.parent is None:
-            found.append(-1)
-            continue
-        parent = _number(f"Body({body.name!r})", body.parent, names)
-        if parent >= j:
-            raise ArgumentError(
-                f"Body({body.name!r}) stands before its parent {body.parent!r}: parents come first."
-            )
-        found.append(parent)
-    return tuple(found)
-
-
-def _foot_names(feet: Sequence[Foot]) -> tuple[str, ...]:
-    of_body = [each.body for each in feet]
-    found: list[str] = []
-    for k, foot in enumerate(feet):
-        several = of_body.count(foot.body) > 1
-        plain = f"foot_{of_body[: k + 1].count(foot.body)}" if several else "foot"
-        name = plain if foot.name is None else foot.name
-        if (foot.body, name) in zip(of_body, found, strict=False):
-            raise ArgumentError(
-                f"two feet of {foot.body!r} are called {name!r}, which is not allowed."
-            )
-        found.append(name)
-    return tuple(found)
-
-
-def _angle(part: AbstractJointPart, parents: Indices, names: list[str]) -> Angle:
-    words = f"{type(part).__name__} on {part.angle!r}"
-    if isinstance(part.angle, str):
-        j = _number(words, part.angle, names)
-        reaction = () if parents[j] < 0 else ((parents[j], -1.0),)
-        return Angle(((j, 1.0), *reaction))
-    weights, vertical = [], 0.0
-    for name, weight in part.angle:
-        if name == "vertical":
-            vertical = weight
-        elif name not in RESERVED:
-            weights.append((_number(words, name, names), weight))
-    if not weights:
-        raise ArgumentError(f"{words} names no body, so that nothing would move.")
-    return Angle(tuple(weights), vertical)
-
-
 def _share(group: Sequence[Any], twins: Indices | None, pieces: list[Any]) -> Indices:
     """Adds the pieces of a group that have parameters of their own; the number of each one's."""
     found: list[int] = []
@@ -296,19 +231,6 @@ def _share(group: Sequence[Any], twins: Indices | None, pieces: list[Any]) -> In
         found.append(len(pieces))
         pieces.append(piece)
     return tuple(found)
-
-
-def _turn(turn: Mapping[str, int] | None, names: list[str]) -> tuple[int, int] | None:
-    if turn is None:
-        return None
-    if not isinstance(turn, Mapping) or len(turn) != 1:
-        raise ArgumentError(f"turn = {turn!r} is not allowed: give one body and its count.")
-    ((name, count),) = turn.items()
-    if not isinstance(count, int) or count < 3:
-        raise ArgumentError(
-            f"turn = {dict(turn)} is not allowed: the count must be a whole number of at least 3."
-        )
-    return _number("turn", name, names), count
 
 
 def _placed(piece: Any, **names: object) -> Any:

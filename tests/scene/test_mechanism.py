@@ -1,4 +1,4 @@
-"""Mechanisms as data: shared parameters of mirror images, names, and what is refused."""
+"""Mechanisms as data against the rules of their interface: names, mirror images, refusals."""
 
 import pickle
 
